@@ -1,0 +1,129 @@
+# `make help` shows what can be asked for. Nothing here is installed outside `.venv`.
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+PYTEST_ARGS ?=
+
+VENV := .venv
+BIN := $(VENV)/bin
+RUN_LOCK := requirements.lock
+DEV_LOCK := requirements-dev.lock
+
+# A sourced ROS shell puts its own packages in front of the ones in .venv; the two must not mix.
+unexport PYTHONPATH
+
+# The stamps carry a checksum of what they stand for: a changed lock asks for a new install, a touched one does not.
+key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
+RUN_STAMP := $(VENV)/.run-$(call key,$(RUN_LOCK))
+DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
+
+# Turns pip's long log into one line that counts: on a terminal it rewrites itself, in a log every tenth is kept.
+# Errors go past it unchanged.
+define install_lock
+total=$$(grep -c '==' $(1)); \
+echo "Installing from $(1): at most $$total packages, exact versions, hashes checked."; \
+PYTHONUNBUFFERED=1 $(BIN)/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
+	--require-hashes -r $(1) | { \
+	seen=0; \
+	while read -r verb what rest; do case "$$verb" in \
+		Collecting|Requirement) seen=$$((seen + 1)); \
+			if [ -t 1 ]; then printf '\r\033[K  %3d/%d %s' "$$seen" "$$total" "$${what%%==*}"; \
+			elif [ $$((seen % 10)) = 0 ]; then printf '  %3d/%d\n' "$$seen" "$$total"; fi ;; \
+		Downloading|Using) if [ -t 1 ]; then printf ' %s' "$${rest##* (}" | tr -d ')'; fi ;; \
+		Building) printf '\n  building %s\n' "$$rest" ;; \
+		Installing) printf '\n  unpacking, this takes a moment\n' ;; \
+	esac; done; }
+endef
+
+# hatchling and editables are in both locks, so that this step needs no network and no isolated build.
+install_fulmar = $(BIN)/python -m pip install --disable-pip-version-check --quiet --no-deps --no-build-isolation -e .
+
+.PHONY: help
+help: ## Show this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+	@echo
+	@echo "  PYTHON=python3.12    the interpreter that .venv is made from (3.11 to 3.13)"
+	@echo "  PYTEST_ARGS='-k lqr' what to add to pytest in 'make test'"
+
+.PHONY: setup
+setup: $(RUN_STAMP) ## Install what a robot or a simulation needs, into .venv (no torch)
+
+.PHONY: dev
+dev: $(DEV_STAMP) ## Install everything, also training and the tools of this workshop
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
+		echo "'$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true), but Fulmar needs Python 3.11, 3.12 or 3.13." >&2; \
+		echo "Name one that you have: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+		echo "'$(PYTHON) -m venv' failed, see above. On Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
+
+$(RUN_STAMP): | $(VENV)/bin/python
+	@$(call install_lock,$(RUN_LOCK))
+	@$(install_fulmar)
+	@rm -f $(VENV)/.run-*
+	@touch $@
+	@echo "Ready: $(BIN)/fulmar"
+
+# The development lock holds the run-time lock, version for version, so it fulfils both stamps.
+$(DEV_STAMP): | $(VENV)/bin/python
+	@$(call install_lock,$(DEV_LOCK))
+	@$(install_fulmar)
+	@rm -f $(VENV)/.run-* $(VENV)/.dev-*
+	@touch $@ $(RUN_STAMP)
+	@echo "Ready: $(BIN)/fulmar, with training and the tools for tests"
+
+.PHONY: demo
+demo: setup ## Run the floating platform with a policy, then with LQR, over real ROS 2
+	@$(BIN)/fulmar demo
+
+.PHONY: train-demo
+train-demo: dev ## Train a policy, export it and judge it in MuJoCo
+	$(BIN)/fulmar train floating_platform go_to_pose --seed 1 --out runs/train/go_to_pose
+	$(BIN)/fulmar export runs/train/go_to_pose --out runs/bundles/go_to_pose
+	$(BIN)/fulmar evaluate floating_platform go_to_pose --controller policy --policy runs/bundles/go_to_pose \
+		--through mujoco --episodes 256
+
+.PHONY: test
+test: dev ## Run every test
+	@if $(BIN)/python -m pytest $(PYTEST_ARGS); then echo; echo "All tests passed."; \
+	else code=$$?; echo; echo "Some tests failed; the list is above. Once more, only those: make test PYTEST_ARGS=--last-failed" >&2; \
+		exit $$code; fi
+
+.PHONY: check
+check: dev ## Check format, lint, types, import contracts and spelling
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/codespell
+	@echo "All checks passed."
+
+.PHONY: format
+format: dev ## Rewrite the sources in the one format, with the safe fixes of the linter
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+.PHONY: ros-build
+ros-build: dev ## Build the ROS workspace with colcon, into ros2_ws/{build,install,log}
+	cd ros2_ws && PATH="$$PWD/../$(BIN):$$PATH" ../$(BIN)/colcon build --base-paths src
+
+# Universal: one file serves Python 3.11 to 3.13. Neither command nor index is written into it.
+compile = $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.11 --fork-strategy fewest \
+	--generate-hashes --no-header --no-annotate --quiet
+
+.PHONY: lock
+lock: dev ## Make both locks anew (UPGRADE=1 takes the newest versions)
+	$(compile) $(if $(UPGRADE),--upgrade) --extra ros --extra sim --extra policy --extra bags --extra hardware \
+		--extra view --group build --output-file $(RUN_LOCK)
+	$(compile) $(if $(UPGRADE),--upgrade) --all-extras --group dev --constraint $(RUN_LOCK) --output-file $(DEV_LOCK)
+
+.PHONY: clean
+clean: ## Remove what was built and cached; .venv and runs/ stay
+	rm -rf build dist ros2_ws/build ros2_ws/install ros2_ws/log
+	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +

@@ -1,0 +1,4 @@
+"""Real devices behind the backend seam.
+
+Only the modules that end in _node know ROS.
+"""
