@@ -1,0 +1,53 @@
+"""Start under `ros2 launch` the same nodes that `fulmar run` starts.
+
+This file only translates. Which nodes there are is decided in `fulmar_bringup.node_table`.
+"""
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from fulmar_bringup.node_table import NodeSpec, list_nodes
+
+ARGUMENTS = {
+    "system": "a file of configs/systems, without .yaml",
+    "robot": "a file of configs/robots, without .yaml",
+    "task": "a file of configs/tasks, without .yaml",
+    "controller": "policy, or a classical controller such as lqr",
+    "backend": "mujoco, mock or hardware",
+    "policy": "folder of a policy bundle",
+}
+
+
+def to_node(spec: NodeSpec) -> Node:
+    """Translate one row of the node table; the end of any node ends the launch."""
+    # Without its type, launch_ros would read a text such as "7" or "on" as YAML.
+    parameters = {
+        key: ParameterValue(value, value_type=str) if isinstance(value, str) else value
+        for key, value in spec.parameters.items()
+    }
+    return Node(
+        package=spec.package,
+        executable=spec.executable,
+        name=spec.name,
+        namespace=spec.namespace,
+        parameters=[parameters] if parameters else [],
+        output="screen",
+        on_exit=Shutdown(reason=f"{spec.name} ended"),
+    )
+
+
+def start_nodes(context: LaunchContext) -> list[Node]:
+    """Read the launch arguments, which are known only now, and list the nodes."""
+    asked = {name: LaunchConfiguration(name).perform(context) or None for name in ARGUMENTS}
+    return [to_node(spec) for spec in list_nodes(**asked)]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Entry point of `ros2 launch`."""
+    arguments = [
+        DeclareLaunchArgument(name, default_value="", description=text) for name, text in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=start_nodes)])
