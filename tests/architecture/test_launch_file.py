@@ -1,0 +1,169 @@
+"""`system.launch.py` starts what the node table lists.
+
+`launch` and `launch_ros` do not exist as wheels, so small stand-ins note what is built from them.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import sys
+from dataclasses import dataclass, field
+from types import ModuleType
+
+import pytest
+
+ARGUMENTS = {"system", "robot", "task", "controller", "backend", "policy"}
+
+
+class Built:
+    """Keeps the arguments of its construction."""
+
+    def __init__(self, *args, **kwargs):
+        self.args = args
+        self.kwargs = kwargs
+
+
+class LaunchConfiguration(Built):
+    """Reads a launch argument; the context is a plain dict here."""
+
+    def perform(self, context):
+        return context[self.args[0]]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the node table, with the fields of a NodeSpec."""
+
+    name: str = "plant"
+    package: str = "sim_nodes"
+    executable: str = "sim_node"
+    module: str = "sim_nodes.sim_node"
+    namespace: str = "platform"
+    parameters: dict = field(default_factory=lambda: {"control_hz": 5.0, "lockstep": True, "seed": 7})
+
+
+STAND_INS = {
+    "launch": {"LaunchContext": Built, "LaunchDescription": type("LaunchDescription", (Built,), {})},
+    "launch.actions": {
+        name: type(name, (Built,), {}) for name in ("DeclareLaunchArgument", "OpaqueFunction", "Shutdown")
+    },
+    "launch.substitutions": {"LaunchConfiguration": LaunchConfiguration},
+    "launch_ros": {},
+    "launch_ros.actions": {"Node": type("Node", (Built,), {})},
+    "launch_ros.parameter_descriptions": {"ParameterValue": type("ParameterValue", (Built,), {})},
+}
+
+
+def stand_in(monkeypatch, name, **attributes):
+    module = ModuleType(name)
+    vars(module).update(attributes)
+    monkeypatch.setitem(sys.modules, name, module)
+
+
+@pytest.fixture
+def load(repository, monkeypatch):
+    """Function that loads the launch file anew."""
+    for name, attributes in STAND_INS.items():
+        stand_in(monkeypatch, name, **attributes)
+
+    def load_launch_file():
+        path = repository / "ros2_ws/src/fulmar_bringup/launch/system.launch.py"
+        spec = importlib.util.spec_from_file_location("system_launch", path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    return load_launch_file
+
+
+@pytest.fixture
+def launch_with(load, monkeypatch):
+    """Function that launches given rows with given arguments: (what was asked, nodes built)."""
+
+    def launch(*rows, **arguments):
+        asked = {}
+
+        def list_nodes(**kwargs):
+            asked.update(kwargs)
+            return rows
+
+        stand_in(monkeypatch, "fulmar_bringup.node_table", NodeSpec=Row, list_nodes=list_nodes)
+        return asked, start(load(), arguments)
+
+    return launch
+
+
+def start(launch_file, arguments):
+    """Nodes that `ros2 launch` would start: the opaque function is called with what was given."""
+    entities = launch_file.generate_launch_description().args[0]
+    context = {
+        e.args[0]: e.kwargs["default_value"] for e in entities if type(e).__name__ == "DeclareLaunchArgument"
+    }
+    assert set(context) == ARGUMENTS
+    (opaque,) = [e for e in entities if type(e).__name__ == "OpaqueFunction"]
+    return opaque.kwargs["function"](context | arguments)
+
+
+def test_arguments_that_are_not_given_mean_none(launch_with):
+    asked, _ = launch_with(Row())
+    assert asked == dict.fromkeys(ARGUMENTS)
+
+
+def test_arguments_that_are_given_reach_the_node_table(launch_with):
+    given = {name: f"some_{name}" for name in ARGUMENTS}
+    asked, _ = launch_with(Row(), **given)
+    assert asked == given
+
+
+def test_every_row_of_the_table_becomes_one_node(launch_with):
+    rows = [Row(), Row(name="controller", package="policy_server", executable="lqr_node")]
+    _, nodes = launch_with(*rows)
+    assert [type(node).__name__ for node in nodes] == ["Node", "Node"]
+    for row, node in zip(rows, nodes, strict=True):
+        told = node.kwargs
+        assert (told["package"], told["executable"]) == (row.package, row.executable)
+        assert (told["name"], told["namespace"]) == (row.name, row.namespace)
+        assert told["parameters"] == [row.parameters]
+        assert told["output"] == "screen"
+
+
+def test_a_node_without_parameters_gets_no_empty_parameter_file(launch_with):
+    _, (node,) = launch_with(Row(parameters={}))
+    assert node.kwargs["parameters"] == []
+
+
+def test_a_text_that_looks_like_a_number_stays_a_text(launch_with):
+    _, (node,) = launch_with(Row(parameters={"task": "7", "seed": 7}))
+    (parameters,) = node.kwargs["parameters"]
+    assert parameters["seed"] == 7
+    assert parameters["task"].args == ("7",)
+    assert parameters["task"].kwargs == {"value_type": str}
+
+
+def test_the_end_of_any_node_ends_the_launch(launch_with):
+    _, nodes = launch_with(Row(), Row(name="controller"))
+    for node in nodes:
+        assert type(node.kwargs["on_exit"]).__name__ == "Shutdown"
+        assert node.kwargs["name"] in node.kwargs["on_exit"].kwargs["reason"]
+
+
+def test_the_launch_arguments_are_those_of_the_node_table():
+    from fulmar_bringup.node_table import list_nodes
+
+    assert set(inspect.signature(list_nodes).parameters) == ARGUMENTS
+
+
+def test_every_system_launches_the_nodes_of_the_table(repository, load):
+    from fulmar_bringup.node_table import list_nodes
+
+    systems = sorted(path.stem for path in (repository / "configs" / "systems").glob("*.yaml"))
+    assert systems
+    for system in systems:
+        launched = [
+            (node.kwargs["package"], node.kwargs["executable"], node.kwargs["name"])
+            for node in start(load(), {"system": system})
+        ]
+        listed = [(spec.package, spec.executable, spec.name) for spec in list_nodes(system=system)]
+        assert launched == listed
+        assert launched

@@ -1,0 +1,125 @@
+"""The locks: exact, hashed, free of addresses, and in agreement with pyproject.toml and each other."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+RUN_LOCK, DEV_LOCK = "requirements.lock", "requirements-dev.lock"
+LOCKS = [RUN_LOCK, DEV_LOCK]
+PYTHONS = ["3.11", "3.12", "3.13"]
+RUN_EXTRAS = ["ros", "sim", "policy", "bags", "hardware", "view"]
+
+
+def entries(text):
+    """Each requirement of a lock with its hashes: (requirement, [hash, ...])."""
+    for entry in re.split(r"(?<!\\)\n", text):
+        pin, *hashes = re.split(r"\\\n\s+--hash=", entry)
+        if pin.strip() and not pin.startswith("#"):
+            yield Requirement(pin.strip()), hashes
+
+
+def versions(text, python):
+    """What a lock installs on Linux x86-64 with one Python: {name: version}."""
+    machine = {
+        "python_version": python,
+        "python_full_version": f"{python}.0",
+        "sys_platform": "linux",
+        "platform_system": "Linux",
+        "platform_machine": "x86_64",
+        "implementation_name": "cpython",
+        "platform_python_implementation": "CPython",
+    }
+    return {
+        canonicalize_name(requirement.name): str(requirement.specifier).removeprefix("==")
+        for requirement, _ in entries(text)
+        if requirement.marker is None or requirement.marker.evaluate(machine)
+    }
+
+
+@pytest.fixture(scope="module")
+def project(repository):
+    return tomllib.loads((repository / "pyproject.toml").read_text())
+
+
+@pytest.fixture(scope="module")
+def locks(repository):
+    return {name: (repository / name).read_text() for name in LOCKS}
+
+
+def wanted(project, extras, groups):
+    """Requirements that pyproject.toml writes down for some extras and groups."""
+    texts = [*project["project"]["dependencies"]]
+    for extra in extras:
+        texts += project["project"]["optional-dependencies"][extra]
+    for group in groups:
+        texts += [text for text in project["dependency-groups"][group] if isinstance(text, str)]
+    return [Requirement(text) for text in texts]
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_a_lock_names_no_address_and_no_path(locks, name):
+    for forbidden in (
+        r"://",
+        r"\bwww\.",
+        r"\.(org|com|io|net|dev)\b",
+        r"--(index|extra-index|find-links)",
+        r"\s@\s",
+    ):
+        assert re.search(forbidden, locks[name]) is None, forbidden
+    assert re.search(r"(^|\s)[./~]*/\w", locks[name]) is None
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_every_pin_is_exact_and_hashed(locks, name):
+    pins = list(entries(locks[name]))
+    assert len(pins) > 50
+    for requirement, hashes in pins:
+        assert requirement.url is None
+        assert re.fullmatch(r"==[^*,]+", str(requirement.specifier)), requirement
+        assert hashes, requirement
+        assert all(re.fullmatch(r"sha256:[0-9a-f]{64}", digest.strip()) for digest in hashes), requirement
+
+
+@pytest.mark.parametrize("python", PYTHONS)
+@pytest.mark.parametrize(
+    ("name", "extras", "groups"),
+    [(RUN_LOCK, RUN_EXTRAS, ["build"]), (DEV_LOCK, [*RUN_EXTRAS, "train"], ["build", "dev"])],
+)
+def test_the_pins_satisfy_pyproject(project, locks, name, extras, groups, python):
+    pinned = versions(locks[name], python)
+    for requirement in wanted(project, extras, groups):
+        version = pinned.get(canonicalize_name(requirement.name))
+        assert version is not None, f"{requirement.name} is not in {name}. Run `make lock`."
+        assert requirement.specifier.contains(version, prereleases=True), (
+            f"{requirement}, but {version}. Run `make lock`."
+        )
+
+
+def test_the_locks_know_every_extra(project):
+    assert set(project["project"]["optional-dependencies"]) == {*RUN_EXTRAS, "train"}
+
+
+def test_the_run_time_lock_can_build_the_editable_install(project, locks):
+    pinned = versions(locks[RUN_LOCK], "3.11")
+    for text in project["build-system"]["requires"]:
+        requirement = Requirement(text)
+        assert requirement.specifier.contains(pinned[requirement.name])
+
+
+@pytest.mark.parametrize("python", PYTHONS)
+def test_running_needs_no_learning_library(locks, python):
+    pinned = versions(locks[RUN_LOCK], python)
+    heavy = {"torch", "triton", "stable-baselines3", "gymnasium"}
+    assert not [name for name in pinned if name in heavy or name.startswith("nvidia-")]
+
+
+@pytest.mark.parametrize("python", PYTHONS)
+def test_the_development_lock_holds_the_run_time_lock(locks, python):
+    # One .venv serves both: `make setup` must never move what `make dev` installed.
+    run, dev = versions(locks[RUN_LOCK], python), versions(locks[DEV_LOCK], python)
+    assert {name: dev.get(name) for name in run} == run

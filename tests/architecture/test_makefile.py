@@ -1,0 +1,125 @@
+"""The Makefile: it explains itself, installs once, and refuses an interpreter that is too old."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+
+import pytest
+
+TARGETS = {
+    "help",
+    "setup",
+    "dev",
+    "demo",
+    "train-demo",
+    "test",
+    "check",
+    "format",
+    "ros-build",
+    "lock",
+    "clean",
+}
+
+# Stands for Python: notes what it is asked, and makes a .venv that holds a copy of itself.
+INTERPRETER = """#!/usr/bin/env bash
+echo "$*" >> calls.log
+case "$*" in
+    *version_info*) exit {too_old} ;;
+    --version) echo "Python {version}" ;;
+    "-m venv .venv") mkdir -p .venv/bin && cp "$0" .venv/bin/python ;;
+    *"-m pip"*"-r "*) echo "Collecting numpy==2.0.0" ;;
+esac
+"""
+
+
+@pytest.fixture
+def make(repository, tmp_path):
+    """Function that runs make in an empty copy: only what setting up reads, and no real Python."""
+    for name in ("Makefile", "pyproject.toml", "requirements.lock", "requirements-dev.lock"):
+        shutil.copy(repository / name, tmp_path)
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
+    environment.pop("PYTHON", None)
+
+    def run(*arguments, too_old=False):
+        interpreter = tmp_path / "interpreter"
+        version = "3.9.2" if too_old else "3.12.1"
+        interpreter.write_text(INTERPRETER.format(too_old=int(too_old), version=version))
+        interpreter.chmod(0o755)
+        return subprocess.run(
+            ["make", "PYTHON=./interpreter", *arguments],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run
+
+
+def installs(tmp_path):
+    """How often pip was asked to install a lock."""
+    return re.findall(r"-r (\S+)", (tmp_path / "calls.log").read_text())
+
+
+def test_help_lists_every_target(repository, make):
+    written = set(re.findall(r"^([a-z][a-z-]*):", (repository / "Makefile").read_text(), re.MULTILINE))
+    assert written == TARGETS
+    shown = re.findall(r"^  make ([a-z-]+) +\S", make("help").stdout, re.MULTILINE)
+    assert sorted(shown) == sorted(TARGETS)
+
+
+def test_make_alone_shows_the_help(make):
+    assert make().stdout == make("help").stdout
+
+
+def test_setup_installs_the_run_time_lock_once(make, tmp_path):
+    first, second = make("setup"), make("setup")
+    assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
+    assert installs(tmp_path) == ["requirements.lock"]
+    assert "--require-hashes" in (tmp_path / "calls.log").read_text()
+
+
+def test_setup_installs_again_when_the_lock_changed(make, tmp_path):
+    make("setup")
+    with (tmp_path / "requirements.lock").open("a") as lock:
+        lock.write("# another version\n")
+    assert make("setup").returncode == 0
+    assert installs(tmp_path) == ["requirements.lock", "requirements.lock"]
+
+
+def test_a_development_setup_serves_as_run_time_setup(make, tmp_path):
+    assert make("dev").returncode == 0
+    assert make("setup").returncode == 0
+    assert installs(tmp_path) == ["requirements-dev.lock"]
+
+
+def test_a_failed_install_is_not_taken_for_done(make, tmp_path):
+    make("setup")
+    (tmp_path / "requirements.lock").write_text("# changed\n")
+    (tmp_path / ".venv/bin/python").write_text("#!/usr/bin/env bash\nexit 1\n")
+    assert make("setup").returncode != 0
+    assert make("-q", "setup").returncode != 0
+
+
+def test_the_demo_needs_no_learning_library(make):
+    plan = make("--dry-run", "demo").stdout
+    assert "requirements.lock" in plan
+    assert "requirements-dev.lock" not in plan
+    assert ".venv/bin/fulmar demo" in plan
+
+
+def test_an_old_interpreter_gets_one_clear_line(make, tmp_path):
+    result = make("setup", too_old=True)
+    assert result.returncode != 0
+    assert "is Python 3.9.2, but Fulmar needs Python 3.11, 3.12 or 3.13." in result.stderr
+    assert "make setup PYTHON=python3.12" in result.stderr
+    assert not (tmp_path / ".venv").exists()
+
+
+def test_the_makefile_names_no_place_of_a_machine(repository):
+    text = (repository / "Makefile").read_text()
+    assert re.search(r"(?<![\w.)}/])/(home|usr|opt|root|tmp|work|var)\b", text) is None
