@@ -1,0 +1,101 @@
+"""A policy bundle as a controller: ONNX, without ROS and without torch; refused unless everything fits."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from fulmar_core.errors import BundleError
+from fulmar_core.policy_bundle import NETWORK, Passport, check_fit, read_golden, read_passport
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks import Task
+
+GOLDEN_TOLERANCE = 1e-4  # of the logits: float32 sums in another order on another processor differ by about 1e-6
+
+
+class Policy:
+    """A network that was validated against its passport, the robot, the task and the rate."""
+
+    name = "policy"
+
+    def __init__(self, folder: Path, robot: Robot, task: Task, *, control_hz: float | None = None) -> None:
+        """Load a bundle.
+
+        Args:
+            folder: The bundle.
+            robot: The robot it shall drive.
+            task: The task it shall do.
+            control_hz: The rate it shall run at; the robot's own by default [Hz].
+
+        Raises:
+            BundleError: Anything is missing, damaged, of other shape, made for something else, or does not
+                reproduce its golden vectors.
+        """
+        self.passport = read_passport(folder)
+        self.control_hz = control_hz or robot.timing.control_hz
+        check_fit(self.passport, robot, task, self.control_hz, where=str(folder))
+        self.observation_names = self.passport.observation_names
+        self._session = _open(folder)
+        _check_shapes(self._session, self.passport, folder)
+        _check_golden(self._session, folder)
+
+    def reset(self) -> None:
+        """Nothing to forget: the network has no memory."""
+
+    def act(self, observation: Array) -> Array:
+        """Choose actuators; shapes as in `Controller.act`."""
+        batch = np.atleast_2d(np.asarray(observation, dtype=np.float32))
+        (command,) = self._session.run(["command"], {"observation": batch})
+        return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
+
+    def metadata(self) -> dict[str, Any]:
+        """The passport, with the name of the controller."""
+        return {"controller": self.name, **asdict(self.passport)}
+
+
+def _open(folder: Path) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(
+            (folder / NETWORK).read_bytes(), options, providers=["CPUExecutionProvider"]
+        )
+    except Exception as error:  # noqa: BLE001 - onnxruntime's exceptions share no base class
+        reason = str(error).splitlines()[0]
+        raise BundleError(f"{folder / NETWORK}: onnxruntime refuses it: {reason}. Export the policy again.") from error
+
+
+def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:
+    inputs = {node.name: node.shape for node in session.get_inputs()}
+    outputs = {node.name: node.shape for node in session.get_outputs()}
+    wanted = (
+        (inputs, "observation", len(passport.observation_names)),
+        (outputs, "command", len(passport.actuator_names)),
+        (outputs, "logits", len(passport.actuator_names)),
+    )
+    for found, name, width in wanted:
+        if name not in found:
+            raise BundleError(f"{folder / NETWORK}: has no tensor '{name}', only {', '.join(found)}.")
+        if len(found[name]) != 2 or found[name][1] != width:
+            raise BundleError(
+                f"{folder / NETWORK}: '{name}' has shape {found[name]}, the passport's names need (worlds, {width})."
+            )
+
+
+def _check_golden(session: onnxruntime.InferenceSession, folder: Path) -> None:
+    golden = read_golden(folder)
+    command, logits = session.run(["command", "logits"], {"observation": golden.observations})
+    worst = float(np.max(np.abs(logits - golden.logits))) if golden.logits.size else float("inf")
+    if not worst <= GOLDEN_TOLERANCE:
+        raise BundleError(
+            f"policy '{folder}' differs from its golden vectors by {worst:.2g} (at most {GOLDEN_TOLERANCE:g}). "
+            "This machine computes something else than the one that exported it."
+        )
+    clear = np.abs(golden.logits) > GOLDEN_TOLERANCE  # a logit of nearly zero may round either way
+    if not np.array_equal(command[clear], golden.commands[clear]):
+        raise BundleError(f"policy '{folder}' gives other commands than its golden vectors. Export it again.")

@@ -1,0 +1,1 @@
+"""Actuators: what a command means in forces, one kind a file."""

@@ -1,0 +1,108 @@
+"""On/off gas thrusters fed by one pressure line."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from array_api_compat import array_namespace, device
+
+from fulmar_core.rotation import Array
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Nozzle:
+    """One valve with its nozzle, in the body frame."""
+
+    name: str
+    position: Vector3  # where the force acts [m]
+    direction: Vector3  # of the force on the body, any length > 0 [-]
+
+    def __post_init__(self) -> None:
+        """Refuse a nozzle that points nowhere."""
+        if np.linalg.norm(self.direction) < 1e-6:
+            raise ValueError(f"nozzle '{self.name}': 'direction' must not be zero.")
+
+
+@dataclass(frozen=True)
+class Thrusters:
+    """A bank of valves; a command is 1 (open) or 0 (closed) for each.
+
+    With a shared pressure line, n open valves give 1/n of the full thrust each (thesis §3.5.1;
+    RANS `tasks/MFP2D_Virtual.py`), so opening more valves redirects the thrust but never adds to it.
+    """
+
+    kind: Literal["thrusters"]
+    thrust: float  # of one valve that is open alone [N]
+    shared_pressure: bool
+    nozzles: tuple[Nozzle, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse banks without thrust or with two valves of one name."""
+        if self.thrust <= 0.0:
+            raise ValueError("'thrust' must be greater than 0.")
+        if not self.nozzles or len(set(self.names)) != len(self.nozzles):
+            raise ValueError("'nozzles' must not be empty, and each needs a name of its own.")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the valves, in the order of every command vector."""
+        return tuple(nozzle.name for nozzle in self.nozzles)
+
+    @property
+    def safe_command(self) -> np.ndarray:
+        """All valves closed, shape (n,)."""
+        return np.zeros(len(self.nozzles))
+
+    @functools.cached_property
+    def wrench_per_newton(self) -> np.ndarray:
+        """Force and torque in the body frame of 1 N at each nozzle, shape (n, 6) [N, N·m]."""
+        positions = np.array([nozzle.position for nozzle in self.nozzles])
+        directions = np.array([nozzle.direction for nozzle in self.nozzles])
+        directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return np.concatenate((directions, np.cross(positions, directions)), axis=1)
+
+    def limited(self, command: Array) -> Array:
+        """Nearest command that the hardware can carry out.
+
+        Args:
+            command: Finite values, shape (..., n); anything above one half opens a valve.
+
+        Returns:
+            Zeros and ones, shape (..., n).
+        """
+        xp = array_namespace(command)
+        return xp.astype(command > 0.5, command.dtype)
+
+    def thrusts(self, command: Array) -> Array:
+        """Thrust of each valve.
+
+        Args:
+            command: Open (1) or closed (0), shape (..., n).
+
+        Returns:
+            Thrusts, shape (..., n) [N].
+        """
+        if not self.shared_pressure:
+            return self.thrust * command
+        xp = array_namespace(command)
+        count = xp.sum(command, axis=-1, keepdims=True)
+        return self.thrust * command / xp.maximum(count, xp.ones_like(count))
+
+    def wrench_in_body(self, command: Array) -> tuple[Array, Array]:
+        """Total force and torque of a command.
+
+        Args:
+            command: Open (1) or closed (0), shape (..., n).
+
+        Returns:
+            Force (..., 3) [N] and torque about the body's origin (..., 3) [N·m], both in the body frame.
+        """
+        xp = array_namespace(command)
+        matrix = xp.asarray(self.wrench_per_newton, dtype=command.dtype, device=device(command))
+        wrench = self.thrusts(command) @ matrix
+        return wrench[..., 0:3], wrench[..., 3:6]

@@ -1,0 +1,61 @@
+"""The seam between Fulmar and whatever moves: a simulator, a mock, or a robot.
+
+The same node runs on any backend; only the constructor argument differs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fulmar_core.disturbances.scenario import World
+from fulmar_core.robot import Robot
+from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.state import RigidBodyState
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What a backend reports at one instant."""
+
+    odometry: RigidBodyState  # measured, without a batch axis
+    imu: ImuSample | None  # None: the robot has no inertial unit
+    truth: RigidBodyState | None  # None: not a simulator
+
+
+class Backend(Protocol):
+    """Anything that can carry out the commands of one robot."""
+
+    robot: Robot
+
+    def reset(self, start: RigidBodyState, world: World, *, seed: int, number: int = 0) -> Sample:
+        """Begin anew.
+
+        Args:
+            start: Where to begin; real robots begin where they are.
+            world: Body and wrench of the episode; real robots have their own.
+            seed: Seed of the sensor noise.
+            number: Number of the episode.
+
+        Returns:
+            First sample.
+        """
+        ...
+
+    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+        """Apply a command for some physics steps.
+
+        Args:
+            command: Within the actuators' limits, shape (n,).
+            ticks: Number of physics steps, >= 1.
+
+        Returns:
+            Sample at their end.
+        """
+        ...
+
+    def close(self) -> None:
+        """Bring the actuators to their safe state and let go."""
+        ...

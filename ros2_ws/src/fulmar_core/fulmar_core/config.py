@@ -1,0 +1,175 @@
+"""Strict YAML into frozen dataclasses: every mistake names its file and line.
+
+Knows types and files, not what a robot or a task is. The supported field types are
+bool, int, float, str, `X | None`, `Literal`, `tuple[X, ...]`, `tuple[X, Y, Z]`, `dict[str, X]`,
+nested dataclasses, and unions of dataclasses told apart by a field `kind`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import types
+import typing
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from fulmar_core.errors import ConfigError, did_you_mean
+
+T = TypeVar("T")
+
+
+def load_config(cls: type[T], path: Path) -> T:
+    """Read one YAML file into a frozen dataclass.
+
+    Args:
+        cls: Dataclass that describes the file; its `__post_init__` may raise ValueError. A union of
+            dataclasses works too: each has a field `kind: Literal["..."]`, and the file's `kind` picks one.
+        path: YAML file.
+
+    Returns:
+        The filled dataclass.
+
+    Raises:
+        ConfigError: File missing, not YAML, unknown or missing key, wrong type, or refused value;
+            the message starts with `file:line`.
+    """
+    root = _compose(path)
+    return typing.cast(T, _Builder(path).build(cls, root, "the file"))
+
+
+def _compose(path: Path) -> Node:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror or error}).") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text (byte {error.start}).") from error
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise ConfigError(f"{path}:{line}: not valid YAML: {error.problem or error.context}.") from error
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{path}: not valid YAML: {error}.") from error
+    if root is None:
+        raise ConfigError(f"{path}:1: the file is empty.")
+    return typing.cast(Node, root)
+
+
+class _Builder:
+    """Turns YAML nodes into typed values and remembers where each came from."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def fail(self, node: Node, message: str) -> typing.NoReturn:
+        raise ConfigError(f"{self.path}:{node.start_mark.line + 1}: {message}")
+
+    def build(self, kind: Any, node: Node, where: str) -> Any:
+        """Dispatch on the declared type of one field."""
+        origin = typing.get_origin(kind)
+        if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+            return self._dataclass(kind, node, where)
+        if origin is tuple:
+            return self._tuple(typing.get_args(kind), node, where)
+        if origin is dict:
+            pairs = self._pairs(node, where)
+            return {key: self.build(typing.get_args(kind)[1], value, f"'{key}'") for key, _, value in pairs}
+        if origin in (typing.Union, types.UnionType):
+            return self._union(typing.get_args(kind), node, where)
+        value = self._scalar(node, where)
+        if origin is typing.Literal:
+            return self._choice(typing.get_args(kind), value, node, where)
+        return self._checked(kind, value, node, where)
+
+    def _pairs(self, node: Node, where: str) -> list[tuple[str, Node, Node]]:
+        if not isinstance(node, MappingNode):
+            self.fail(node, f"{where} must be a mapping of keys to values.")
+        seen: set[str] = set()
+        for key_node, _ in node.value:
+            if key_node.value in seen:
+                self.fail(key_node, f"key '{key_node.value}' is written twice.")
+            seen.add(key_node.value)
+        return [(str(key.value), key, value) for key, value in node.value]
+
+    def _dataclass(self, cls: type, node: Node, where: str) -> Any:
+        hints = typing.get_type_hints(cls)
+        fields = {field.name: field for field in dataclasses.fields(cls) if field.init}
+        values: dict[str, Any] = {}
+        for name, key_node, value in self._pairs(node, where):
+            if name not in fields:
+                self.fail(key_node, f"unknown key '{name}'.{did_you_mean(name, fields)}")
+            values[name] = self.build(hints[name], value, f"'{name}'")
+        missing = [
+            name
+            for name, field in fields.items()
+            if name not in values
+            and field.default is dataclasses.MISSING
+            and field.default_factory is dataclasses.MISSING
+        ]
+        if missing:
+            self.fail(node, f"{where} lacks the key '{missing[0]}'.")
+        try:
+            return cls(**values)
+        except ValueError as error:
+            self.fail(node, f"{where}: {error}")
+
+    def _tuple(self, kinds: tuple[Any, ...], node: Node, where: str) -> tuple[Any, ...]:
+        if not isinstance(node, SequenceNode):
+            self.fail(node, f"{where} must be a list.")
+        if kinds[-1] is Ellipsis:
+            kinds = (kinds[0],) * len(node.value)
+        if len(kinds) != len(node.value):
+            self.fail(node, f"{where} has {len(node.value)} entries, {len(kinds)} are needed.")
+        items = zip(kinds, node.value, strict=True)
+        return tuple(self.build(kind, item, f"{where} entry {i + 1}") for i, (kind, item) in enumerate(items))
+
+    def _union(self, kinds: tuple[Any, ...], node: Node, where: str) -> Any:
+        if isinstance(node, ScalarNode) and self._scalar(node, where) is None:
+            if type(None) in kinds:
+                return None
+            self.fail(node, f"{where} must not be empty.")
+        some = [kind for kind in kinds if kind is not type(None)]
+        return self.build(some[0] if len(some) == 1 else self._member(some, node, where), node, where)
+
+    def _member(self, members: list[Any], node: Node, where: str) -> Any:
+        """The member of a union of dataclasses that the key `kind` names."""
+        kinds = {typing.get_args(typing.get_type_hints(member)["kind"])[0]: member for member in members}
+        for name, _, value in self._pairs(node, where):
+            if name == "kind":
+                return kinds[self._choice(tuple(kinds), self._scalar(value, "'kind'"), value, "'kind'")]
+        self.fail(node, f"{where} lacks the key 'kind' (one of: {', '.join(sorted(kinds))}).")
+
+    def _scalar(self, node: Node, where: str) -> Any:
+        if not isinstance(node, ScalarNode):
+            self.fail(node, f"{where} must be a single value.")
+        try:
+            return yaml.SafeLoader("").construct_object(node)
+        except (yaml.YAMLError, ValueError) as error:
+            self.fail(node, f"{where} = {node.value!r} cannot be read: {error}.")
+
+    def _choice(self, allowed: tuple[Any, ...], value: Any, node: Node, where: str) -> Any:
+        if value not in allowed:
+            self.fail(node, f"{where} = {value!r} is not known.{did_you_mean(str(value), map(str, allowed))}")
+        return value
+
+    def _checked(self, kind: Any, value: Any, node: Node, where: str) -> Any:
+        if kind is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if kind is float and isinstance(value, str) and _YAML_1_2_NUMBER.fullmatch(value):
+            value = float(value)
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            self.fail(node, f"{where} = {value!r} must be {_PLAIN_NAME.get(kind, kind)}.")
+        if isinstance(value, float) and not math.isfinite(value):
+            self.fail(node, f"{where} = {value!r} must be a finite number.")
+        return value
+
+
+# PyYAML follows YAML 1.1, which reads 1e-3 as text.
+_YAML_1_2_NUMBER = re.compile(r"[-+]?[0-9.]+[eE][-+]?[0-9]+")
+_PLAIN_NAME = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

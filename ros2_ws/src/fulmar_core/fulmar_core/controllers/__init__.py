@@ -1,0 +1,1 @@
+"""Classical controllers, and the interface that every controller has."""

@@ -1,0 +1,1 @@
+"""Disturbances: what differs from the nominal robot and world, drawn once an episode."""

@@ -1,0 +1,1 @@
+"""Motion of bodies under forces: pure functions, batch-first, any array library."""

@@ -1,0 +1,58 @@
+"""Errors that a person can act on, and the nearest-name helper they share."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class FulmarError(Exception):
+    """A mistake or fault with a one-line message: where, found, allowed, what next."""
+
+
+class ConfigError(FulmarError):
+    """A configuration file or an argument is wrong."""
+
+
+class UnknownNameError(ConfigError):
+    """A name that is not in a closed set, reported with the nearest known one."""
+
+    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+        """Say what kind of name was not found, and what exists."""
+        known = sorted(known)
+        super().__init__(f"unknown {what} '{name}'.{did_you_mean(name, known)}")
+        self.name = name
+        self.known = known
+
+
+class BundleError(FulmarError):
+    """A policy bundle is damaged, or does not fit the robot, the task or the rate."""
+
+
+class SafetyError(FulmarError):
+    """A safety limit is set to something that would not protect."""
+
+
+class LockstepError(FulmarError):
+    """The other side of a lock-stepped pair did not answer in time."""
+
+
+class BagError(FulmarError):
+    """A bag cannot be read, or lacks what was asked of it."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Hint for an unknown name: the nearest one if there is one, else all of them.
+
+    Args:
+        name: What was written.
+        known: What would have been allowed.
+
+    Returns:
+        A sentence that begins with a space, ready to be appended to a message.
+    """
+    known = sorted(known)
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    if near:
+        return f" Did you mean '{near[0]}'?"
+    return f" Known: {', '.join(known) if known else 'none'}."

@@ -1,0 +1,194 @@
+"""A policy with its passport: one folder that says what it is and refuses to be anything else.
+
+    policy.onnx     the network: input `observation`, outputs `command` and `logits`
+    golden.npz      observations, and the commands and logits the network gave for them when it was exported
+    passport.json   robot, task, rate, names, hashes of the two files, and how it was made
+
+Knows files and hashes, not how to run a network.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.errors import BundleError, did_you_mean
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+
+FORMAT = 1
+NETWORK = "policy.onnx"
+GOLDEN = "golden.npz"
+PASSPORT = "passport.json"
+MAX_BYTES = 50_000_000  # a file beyond this is no policy of ours, and is not read
+
+
+@dataclass(frozen=True)
+class Passport:
+    """What a policy is, and for what."""
+
+    format: int
+    robot: str
+    task: str
+    control_hz: float  # the command rate it was trained at [Hz]
+    observation_names: tuple[str, ...]  # in the order of the network's input
+    actuator_names: tuple[str, ...]  # in the order of the network's output
+    network_sha256: str
+    golden_sha256: str
+    training: dict[str, Any] = field(default_factory=dict)  # how it was made, for people
+    sha256: str = ""  # of all the above
+
+    def sealed(self) -> Passport:
+        """The same passport with its own hash filled in."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "sha256"}
+        return Passport(**values, sha256=self.expected_sha256())
+
+    def expected_sha256(self) -> str:
+        """Hash of everything but the hash itself."""
+        values = asdict(self)
+        del values["sha256"]
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Golden:
+    """Inputs and outputs that a loaded network must reproduce."""
+
+    observations: np.ndarray  # (k, n) float32
+    commands: np.ndarray  # (k, m) float32
+    logits: np.ndarray  # (k, m) float32
+
+
+def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passport) -> Passport:
+    """Write a bundle; hashes are filled in here.
+
+    Args:
+        folder: Made if need be; files of the same names are replaced.
+        network: ONNX model.
+        golden: Vectors computed with this very model.
+        passport: Its hashes are ignored.
+
+    Returns:
+        The sealed passport.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / NETWORK).write_bytes(network)
+    with (folder / GOLDEN).open("wb") as file:
+        np.savez(file, observations=golden.observations, commands=golden.commands, logits=golden.logits)
+    values = asdict(passport) | {
+        "network_sha256": _sha256(folder / NETWORK),
+        "golden_sha256": _sha256(folder / GOLDEN),
+        "sha256": "",
+    }
+    sealed = _passport_of(values, folder / PASSPORT).sealed()
+    (folder / PASSPORT).write_text(json.dumps(asdict(sealed), indent=2) + "\n", encoding="utf-8")
+    return sealed
+
+
+def read_passport(folder: Path) -> Passport:
+    """Read the passport of a bundle and check every hash.
+
+    Args:
+        folder: The bundle.
+
+    Returns:
+        The passport.
+
+    Raises:
+        BundleError: No bundle, unreadable, of another format, or a file that is not the one it was sealed with.
+    """
+    for name in (PASSPORT, NETWORK, GOLDEN):
+        path = folder / name
+        if not path.is_file():
+            raise BundleError(f"policy '{folder}' has no {name}. Export one with `fulmar export RUN --out DIR`.")
+        if path.stat().st_size > MAX_BYTES:
+            raise BundleError(f"{path}: {path.stat().st_size} bytes, at most {MAX_BYTES} are accepted.")
+    try:
+        values = json.loads((folder / PASSPORT).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BundleError(f"{folder / PASSPORT}: cannot be read: {error}. Export the policy again.") from error
+    passport = _passport_of(values, folder / PASSPORT)
+    if passport.format != FORMAT:
+        raise BundleError(f"policy '{folder}' has format {passport.format}, this Fulmar reads {FORMAT}. Export it again.")
+    if passport.sha256 != passport.expected_sha256():
+        raise BundleError(f"{folder / PASSPORT}: was changed after export (its hash does not match). Export it again.")
+    for name, expected in ((NETWORK, passport.network_sha256), (GOLDEN, passport.golden_sha256)):
+        found = _sha256(folder / name)
+        if found != expected:
+            raise BundleError(
+                f"{folder / name}: SHA-256 is {found[:12]}…, the passport says {expected[:12]}…. "
+                "The file is not the one that was exported; export the policy again."
+            )
+    return passport
+
+
+def read_golden(folder: Path) -> Golden:
+    """Read the golden vectors; call `read_passport` first, which checks their hash.
+
+    Raises:
+        BundleError: If they cannot be read.
+    """
+    try:
+        with np.load(folder / GOLDEN, allow_pickle=False) as arrays:
+            return Golden(arrays["observations"], arrays["commands"], arrays["logits"])
+    except (OSError, ValueError, KeyError) as error:
+        raise BundleError(f"{folder / GOLDEN}: cannot be read: {error}. Export the policy again.") from error
+
+
+def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *, where: str) -> None:
+    """Refuse a policy that was made for something else.
+
+    Args:
+        passport: The policy's.
+        robot: The robot it shall drive.
+        task: The task it shall do.
+        control_hz: The rate it shall run at [Hz].
+        where: The bundle's folder, for the message.
+
+    Raises:
+        BundleError: On the first thing that differs.
+    """
+    if passport.robot != robot.name:
+        raise BundleError(f"policy '{where}' was trained for robot '{passport.robot}', not '{robot.name}'.")
+    if passport.task != task.name:
+        raise BundleError(f"policy '{where}' was trained for task '{passport.task}', not '{task.name}'.")
+    if abs(passport.control_hz - control_hz) > 1e-9:
+        raise BundleError(
+            f"policy '{where}' was trained at {passport.control_hz:g} Hz, but would run at {control_hz:g} Hz. "
+            f"Train and export it at {control_hz:g} Hz, or run it with control_hz = {passport.control_hz:g}."
+        )
+    _check_names("observation", passport.observation_names, task.observation_names, where)
+    _check_names("actuator", passport.actuator_names, robot.actuators.names, where)
+
+
+def _check_names(what: str, found: tuple[str, ...], needed: tuple[str, ...], where: str) -> None:
+    if found == needed:
+        return
+    if len(found) != len(needed):
+        raise BundleError(f"policy '{where}' has {len(found)} {what} names, {len(needed)} are needed.")
+    index = next(i for i, (a, b) in enumerate(zip(found, needed, strict=True)) if a != b)
+    raise BundleError(f"policy '{where}': {what} {index + 1} is '{found[index]}', it must be '{needed[index]}'.")
+
+
+def _passport_of(values: Any, path: Path) -> Passport:
+    if not isinstance(values, dict):
+        raise BundleError(f"{path}: must hold one JSON object. Export the policy again.")
+    known = {f.name for f in fields(Passport)}
+    for name in values:
+        if name not in known:
+            raise BundleError(f"{path}: unknown key '{name}'.{did_you_mean(name, known)}")
+    missing = known - values.keys()
+    if missing:
+        raise BundleError(f"{path}: lacks the key '{min(missing)}'. Export the policy again.")
+    for name in ("observation_names", "actuator_names"):
+        values[name] = tuple(values[name]) if isinstance(values[name], list | tuple) else (str(values[name]),)
+    return Passport(**values)
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

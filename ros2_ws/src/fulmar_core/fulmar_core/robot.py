@@ -1,0 +1,134 @@
+"""What a robot is: body, actuators, sensors, rates and limits, as read from its YAML."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.config import load_config
+from fulmar_core.errors import ConfigError
+from fulmar_core.paths import config_path
+from fulmar_core.sensors.imu import ImuSpec
+from fulmar_core.sensors.odometry import OdometrySpec
+
+Range = tuple[float, float]
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Body:
+    """Mass properties and outline of a rigid body."""
+
+    mass: float  # [kg]
+    inertia: Vector3  # principal moments about the body axes [kg·m²]
+    radius: float  # outline seen from above [m]
+    height: float  # [m]
+    planar: bool  # True: only x, y and yaw move
+
+    def __post_init__(self) -> None:
+        """Refuse bodies that cannot exist."""
+        if min(self.mass, self.radius, self.height, *self.inertia) <= 0.0:
+            raise ValueError("mass, inertia, radius and height must be greater than 0.")
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Spans over which the body is not known; scenarios draw from them."""
+
+    mass: Range  # [kg]
+    yaw_inertia: Range  # [kg·m²]
+
+    def __post_init__(self) -> None:
+        """Refuse spans that are empty or not positive."""
+        for name in ("mass", "yaw_inertia"):
+            low, high = getattr(self, name)
+            if not 0.0 < low <= high:
+                raise ValueError(f"'{name}' must be [low, high] with 0 < low <= high, found [{low}, {high}].")
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How often the physics and the controller run."""
+
+    physics_dt: float  # integration step of the simulators [s]
+    control_hz: float  # default command rate [Hz]
+
+    def __post_init__(self) -> None:
+        """Refuse rates that do not divide evenly."""
+        if self.physics_dt <= 0.0 or self.control_hz <= 0.0:
+            raise ValueError("physics_dt and control_hz must be greater than 0.")
+        self.substeps(self.control_hz)
+
+    def substeps(self, control_hz: float) -> int:
+        """Physics steps in one control step.
+
+        Args:
+            control_hz: Command rate, > 0 [Hz].
+
+        Returns:
+            Whole number of steps, >= 1.
+
+        Raises:
+            ValueError: If the control period is not a multiple of the physics step.
+        """
+        ratio = 1.0 / (control_hz * self.physics_dt)
+        if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6:
+            raise ValueError(
+                f"control_hz = {control_hz:g} must divide the physics rate of {1.0 / self.physics_dt:g} Hz evenly."
+            )
+        return round(ratio)
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the robot measures."""
+
+    odometry: OdometrySpec
+    imu: ImuSpec
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the safety gates take for possible."""
+
+    geofence: float  # largest distance from the goal at which control goes on [m]
+    speed: float  # largest believable speed [m/s]
+    yaw_rate: float  # largest believable turn rate [rad/s]
+
+    def __post_init__(self) -> None:
+        """Refuse limits that nothing could keep."""
+        if min(self.geofence, self.speed, self.yaw_rate) <= 0.0:
+            raise ValueError("geofence, speed and yaw_rate must be greater than 0.")
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Everything that is known about one robot, one definition for every user of it."""
+
+    name: str
+    title: str  # what it is, in a few words
+    body: Body
+    uncertainty: Uncertainty
+    timing: Timing
+    actuators: Thrusters
+    sensors: Sensors
+    limits: Limits
+
+
+def load_robot(name: str) -> Robot:
+    """Read `configs/robots/<name>.yaml`.
+
+    Args:
+        name: A name that `fulmar list robots` shows.
+
+    Returns:
+        The robot.
+
+    Raises:
+        ConfigError: Unknown name, or a mistake in the file.
+    """
+    path = config_path("robots", name)
+    robot = load_config(Robot, path)
+    if robot.name != name:
+        raise ConfigError(f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal.")
+    return robot

@@ -1,0 +1,111 @@
+"""Rotations as unit quaternions in ROS order (x, y, z, w), batch-first, any array library.
+
+Formulas: Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508 (his order is w first).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from array_api_compat import array_namespace
+
+Array = Any  # an array of NumPy, torch or any other library that follows the array API
+
+
+def rotate(quat_xyzw: Array, vector: Array) -> Array:
+    """Express body-frame vectors in the world frame.
+
+    Args:
+        quat_xyzw: Attitude of the body in the world, shape (..., 4).
+        vector: Vectors in the body frame, shape (..., 3).
+
+    Returns:
+        The same vectors in the world frame, shape (..., 3).
+    """
+    xp = array_namespace(quat_xyzw)
+    return _sandwich(xp, quat_xyzw[..., 0:3], quat_xyzw[..., 3:4], vector)
+
+
+def rotate_inverse(quat_xyzw: Array, vector: Array) -> Array:
+    """Express world-frame vectors in the body frame; shapes as in `rotate`."""
+    xp = array_namespace(quat_xyzw)
+    return _sandwich(xp, -quat_xyzw[..., 0:3], quat_xyzw[..., 3:4], vector)
+
+
+def _sandwich(xp: Any, u: Array, w: Array, v: Array) -> Array:
+    t = 2.0 * cross(u, v)
+    return v + w * t + cross(u, t)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product over the last axis, shapes (..., 3)."""
+    xp = array_namespace(a, b)
+    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
+    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
+    return xp.stack((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0), axis=-1)
+
+
+def multiply(p_xyzw: Array, q_xyzw: Array) -> Array:
+    """Hamilton product p ⊗ q, shapes (..., 4)."""
+    xp = array_namespace(p_xyzw, q_xyzw)
+    px, py, pz, pw = (p_xyzw[..., i] for i in range(4))
+    qx, qy, qz, qw = (q_xyzw[..., i] for i in range(4))
+    return xp.stack(
+        (
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+            pw * qw - px * qx - py * qy - pz * qz,
+        ),
+        axis=-1,
+    )
+
+
+def inverse(quat_xyzw: Array) -> Array:
+    """Conjugate of unit quaternions, shape (..., 4)."""
+    xp = array_namespace(quat_xyzw)
+    return xp.concat((-quat_xyzw[..., 0:3], quat_xyzw[..., 3:4]), axis=-1)
+
+
+def from_rotation_vector(phi: Array) -> Array:
+    """Exponential map: rotation vector to quaternion.
+
+    Args:
+        phi: Axis times angle, shape (..., 3) [rad].
+
+    Returns:
+        Unit quaternion, shape (..., 4).
+    """
+    xp = array_namespace(phi)
+    half = 0.5 * xp.sqrt(xp.sum(phi * phi, axis=-1, keepdims=True))
+    # sin(h)/h by its series where h is small, so that zero needs no branch of its own.
+    safe = xp.where(half > 1e-4, half, xp.ones_like(half))
+    ratio = xp.where(half > 1e-4, xp.sin(safe) / safe, 1.0 - half * half / 6.0)
+    return xp.concat((0.5 * ratio * phi, xp.cos(half)), axis=-1)
+
+
+def from_yaw(yaw: Array) -> Array:
+    """Quaternion of a rotation about +z, shape (...,) [rad] to (..., 4)."""
+    xp = array_namespace(yaw)
+    zero = xp.zeros_like(yaw)
+    return xp.stack((zero, zero, xp.sin(0.5 * yaw), xp.cos(0.5 * yaw)), axis=-1)
+
+
+def yaw_of(quat_xyzw: Array) -> Array:
+    """Heading: angle of the body's x axis about the world's z axis.
+
+    Args:
+        quat_xyzw: Unit quaternion, shape (..., 4).
+
+    Returns:
+        Yaw, shape (...,) [rad], in (-pi, pi].
+    """
+    xp = array_namespace(quat_xyzw)
+    x, y, z, w = (quat_xyzw[..., i] for i in range(4))
+    return xp.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def wrap_angle(angle: Array) -> Array:
+    """Same angle in [-pi, pi], any shape [rad]."""
+    xp = array_namespace(angle)
+    return xp.atan2(xp.sin(angle), xp.cos(angle))

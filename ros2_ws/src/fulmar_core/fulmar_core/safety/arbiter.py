@@ -1,0 +1,74 @@
+"""Whether a controller may act now: one pure function, most severe reason first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Mode(Enum):
+    """Stages of a controller, in the order in which it goes through them."""
+
+    UNCONFIGURED = "unconfigured"  # nothing loaded
+    IDLE = "idle"  # loaded, validated, warm
+    ARMED = "armed"  # running, safe command only
+    ACTIVE = "active"  # the controller's own command
+    FAULT = "fault"  # safe command until a person resets it
+
+
+@dataclass(frozen=True, slots=True)
+class Flags:
+    """Everything that the decision depends on, besides the time."""
+
+    configured: bool = False
+    activated: bool = False
+    latched_fault: str = ""  # reason, empty if there is none
+    has_goal: bool = False
+    last_input_ns: int | None = None  # steady clock at the newest accepted measurement
+    input_problem: str = ""  # why the newest measurement was refused, empty if it was not
+    input_timeout_ns: int = 0
+    goal_distance: float = 0.0  # [m]
+    geofence: float = float("inf")  # [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """The mode, whether the controller's command may go out, and why not."""
+
+    mode: Mode
+    may_act: bool
+    reason: str
+
+
+def arbitrate(flags: Flags, now_ns: int) -> Decision:
+    """Decide for one instant.
+
+    Args:
+        flags: What is known.
+        now_ns: Steady clock [ns].
+
+    Returns:
+        The decision; anything but ACTIVE means the safe command.
+    """
+    if flags.latched_fault:
+        return Decision(Mode.FAULT, False, flags.latched_fault)
+    if not flags.configured:
+        return Decision(Mode.UNCONFIGURED, False, "not configured")
+    if not flags.activated:
+        return Decision(Mode.IDLE, False, "not activated")
+    if flags.last_input_ns is None:
+        return Decision(Mode.ARMED, False, flags.input_problem or "no odom yet. Is the plant running?")
+    age_ns = now_ns - flags.last_input_ns
+    if age_ns > flags.input_timeout_ns:
+        cause = f" ({flags.input_problem})" if flags.input_problem else ""
+        limit = flags.input_timeout_ns / 1e6
+        return Decision(Mode.ARMED, False, f"no usable odom for {age_ns / 1e6:.0f} ms (limit {limit:.0f} ms){cause}")
+    if flags.input_problem:
+        return Decision(Mode.ARMED, False, flags.input_problem)
+    if not flags.has_goal:
+        return Decision(Mode.ARMED, False, "no goal yet")
+    if flags.goal_distance > flags.geofence:
+        return Decision(
+            Mode.ARMED, False, f"goal is {flags.goal_distance:.1f} m away, beyond the geofence of {flags.geofence:g} m"
+        )
+    return Decision(Mode.ACTIVE, True, "")

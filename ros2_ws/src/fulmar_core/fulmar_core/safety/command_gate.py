@@ -1,0 +1,63 @@
+"""The gate after a controller, and again before an actuator: only commands that can be carried out pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+REJECTIONS_TO_LATCH = 3
+
+
+def command_problem(command: np.ndarray, count: int) -> str | None:
+    """What is wrong with a command vector.
+
+    Args:
+        command: Any array.
+        count: Number of actuators.
+
+    Returns:
+        A reason for people, or None if it may be limited and applied.
+    """
+    if command.shape != (count,):
+        return f"command has shape {command.shape}, must be ({count},)"
+    if not np.isfinite(command).all():
+        return f"command for actuator {int(np.flatnonzero(~np.isfinite(command))[0]) + 1} is not finite"
+    return None
+
+
+def name_problem(names: Sequence[str], needed: Sequence[str]) -> str | None:
+    """What is wrong with the actuator names of a command, or None."""
+    if list(names) == list(needed):
+        return None
+    if len(names) != len(needed):
+        return f"command names {len(names)} actuators, must name {len(needed)}"
+    index = next(i for i, (a, b) in enumerate(zip(names, needed, strict=True)) if a != b)
+    return f"command names '{names[index]}' as actuator {index + 1}, must be '{needed[index]}'"
+
+
+class Rejections:
+    """Counts refusals; several in a row are a fault that stays."""
+
+    def __init__(self, to_latch: int = REJECTIONS_TO_LATCH) -> None:
+        """Latch after this many in a row, > 0."""
+        self.total = 0
+        self._in_a_row, self._to_latch = 0, to_latch
+
+    def note(self, reason: str | None) -> str | None:
+        """Note the verdict on one command.
+
+        Args:
+            reason: Why it was refused, or None if it was not.
+
+        Returns:
+            The fault to latch, or None.
+        """
+        if reason is None:
+            self._in_a_row = 0
+            return None
+        self.total += 1
+        self._in_a_row += 1
+        if self._in_a_row >= self._to_latch:
+            return f"{self._in_a_row} commands in a row were refused, the last because {reason}"
+        return None

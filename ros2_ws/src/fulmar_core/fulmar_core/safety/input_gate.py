@@ -1,0 +1,93 @@
+"""The gate before a controller: only believable, fresh measurements pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.robot import Limits
+from fulmar_core.state import RigidBodyState
+
+FROZEN_AFTER = 10  # equal measurements in a row that no noisy sensor gives
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """An odometry message without ROS."""
+
+    stamp_ns: int  # when it was measured
+    frame: str
+    child_frame: str
+    state: RigidBodyState
+
+
+class InputGate:
+    """Checks measurements one after the other."""
+
+    def __init__(self, limits: Limits, *, frozen_after: int = FROZEN_AFTER) -> None:
+        """Check against a robot's limits.
+
+        Args:
+            limits: What the robot can possibly do.
+            frozen_after: Equal measurements in a row that count as a stuck sensor; 0 never does, as for
+                simulated sensors without noise.
+        """
+        self._limits, self._frozen_after = limits, frozen_after
+        self._last: Measurement | None = None
+        self._equal = 0
+
+    def problem(self, measurement: Measurement) -> str | None:
+        """What is wrong with a measurement.
+
+        Args:
+            measurement: The next one.
+
+        Returns:
+            A reason for people, or None if it may be used.
+        """
+        reason = self._frame_problem(measurement) or self._value_problem(measurement.state)
+        if reason is None and self._last is not None and measurement.stamp_ns <= self._last.stamp_ns:
+            back = (self._last.stamp_ns - measurement.stamp_ns) / 1e6
+            reason = f"odom stamp went back by {back:.0f} ms" if back else "odom stamp did not advance"
+        if reason is None:
+            reason = self._frozen_problem(measurement)
+            self._last = measurement
+        return reason
+
+    def forget(self) -> None:
+        """Begin anew, as after a time jump that is known."""
+        self._last, self._equal = None, 0
+
+    def _frame_problem(self, measurement: Measurement) -> str | None:
+        if measurement.frame != "odom" or measurement.child_frame != "base_link":
+            return f"odom is '{measurement.frame}' → '{measurement.child_frame}', must be 'odom' → 'base_link'"
+        return None
+
+    def _value_problem(self, state: RigidBodyState) -> str | None:
+        parts = (state.position_in_world, state.quat_xyzw, state.velocity_in_world, state.angular_velocity_in_body)
+        if not all(np.isfinite(part).all() for part in parts):
+            return "odom holds a value that is not finite"
+        norm = float(np.linalg.norm(state.quat_xyzw))
+        if abs(norm - 1.0) > 0.01:
+            return f"odom quaternion has norm {norm:.3f}, must be 1"
+        speed = float(np.linalg.norm(state.velocity_in_world))
+        if speed > self._limits.speed:
+            return f"odom speed {speed:.2f} m/s is beyond the possible {self._limits.speed:g} m/s"
+        yaw_rate = abs(float(state.angular_velocity_in_body[2]))
+        if yaw_rate > self._limits.yaw_rate:
+            return f"odom yaw rate {yaw_rate:.2f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
+        return None
+
+    def _frozen_problem(self, measurement: Measurement) -> str | None:
+        if self._last is not None and _same(self._last.state, measurement.state):
+            self._equal += 1
+        else:
+            self._equal = 0
+        if self._frozen_after and self._equal >= self._frozen_after:
+            return f"odom has not changed for {self._equal} messages: the sensor is stuck"
+        return None
+
+
+def _same(a: RigidBodyState, b: RigidBodyState) -> bool:
+    return np.array_equal(a.position_in_world, b.position_in_world) and np.array_equal(a.quat_xyzw, b.quat_xyzw)

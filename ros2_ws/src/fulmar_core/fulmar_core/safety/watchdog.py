@@ -1,0 +1,67 @@
+"""The watchdog next to the actuators: commands must keep coming."""
+
+from __future__ import annotations
+
+from fulmar_core.errors import SafetyError
+
+SHORTEST_S = 0.2
+LONGEST_S = 0.5
+
+
+def default_timeout(control_dt: float) -> float:
+    """Silence after which actuators go to their safe state.
+
+    Args:
+        control_dt: Time between commands, > 0 [s].
+
+    Returns:
+        Twice that, at least 0.2 s and at most 0.5 s [s].
+    """
+    return min(max(SHORTEST_S, 2.0 * control_dt), LONGEST_S)
+
+
+class Watchdog:
+    """Says whether commands have stopped; knows no clock of its own."""
+
+    def __init__(self, timeout_ns: int) -> None:
+        """Wait this long.
+
+        Args:
+            timeout_ns: Longest silence, > 0 [ns].
+
+        Raises:
+            SafetyError: If the timeout would not protect.
+        """
+        if timeout_ns <= 0:
+            raise SafetyError(f"the command timeout is {timeout_ns} ns; it must be greater than 0.")
+        self.timeout_ns = timeout_ns
+        self.trips = 0
+        self._last_ns: int | None = None
+        self._tripped = False
+
+    def feed(self, now_ns: int) -> None:
+        """A command has come at this time of a steady clock [ns]."""
+        self._last_ns = now_ns
+        self._tripped = False
+
+    def expired(self, now_ns: int) -> bool:
+        """Whether actuators must be in their safe state at this time [ns].
+
+        Before the first command that is so, but no trip: nothing has stopped yet. Each silence counts once.
+        """
+        if self._last_ns is None:
+            return True
+        late = now_ns - self._last_ns > self.timeout_ns
+        if late and not self._tripped:
+            self._tripped = True
+            self.trips += 1
+        return late
+
+    @property
+    def tripped(self) -> bool:
+        """Whether commands came once and have stopped."""
+        return self._tripped
+
+    def silent_ns(self, now_ns: int) -> int:
+        """Time since the last command, 0 before the first [ns]."""
+        return 0 if self._last_ns is None else now_ns - self._last_ns

@@ -1,0 +1,35 @@
+"""Tasks: what a robot shall reach, what its controller sees, how it is judged.
+
+The explicit table of tasks. A new task is one file here, one line below and one YAML.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from fulmar_core.config import load_config
+from fulmar_core.errors import ConfigError
+from fulmar_core.paths import config_path
+from fulmar_core.tasks.go_to_pose import GoToPose
+from fulmar_core.tasks.go_to_position import GoToPosition
+
+Task = GoToPose | GoToPosition
+
+
+def load_task(name: str) -> Task:
+    """Read `configs/tasks/<name>.yaml`.
+
+    Args:
+        name: A name that `fulmar list tasks` shows.
+
+    Returns:
+        The task.
+
+    Raises:
+        ConfigError: Unknown name, or a mistake in the file.
+    """
+    path = config_path("tasks", name)
+    task = cast(Task, load_config(Task, path))  # type: ignore[arg-type]
+    if task.name != name:
+        raise ConfigError(f"{path}: 'name' is '{task.name}', the file's own name is '{name}'. Make them equal.")
+    return task

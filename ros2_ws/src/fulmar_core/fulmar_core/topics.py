@@ -1,0 +1,157 @@
+"""The wires: every topic, its type, who publishes it, how, how fast, and whether bags keep it.
+
+Read by every node, the recorder, the health checks and the documentation. Names are relative and live under the
+robot's namespace, except those that begin with a slash.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Source = Literal["plant", "controller", "operator"]
+Delivery = Literal["stream", "latched", "best_effort"]
+
+
+@dataclass(frozen=True)
+class Wire:
+    """One topic.
+
+    `delivery` is how publishers offer it: "stream" is reliable with the last 10 kept, "latched" is reliable and
+    transient-local with the last 1, "best_effort" keeps the last 10.
+    """
+
+    name: str
+    type: str  # ROS message type
+    source: Source
+    delivery: Delivery
+    rate: str  # for people
+    content: str  # for people
+    recorded: bool = True
+    simulation_only: bool = False
+
+
+ODOMETRY = Wire(
+    "odom",
+    "nav_msgs/msg/Odometry",
+    "plant",
+    "stream",
+    "odometry rate",
+    "measured pose in `odom` and twist in `base_link`, stamped at measurement",
+)
+IMU = Wire(
+    "imu/data",
+    "sensor_msgs/msg/Imu",
+    "plant",
+    "stream",
+    "odometry rate",
+    "specific force (+g at rest) and turn rate; no orientation",
+)
+TRUTH = Wire(
+    "ground_truth/odom",
+    "nav_msgs/msg/Odometry",
+    "plant",
+    "stream",
+    "odometry rate",
+    "the simulator's own state; never read by a deployed controller",
+    simulation_only=True,
+)
+ACTUATORS_STATE = Wire(
+    "actuators/state",
+    "sensor_msgs/msg/JointState",
+    "plant",
+    "stream",
+    "every plant tick",
+    "what was really applied, after limits and watchdog; `effort` by actuator name",
+)
+CLOCK = Wire(
+    "/clock",
+    "rosgraph_msgs/msg/Clock",
+    "plant",
+    "best_effort",
+    "every plant tick, at most 200 Hz",
+    "simulated time",
+    simulation_only=True,
+)
+COMMAND = Wire(
+    "actuators/command",
+    "sensor_msgs/msg/JointState",
+    "controller",
+    "stream",
+    "control rate",
+    "`effort` by actuator name, stamped as the observation it answers",
+)
+OBSERVATION = Wire(
+    "controller/observation",
+    "sensor_msgs/msg/JointState",
+    "controller",
+    "best_effort",
+    "control rate",
+    "the very vector that the controller was fed; names are its terms",
+)
+ACTION = Wire(
+    "controller/action",
+    "sensor_msgs/msg/JointState",
+    "controller",
+    "best_effort",
+    "control rate",
+    "the very vector that the controller gave, before limits",
+)
+METADATA = Wire(
+    "controller/metadata",
+    "std_msgs/msg/String",
+    "controller",
+    "latched",
+    "at load",
+    "JSON: which controller this is, with the SHA-256 of what defines it",
+)
+STATUS = Wire(
+    "controller/status",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "controller",
+    "latched",
+    "on change and at least 2 Hz",
+    "mode, reason, ages, latencies, overruns, rejections",
+)
+DIAGNOSTICS = Wire(
+    "/diagnostics",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "plant",
+    "stream",
+    "on change and at least 1 Hz",
+    "health of each node: `<robot>: plant`, `<robot>: controller`",
+)
+GOAL_POSE = Wire(
+    "goal_pose",
+    "geometry_msgs/msg/PoseStamped",
+    "operator",
+    "latched",
+    "on demand",
+    "goal with heading, as RViz's 2D Goal Pose publishes it",
+)
+GOAL_POINT = Wire(
+    "goal_point",
+    "geometry_msgs/msg/PointStamped",
+    "operator",
+    "latched",
+    "on demand",
+    "goal without heading",
+)
+
+WIRES: tuple[Wire, ...] = (
+    ODOMETRY,
+    IMU,
+    TRUTH,
+    ACTUATORS_STATE,
+    CLOCK,
+    COMMAND,
+    OBSERVATION,
+    ACTION,
+    METADATA,
+    STATUS,
+    DIAGNOSTICS,
+    GOAL_POSE,
+    GOAL_POINT,
+)
+
+GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT)}

@@ -1,0 +1,31 @@
+"""What a controller node can be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fulmar_core.robot import Robot
+
+
+@dataclass(frozen=True)
+class ControllerSettings:
+    """ROS parameters of a controller node."""
+
+    robot: str = "floating_platform"
+    task: str = "go_to_pose"
+    policy: str = ""  # folder of the bundle, for policies
+    control_hz: float = 0.0  # 0: the robot's own [Hz]
+    lockstep: bool = False
+    rate: float = 1.0  # simulated seconds a wall-clock second, where not in lock step
+    input_timeout_s: float = 0.0  # 0: two control periods, at least 0.2 s and at most 0.5 s [s]
+    wait_for_subscribers: int = 0  # of actuators/command, before the first answer in lock step
+    autostart: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse values without meaning."""
+        if not self.rate > 0.0:
+            raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
+
+    def control_rate(self, robot: Robot) -> float:
+        """Command rate in the robot's own time [Hz]."""
+        return self.control_hz or robot.timing.control_hz

@@ -1,0 +1,93 @@
+"""What a controller publishes and hears: one object for every wire on its side."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+from fulmar_core.topics import (
+    ACTION,
+    COMMAND,
+    DIAGNOSTICS,
+    GOAL_WIRES,
+    METADATA,
+    OBSERVATION,
+    ODOMETRY,
+    STATUS,
+)
+from geometry_msgs.msg import PointStamped, PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.lifecycle import LifecycleNode
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from fulmar_ros.convert import VectorWriter
+from fulmar_ros.health import Health
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+
+
+class ControllerWires:
+    """Publishers and subscriptions of a controller node; callbacks go to their owner."""
+
+    def __init__(
+        self,
+        node: LifecycleNode,
+        robot: Robot,
+        task: Task,
+        controller: Controller,
+        *,
+        on_odometry: Callable[[Odometry], None],
+        on_goal: Callable[[PoseStamped | PointStamped], None],
+        lockstep: bool,
+    ) -> None:
+        """Create every endpoint.
+
+        Args:
+            node: Owner of the endpoints.
+            robot: The robot.
+            task: Says on which topic goals come.
+            controller: Says what its observation holds.
+            on_odometry: Told every odometry message.
+            on_goal: Told every goal.
+            lockstep: Ask for lost odometry again: the plant waits for its answer.
+        """
+        self._command = node.create_publisher(JointState, COMMAND.name, publisher_qos(COMMAND))
+        self._observation = node.create_publisher(JointState, OBSERVATION.name, publisher_qos(OBSERVATION))
+        self._action = node.create_publisher(JointState, ACTION.name, publisher_qos(ACTION))
+        self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
+        status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
+        diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
+        self.health = Health(f"{robot.name}: controller", [status, diagnostics])
+        self._write_command = VectorWriter(robot.actuators.names)
+        self._write_action = VectorWriter(robot.actuators.names)
+        self._write_observation = VectorWriter(controller.observation_names, "position")
+        odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
+        node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos)
+        goal = GOAL_WIRES[task.goal_topic]
+        goal_type = PoseStamped if goal.type.endswith("PoseStamped") else PointStamped
+        node.create_subscription(goal_type, goal.name, on_goal, subscriber_qos(goal))
+
+    def subscribers(self) -> int:
+        """Matched subscriptions of the command."""
+        return int(self._command.get_subscription_count())
+
+    def publish_command(self, command: np.ndarray, stamp: int) -> None:
+        """Publish a command that answers the observation of this stamp [ns]."""
+        self._command.publish(self._write_command.write(command, stamp))
+
+    def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
+        """Publish the very vectors behind a command, where somebody listens."""
+        if self._observation.get_subscription_count():
+            self._observation.publish(self._write_observation.write(observation, stamp))
+        if self._action.get_subscription_count():
+            self._action.publish(self._write_action.write(action, stamp))
+
+    def publish_metadata(self, metadata: dict[str, Any]) -> None:
+        """Say who controls."""
+        self._metadata.publish(String(data=json.dumps(metadata, sort_keys=True)))

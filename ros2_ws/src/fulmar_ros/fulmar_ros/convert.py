@@ -1,0 +1,179 @@
+"""Between the core's types and ROS messages; the only place that knows both.
+
+Messages are filled in place by writers that keep one message each: building an Odometry anew costs more than
+everything else a control step does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import from_yaw, rotate, rotate_inverse
+from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.sensors.odometry import OdometrySpec
+from fulmar_core.state import Pose, RigidBodyState
+from geometry_msgs.msg import PointStamped, PoseStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, JointState
+
+NS = 1_000_000_000
+UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
+
+
+def stamp_of(time_ns: int) -> Time:
+    """ROS time of nanoseconds since the epoch."""
+    return Time(sec=time_ns // NS, nanosec=time_ns % NS)
+
+
+def stamp_ns(stamp: Time) -> int:
+    """Nanoseconds since the epoch of a ROS time."""
+    return stamp.sec * NS + stamp.nanosec
+
+
+class OdometryWriter:
+    """States as `odom` → `base_link` odometry."""
+
+    def __init__(self, spec: OdometrySpec | None, *, frame: str = "odom", child_frame: str = "base_link") -> None:
+        """Fill in what never changes.
+
+        Args:
+            spec: Noise that the covariances state; None for the truth.
+            frame: Frame of the pose.
+            child_frame: Frame of the twist.
+        """
+        self._message = Odometry()
+        self._message.header.frame_id = frame
+        self._message.child_frame_id = child_frame
+        if spec is not None:
+            self._message.pose.covariance = _diagonal((*spec.position_std, *spec.rotation_std))
+            self._message.twist.covariance = _diagonal((*spec.velocity_std, *spec.angular_velocity_std))
+
+    def write(self, state: RigidBodyState, time_ns: int) -> Odometry:
+        """Fill the message; it is overwritten by the next call.
+
+        Args:
+            state: Without a batch axis.
+            time_ns: Time of measurement [ns].
+        """
+        message = self._message
+        message.header.stamp = stamp_of(time_ns)
+        pose, twist = message.pose.pose, message.twist.twist
+        pose.position.x, pose.position.y, pose.position.z = state.position_in_world.tolist()
+        q = pose.orientation
+        q.x, q.y, q.z, q.w = state.quat_xyzw.tolist()
+        velocity = rotate_inverse(state.quat_xyzw, state.velocity_in_world)
+        twist.linear.x, twist.linear.y, twist.linear.z = velocity.tolist()
+        twist.angular.x, twist.angular.y, twist.angular.z = state.angular_velocity_in_body.tolist()
+        return message
+
+
+def _diagonal(stds: Sequence[float]) -> np.ndarray:
+    return np.diag(np.square(np.asarray(stds, dtype=float))).ravel()
+
+
+def measurement_of(message: Odometry) -> Measurement:
+    """Read an odometry message; nothing is checked here."""
+    p, q = message.pose.pose.position, message.pose.pose.orientation
+    v, w = message.twist.twist.linear, message.twist.twist.angular
+    quat = np.array([q.x, q.y, q.z, q.w])
+    state = RigidBodyState(
+        np.array([p.x, p.y, p.z]), quat, rotate(quat, np.array([v.x, v.y, v.z])), np.array([w.x, w.y, w.z])
+    )
+    return Measurement(stamp_ns(message.header.stamp), message.header.frame_id, message.child_frame_id, state)
+
+
+class ImuWriter:
+    """Inertial readings per REP-145, without an orientation."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Fill in what never changes."""
+        self._message = Imu()
+        self._message.header.frame_id = "imu_link"
+        self._message.orientation_covariance[0] = UNKNOWN
+        spec = robot.sensors.imu
+        self._message.linear_acceleration_covariance = np.eye(3).ravel() * spec.accelerometer_std**2
+        self._message.angular_velocity_covariance = np.eye(3).ravel() * spec.gyroscope_std**2
+
+    def write(self, sample: ImuSample, time_ns: int) -> Imu:
+        """Fill the message; it is overwritten by the next call."""
+        message = self._message
+        message.header.stamp = stamp_of(time_ns)
+        a, w = message.linear_acceleration, message.angular_velocity
+        a.x, a.y, a.z = sample.specific_force.tolist()
+        w.x, w.y, w.z = sample.angular_velocity.tolist()
+        return message
+
+
+class VectorWriter:
+    """Named vectors as JointState: commands and states in `effort`, observations in `position`."""
+
+    def __init__(self, names: Sequence[str], field: str = "effort") -> None:
+        """Fill in the names.
+
+        Args:
+            names: Of the entries, in order.
+            field: Which array of the message carries the values.
+        """
+        self._message = JointState(name=list(names))
+        self._field = field
+
+    def write(self, values: np.ndarray, time_ns: int) -> JointState:
+        """Fill the message; it is overwritten by the next call."""
+        self._message.header.stamp = stamp_of(time_ns)
+        setattr(self._message, self._field, np.asarray(values, dtype=float).tolist())
+        return self._message
+
+
+def goal_message(goal: Pose, topic: str, time_ns: int) -> PoseStamped | PointStamped:
+    """A goal as the message of its topic.
+
+    Args:
+        goal: Goal pose without a batch axis.
+        topic: `goal_pose` or `goal_point`.
+        time_ns: When it was given; controllers report it back [ns].
+
+    Returns:
+        The message, in frame `odom`.
+    """
+    x, y, z = goal.position_in_world.tolist()
+    if topic == "goal_point":
+        point = PointStamped()
+        point.header.frame_id, point.header.stamp = "odom", stamp_of(time_ns)
+        point.point.x, point.point.y, point.point.z = x, y, z
+        return point
+    pose = PoseStamped()
+    pose.header.frame_id, pose.header.stamp = "odom", stamp_of(time_ns)
+    pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = x, y, z
+    q = pose.pose.orientation
+    q.x, q.y, q.z, q.w = goal.quat_xyzw.tolist()
+    return pose
+
+
+def goal_of(message: PoseStamped | PointStamped) -> tuple[Pose | None, str]:
+    """Read a goal.
+
+    Args:
+        message: From either goal topic.
+
+    Returns:
+        The pose and an empty text, or None and what is wrong with the message.
+    """
+    if message.header.frame_id not in ("odom", "map", "world"):
+        return None, f"goal frame is '{message.header.frame_id}', must be 'odom'"
+    if isinstance(message, PointStamped):
+        p, quat = message.point, from_yaw(np.asarray(0.0))
+    else:
+        p, q = message.pose.position, message.pose.orientation
+        quat = np.array([q.x, q.y, q.z, q.w])
+    position = np.array([p.x, p.y, p.z])
+    if not (np.isfinite(position).all() and np.isfinite(quat).all()):
+        return None, "goal holds a value that is not finite"
+    norm = math.sqrt(float(quat @ quat))
+    if abs(norm - 1.0) > 0.01:
+        return None, f"goal quaternion has norm {norm:.3f}, must be 1"
+    return Pose(position, quat / norm), ""

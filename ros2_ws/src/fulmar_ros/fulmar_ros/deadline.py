@@ -1,0 +1,84 @@
+"""Absolute deadlines on a monotonic clock: late is counted, never made up for in a burst."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+
+import numpy as np
+
+KEPT = 20_000  # newest samples that percentiles are taken over
+
+NS = 1_000_000_000
+
+
+class Spread:
+    """Percentiles of the newest samples of one quantity."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._samples: deque[float] = deque(maxlen=KEPT)
+
+    def add(self, value: float) -> None:
+        """Note one sample."""
+        self._samples.append(value)
+
+    def percentiles(self, name: str) -> dict[str, str]:
+        """`<name>_p50`, `_p99` and `_max` as text for diagnostics; empty texts before the first sample."""
+        if not self._samples:
+            return {f"{name}_{key}": "" for key in ("p50", "p99", "max")}
+        values = np.fromiter(self._samples, dtype=float)
+        p50, p99 = np.percentile(values, (50, 99))
+        return {f"{name}_p50": f"{p50:.4f}", f"{name}_p99": f"{p99:.4f}", f"{name}_max": f"{values.max():.4f}"}
+
+
+class Deadlines:
+    """A steady beat: wait for the next deadline, know how late it came."""
+
+    def __init__(self, period_s: float) -> None:
+        """Beat with this period, > 0 [s]."""
+        self._period_ns = round(period_s * NS)
+        self._next_ns: int | None = None
+        self._last_ns: int | None = None
+        self._first_ns: int | None = None
+        self.beats = 0
+        self.overruns = 0
+        self.period_error_ms = Spread()
+
+    def wait(self, stop: threading.Event) -> bool:
+        """Sleep until the next deadline; the first one is now.
+
+        Deadlines that have passed already are skipped and counted as overruns.
+
+        Args:
+            stop: Set by another thread to end the beat.
+
+        Returns:
+            False if `stop` is set.
+        """
+        if self._next_ns is None:
+            self._next_ns = time.monotonic_ns()
+        ahead = self._next_ns - time.monotonic_ns()
+        if ahead > 0:
+            time.sleep(ahead / NS)
+        if stop.is_set():
+            return False
+        now = time.monotonic_ns()
+        if self._last_ns is not None:
+            self.period_error_ms.add(abs(now - self._last_ns - self._period_ns) / 1e6)
+        self._first_ns = self._first_ns or now
+        self._last_ns = now
+        self.beats += 1
+        self._next_ns += self._period_ns
+        while self._next_ns <= now:
+            self._next_ns += self._period_ns
+            self.overruns += 1
+        return True
+
+    @property
+    def rate_hz(self) -> float:
+        """Beats per second so far, 0 before the second [Hz]."""
+        if self._first_ns is None or self._last_ns is None or self._last_ns == self._first_ns:
+            return 0.0
+        return (self.beats - 1) * NS / (self._last_ns - self._first_ns)

@@ -1,0 +1,106 @@
+"""Lock step: publish the state stamped k, wait for the command that answers it, then step."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from fulmar_core.backend import Backend, Sample
+from fulmar_core.errors import LockstepError
+from fulmar_core.robot import Robot
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+
+from fulmar_ros.plant_wires import PlantWires
+
+RESEND_S = 0.5
+OnStep = Callable[[Sample, np.ndarray], None]  # called with the sample after a step and the command of the step
+
+
+@dataclass
+class SimulatedTime:
+    """Time of a simulated plant; never runs backwards, also across episodes."""
+
+    now_ns: int = 1_000_000_000  # ROS takes 0 for "not set"
+
+    def advance(self, seconds: float) -> None:
+        """Move on [s]."""
+        self.now_ns += round(seconds * 1e9)
+
+
+class LockstepLoop:
+    """Steps a backend with a controller that lives in another process."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        wires: PlantWires,
+        guard: ActuatorGuard,
+        clock: SimulatedTime,
+        *,
+        control_hz: float,
+        answer_timeout_s: float,
+    ) -> None:
+        """Join the parts.
+
+        Args:
+            backend: A simulator.
+            wires: Endpoints of the plant.
+            guard: The last word on commands.
+            clock: Stamps of the states.
+            control_hz: Command rate [Hz].
+            answer_timeout_s: Longest wait for one answer [s].
+        """
+        self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
+        robot: Robot = backend.robot
+        self._substeps = robot.timing.substeps(control_hz)
+        self._dt = self._substeps * robot.timing.physics_dt
+        self._answer_timeout_s = answer_timeout_s
+        self.steps = 0
+
+    def run(self, sample: Sample, steps: int | None, stop: threading.Event, on_step: OnStep | None = None) -> None:
+        """Step until the number of steps is done or somebody stops it.
+
+        Args:
+            sample: First sample of the episode.
+            steps: How many; None for no end.
+            stop: Set by another thread.
+            on_step: Told about every step.
+
+        Raises:
+            LockstepError: If an answer does not come in time.
+        """
+        done = 0
+        while not stop.is_set() and (steps is None or done < steps):
+            command = self._exchange(sample, stop)
+            if command is None:
+                return
+            sample = self._backend.step(command, self._substeps)
+            self._clock.advance(self._dt)
+            done += 1
+            self.steps += 1
+            if on_step is not None:
+                on_step(sample, command)
+
+    def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
+        stamp = self._clock.now_ns
+        began = time.monotonic()
+        self._wires.publish_sample(sample, stamp)
+        with self._wires.lock:
+            while not self._wires.wait_for_answer(stamp, RESEND_S):
+                waited = time.monotonic() - began
+                if stop.is_set():
+                    return None
+                if waited > self._answer_timeout_s:
+                    refused = f" {self._guard.last_rejection}." if self._guard.last_rejection else ""
+                    raise LockstepError(
+                        f"no command answers the odom of t = {stamp / 1e9:.2f} s for {waited:.1f} s "
+                        f"(limit {self._answer_timeout_s:g} s): the controller is silent.{refused} Look at its output."
+                    )
+                # The first messages can get lost while endpoints still find each other.
+                self._wires.publish_sample(sample, stamp, resend=True)
+            command = self._guard.output(time.monotonic_ns())
+        self._wires.publish_applied(command, stamp)
+        return command

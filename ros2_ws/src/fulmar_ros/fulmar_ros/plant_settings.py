@@ -1,0 +1,50 @@
+"""What a plant node can be told."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fulmar_core.robot import Robot
+from fulmar_core.safety.watchdog import default_timeout
+
+BY_RATE = -1.0  # stands for a value that follows from the control rate
+
+
+@dataclass(frozen=True)
+class PlantSettings:
+    """ROS parameters of a plant node."""
+
+    robot: str = "floating_platform"
+    backend: str = "mujoco"
+    scenario: str = "nominal"
+    seed: int = 0
+    start: tuple[float, ...] = (0.0, 0.0, 0.0)  # x [m], y [m], heading [deg]
+    control_hz: float = 0.0  # 0: the robot's own [Hz]
+    lockstep: bool = False
+    rate: float = 1.0  # simulated seconds a wall-clock second, where not in lock step
+    duration_s: float = 0.0  # simulated time after which the plant stops; 0: never [s]
+    command_timeout_s: float = BY_RATE  # 0 switches the watchdog off
+    answer_timeout_s: float = 5.0  # longest wait for a controller in lock step [s]
+    wait_for_subscribers: int = 0  # of odom, before the first step
+    autostart: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse values without meaning."""
+        if len(self.start) != 3 or not all(math.isfinite(value) for value in self.start):
+            raise ValueError(f"start = {list(self.start)} must be three finite numbers: x [m], y [m], heading [deg].")
+        if not self.rate > 0.0:
+            raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
+        if self.seed < 0:
+            raise ValueError(f"seed = {self.seed} must not be negative.")
+
+    def control_rate(self, robot: Robot) -> float:
+        """Command rate [Hz]."""
+        return self.control_hz or robot.timing.control_hz
+
+    def timeout_s(self, robot: Robot) -> float:
+        """Silence after which actuators go to their safe state, in wall-clock time [s]."""
+        if self.command_timeout_s != BY_RATE:
+            return self.command_timeout_s
+        # Simulated slower than life, commands come later than any clock on a real robot would allow.
+        return default_timeout(1.0 / self.control_rate(robot)) / min(self.rate, 1.0)

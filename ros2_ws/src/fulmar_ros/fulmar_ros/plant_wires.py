@@ -1,0 +1,101 @@
+"""What a plant publishes and hears: one object for every wire on its side."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+
+import numpy as np
+from fulmar_core.backend import Sample
+from fulmar_core.robot import Robot
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.topics import ACTUATORS_STATE, CLOCK, COMMAND, IMU, ODOMETRY, TRUTH
+from nav_msgs.msg import Odometry
+from rclpy.lifecycle import LifecycleNode
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+
+from fulmar_ros.convert import ImuWriter, OdometryWriter, VectorWriter, stamp_ns, stamp_of
+from fulmar_ros.deadline import Spread
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+
+CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
+REMEMBERED = 256  # odometry messages whose answer may still come
+
+
+class PlantWires:
+    """Publishers, the command subscription, and the times between them."""
+
+    def __init__(self, node: LifecycleNode, robot: Robot, guard: ActuatorGuard, *, simulated: bool) -> None:
+        """Create every endpoint.
+
+        Args:
+            node: Owner of the endpoints.
+            robot: The robot.
+            guard: Takes the commands; only touched under `self.lock`.
+            simulated: Whether truth and clock are published.
+        """
+        self.lock = threading.Condition()
+        self.latency_ms = Spread()
+        self._guard = guard
+        self._sent_ns: OrderedDict[int, int] = OrderedDict()
+        self._answered: int | None = None
+        self._clock_ns = 0
+        self._odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+        self._imu = node.create_publisher(Imu, IMU.name, publisher_qos(IMU))
+        self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
+        self._truth = node.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH)) if simulated else None
+        self._clock = node.create_publisher(Clock, CLOCK.name, publisher_qos(CLOCK)) if simulated else None
+        self._write_odometry = OdometryWriter(robot.sensors.odometry)
+        self._write_truth = OdometryWriter(None, frame="map")
+        self._write_imu = ImuWriter(robot)
+        self._write_state = VectorWriter(robot.actuators.names)
+        node.create_subscription(JointState, COMMAND.name, self._on_command, subscriber_qos(COMMAND, reliable=True))
+
+    def subscribers(self) -> int:
+        """Matched subscriptions of the odometry."""
+        return int(self._odometry.get_subscription_count())
+
+    def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
+        """Publish what the backend reports; the odometry first, since somebody waits for it.
+
+        Args:
+            sample: From the backend.
+            time_ns: Time of measurement [ns].
+            resend: Only the odometry, once more.
+        """
+        self._sent_ns[time_ns] = time.monotonic_ns()
+        while len(self._sent_ns) > REMEMBERED:
+            self._sent_ns.popitem(last=False)
+        self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
+        if resend:
+            return
+        if sample.imu is not None:
+            self._imu.publish(self._write_imu.write(sample.imu, time_ns))
+        if self._truth is not None and sample.truth is not None and self._truth.get_subscription_count():
+            self._truth.publish(self._write_truth.write(sample.truth, time_ns))
+        now = time.monotonic_ns()
+        if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
+            self._clock.publish(Clock(clock=stamp_of(time_ns)))
+            self._clock_ns = now
+
+    def publish_applied(self, command: np.ndarray, time_ns: int) -> None:
+        """Publish what the actuators are doing from this time on."""
+        self._state.publish(self._write_state.write(command, time_ns))
+
+    def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
+        """Wait until a command answers the odometry of this stamp; call with `lock` held."""
+        return self.lock.wait_for(lambda: self._answered == time_ns, timeout_s)
+
+    def _on_command(self, message: JointState) -> None:
+        now = time.monotonic_ns()
+        stamp = stamp_ns(message.header.stamp)
+        with self.lock:
+            taken = self._guard.offer(message.name, message.effort, now)
+            sent = self._sent_ns.pop(stamp, None)
+            if taken and sent is not None:
+                self.latency_ms.add((now - sent) / 1e6)
+            if taken:
+                self._answered = stamp
+            self.lock.notify_all()

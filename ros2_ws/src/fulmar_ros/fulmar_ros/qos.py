@@ -1,0 +1,51 @@
+"""Quality of service of each wire, for publishers and for subscribers.
+
+Follows `Wire.delivery`; no deadline is requested anywhere, since a publisher that offers none would never match.
+"""
+
+from __future__ import annotations
+
+from fulmar_core.topics import Wire
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+STREAM_DEPTH = 10
+
+
+def publisher_qos(wire: Wire) -> QoSProfile:
+    """How publishers of a wire offer it."""
+    return _profile(
+        reliable=wire.delivery != "best_effort",
+        latched=wire.delivery == "latched",
+        depth=1 if wire.delivery == "latched" else STREAM_DEPTH,
+    )
+
+
+def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | None = None) -> QoSProfile:
+    """How subscribers of a wire ask for it.
+
+    By default a subscriber wants the newest message only: best effort, the last 1 kept. Latched wires are asked
+    for reliably, with what was published before.
+
+    Args:
+        wire: The wire.
+        reliable: Ask for every message again that got lost; only where publishers offer it.
+        depth: Messages that may wait for the callback, >= 1.
+
+    Returns:
+        A profile that matches `publisher_qos(wire)`.
+    """
+    latched = wire.delivery == "latched"
+    return _profile(
+        reliable=latched if reliable is None else reliable and wire.delivery != "best_effort",
+        latched=latched,
+        depth=depth or 1,
+    )
+
+
+def _profile(*, reliable: bool, latched: bool, depth: int) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )

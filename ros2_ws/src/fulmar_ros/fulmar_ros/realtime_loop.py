@@ -1,0 +1,56 @@
+"""Real time: step on absolute deadlines with the newest command, whatever the controller does."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+from fulmar_core.backend import Backend, Sample
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+
+from fulmar_ros.deadline import Deadlines
+from fulmar_ros.lockstep_loop import SimulatedTime
+from fulmar_ros.plant_wires import PlantWires
+
+
+class RealtimeLoop:
+    """Steps a backend by the clock; the watchdog acts at every tick."""
+
+    def __init__(
+        self, backend: Backend, wires: PlantWires, guard: ActuatorGuard, clock: SimulatedTime, *, rate: float
+    ) -> None:
+        """Join the parts.
+
+        Args:
+            backend: A simulator or a robot.
+            wires: Endpoints of the plant.
+            guard: The last word on commands.
+            clock: Stamps of the states.
+            rate: Simulated seconds a wall-clock second, > 0.
+        """
+        self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
+        self._dt = backend.robot.timing.physics_dt
+        self.deadlines = Deadlines(self._dt / rate)
+        self.ticks = 0
+
+    def run(self, sample: Sample, ticks: int | None, stop: threading.Event) -> None:
+        """Tick until the number of ticks is done or somebody stops it.
+
+        Args:
+            sample: First sample.
+            ticks: How many; None for no end.
+            stop: Set by another thread.
+        """
+        self._wires.publish_sample(sample, self._clock.now_ns)
+        while (ticks is None or self.ticks < ticks) and self.deadlines.wait(stop):
+            command = self._command()
+            self._wires.publish_applied(command, self._clock.now_ns)
+            sample = self._backend.step(command)
+            self._clock.advance(self._dt)
+            self.ticks += 1
+            self._wires.publish_sample(sample, self._clock.now_ns)
+
+    def _command(self) -> np.ndarray:
+        with self._wires.lock:
+            return self._guard.output(time.monotonic_ns())

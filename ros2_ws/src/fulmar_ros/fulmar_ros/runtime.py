@@ -1,0 +1,121 @@
+"""How every node process lives: start, spin, stop in order, and an exit code that says how it went.
+
+The only home of `rclpy.init` and of spinning. The executor spins in a thread of its own, so that the main thread
+is free for signals and for a control loop's last words.
+"""
+
+from __future__ import annotations
+
+import gc
+import queue
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Any
+
+import rclpy
+from fulmar_core.errors import FulmarError
+from rclpy.executors import Executor, ExternalShutdownException
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+DONE, FAILED, BAD_USAGE = 0, 1, 2
+
+# A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a tenth of a 50 Hz period.
+SWITCH_INTERVAL_S = 0.0005
+
+RequestExit = Callable[[int], None]
+"""Ends the process in order, with an exit code; from any thread, returns at once, the first call counts."""
+
+
+def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | None = None) -> int:
+    """Build one node, spin it until it is told to stop, and stop it in order.
+
+    SIGINT and SIGTERM ask for an orderly end with exit code 0. A node may have a method `stop()`: it is called
+    in the main thread while messages still flow (publish zeros, flush, close). What it returns, if anything, is
+    the exit code of a run that would otherwise end with 0.
+
+    Args:
+        make_node: Builds the node. It is given a function that ends the process with an exit code.
+        argv: Command line with the ROS arguments; that of the process by default.
+
+    Returns:
+        0 after an orderly end, 1 if a callback or `stop` failed, 2 if the node could not be built, or the code
+        that the node asked for.
+    """
+    # A SimpleQueue may be filled from a signal handler; an Event may not, its lock is not reentrant.
+    exit_codes: queue.SimpleQueue[int] = queue.SimpleQueue()
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        exit_codes.put(DONE)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+
+    rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        try:
+            node = make_node(exit_codes.put)
+        except FulmarError as error:
+            sys.stderr.write(f"{error}\n")
+            return BAD_USAGE
+        return _spin(node, exit_codes)
+    finally:
+        rclpy.try_shutdown()
+
+
+def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
+    executor = _executor()
+    executor.add_node(node)
+
+    def spin() -> None:
+        try:
+            executor.spin()
+        except ExternalShutdownException:
+            exit_codes.put(DONE)
+        except Exception as error:  # noqa: BLE001 - whatever a callback raises ends the node
+            node.get_logger().error(_one_line(error))
+            exit_codes.put(FAILED)
+
+    thread = threading.Thread(target=spin, name="executor", daemon=True)
+    thread.start()
+    gc.collect()
+    gc.freeze()  # what exists now lives to the end; no need to look through it again and again
+    asked = exit_codes.get()
+    stopped = _stop(node)
+    executor.shutdown()
+    thread.join(timeout=2.0)
+    node.destroy_node()
+    return asked or stopped
+
+
+def _stop(node: Any) -> int:
+    stop = getattr(node, "stop", None)
+    if stop is None:
+        return DONE
+    try:
+        return stop() or DONE
+    except Exception as error:  # noqa: BLE001 - the rest of the shutdown must still happen
+        node.get_logger().error(_one_line(error))
+        return FAILED
+
+
+def _executor() -> Executor:
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:  # rclpy before Jazzy's 7.1.2
+        from rclpy.executors import SingleThreadedExecutor
+
+        return SingleThreadedExecutor()
+    return EventsExecutor()
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, FulmarError):
+        return str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"

@@ -1,0 +1,37 @@
+"""The process that simulates a robot: MuJoCo or the mock behind the plant's wires."""
+
+from __future__ import annotations
+
+import sys
+
+from fulmar_core.backend import Backend
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import UnknownNameError
+from fulmar_core.robot import Robot
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.plant_settings import PlantSettings
+from fulmar_ros.runtime import run_node
+
+BACKENDS = ("mujoco", "mock")
+
+
+def make_backend(robot: Robot, settings: PlantSettings) -> Backend:
+    """Build the backend that the parameters name; only that one is imported."""
+    if settings.backend == "mujoco":
+        from sim_nodes.mujoco_backend import MujocoBackend
+
+        return MujocoBackend(robot, sensor_noise=load_scenario(settings.scenario).sensor_noise)
+    if settings.backend == "mock":
+        from sim_nodes.mock_backend import MockBackend
+
+        return MockBackend(robot)
+    raise UnknownNameError("simulated backend", settings.backend, BACKENDS)
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    sys.exit(run_node(lambda request_exit: PlantNode(make_backend, request_exit)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,163 @@
+"""Learn a controller in the core's batch and leave a run folder that `export` understands.
+
+A run folder holds `run.json` (what was done), `network.pt` (the best weights) and `tensorboard/`.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import torch
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
+from fulmar_core.metrics import summary
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
+from stable_baselines3.common.vec_env import VecNormalize
+
+from training.network import DeployedNetwork, NetworkController
+from training.ppo import build_ppo
+from training.progress import LearningBar
+from training.rollout import roll_out_in_batch
+from training.settings import TrainingSettings
+from training.vec_env import BatchVecEnv
+
+NETWORK_FILE = "network.pt"
+RUN_FILE = "run.json"
+HELD_OUT_SEED = 1_000_003  # training seeds stay below, so checks see episodes that no run has learned from
+
+
+@dataclass(frozen=True)
+class Check:
+    """One look at the learner on held-out episodes, in the batch."""
+
+    wall_s: float
+    steps: int
+    success_rate: float
+    score: float  # orders checks: success first, then precision, then economy
+
+
+class _TimedLearning(BaseCallback):
+    """Checks the learner now and then, keeps the best network, and stops when time is up."""
+
+    def __init__(self, judge: Callable[[DeployedNetwork], tuple[float, float]], settings: TrainingSettings, limit: float) -> None:
+        super().__init__()
+        self._judge, self._settings, self._limit = judge, settings, limit
+        self._began = time.monotonic()
+        self._next_check = settings.evaluate_every_s
+        self._bar = LearningBar(limit)
+        self.checks: list[Check] = []
+        self.best: DeployedNetwork | None = None
+
+    def _on_training_start(self) -> None:
+        self._bar.__enter__()
+
+    def _on_training_end(self) -> None:
+        self._bar.__exit__(None, None, None)
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        elapsed = time.monotonic() - self._began
+        self._bar.advance(min(elapsed, self._limit), self.num_timesteps)
+
+    def _on_rollout_start(self) -> None:
+        elapsed = time.monotonic() - self._began
+        if elapsed >= min(self._next_check, self._limit):
+            self._check(elapsed)
+            self._next_check = elapsed + self._settings.evaluate_every_s
+
+    def _check(self, elapsed: float) -> None:
+        normaliser = self.model.get_vec_normalize_env()
+        assert normaliser is not None
+        network = DeployedNetwork(self.model, normaliser)  # type: ignore[arg-type]
+        success, score = self._judge(network)
+        if self.best is None or score > max(check.score for check in self.checks):
+            self.best = network
+        self.checks.append(Check(elapsed, self.num_timesteps, success, score))
+        self._bar.verdict(elapsed, f"success {success:.3f}")
+        self.logger.record("held_out/success_rate", success)
+        self.logger.record("held_out/score", score)
+        if elapsed >= self._limit:
+            raise _TimeIsUp
+
+
+class _TimeIsUp(Exception):
+    """Ends learning between two updates."""
+
+
+def train(
+    robot: Robot,
+    task: Task,
+    settings: TrainingSettings,
+    *,
+    seed: int,
+    out: Path,
+    time_limit_s: float | None = None,
+    command: str = "",
+) -> dict[str, Any]:
+    """Learn until the time is up.
+
+    Args:
+        robot: The robot.
+        task: The task.
+        settings: How to learn.
+        seed: Seed of everything random, in [0, 1,000,000].
+        out: Run folder; made if need be.
+        time_limit_s: Wall-clock of learning; the settings' by default [s].
+        command: Command line that started this, for the record.
+
+    Returns:
+        What `run.json` says.
+    """
+    limit = time_limit_s or settings.time_limit_s
+    torch.set_num_threads(1)  # a second thread gains little here and loses much when the machine is shared
+    scenario = load_scenario(settings.scenario)
+    out.mkdir(parents=True, exist_ok=True)
+    ppo = settings.ppo
+    worlds = BatchVecEnv(robot, task, scenario, worlds=ppo.worlds, seed=seed, reward_scale=ppo.reward_scale)
+    env = VecNormalize(worlds, norm_reward=False, gamma=ppo.gamma)
+    learner, feedback = build_ppo(ppo, env, seed=seed, tensorboard=str(out / "tensorboard"))
+    learning = _TimedLearning(_judge_of(robot, task, scenario), settings, limit)
+    try:
+        learner.learn(total_timesteps=10**12, callback=CallbackList([feedback, learning]))
+    except _TimeIsUp:
+        learning.on_training_end()
+    assert learning.best is not None
+    torch.save(learning.best.state_dict(), out / NETWORK_FILE)
+    record = {
+        "robot": robot.name,
+        "task": task.name,
+        "seed": seed,
+        "command": command,
+        "control_hz": robot.timing.control_hz,
+        "settings": asdict(settings),
+        "steps": learner.num_timesteps,
+        "wall_s": round(learning.checks[-1].wall_s, 1),
+        "best": asdict(max(learning.checks, key=lambda check: check.score)),
+        "curve": [asdict(check) for check in learning.checks],
+        "versions": {name: version(name) for name in ("torch", "stable-baselines3", "numpy")}
+        | {"python": platform.python_version()},
+    }
+    (out / RUN_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    return record
+
+
+def _judge_of(robot: Robot, task: Task, scenario: Scenario) -> Callable[[DeployedNetwork], tuple[float, float]]:
+    def judge(network: DeployedNetwork) -> tuple[float, float]:
+        controller = NetworkController(network, task.observation_names, robot.timing.control_hz)
+        run = roll_out_in_batch(controller, robot, task, scenario, episodes=256, seed=HELD_OUT_SEED)
+        figures: dict[str, Any] = summary(run, task)
+        success = float(figures["success_rate"])
+        precision = float(figures["PT2_percent"]["mean"]) / 100.0
+        return success, success + 0.5 * precision - 0.5 * float(figures["AAS"]["mean"])
+
+    return judge

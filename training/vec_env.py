@@ -1,0 +1,120 @@
+"""The core's batch as a Stable-Baselines3 vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.robot import Robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.planar import planar_error
+from stable_baselines3.common.vec_env import VecEnv
+
+
+class BatchVecEnv(VecEnv):
+    """Worlds that learn together; each begins again by itself when its episode is over.
+
+    An episode ends when the robot leaves the geofence (terminated) or its time is up (truncated: the value of
+    the last state still counts). First episodes have random lengths, so that resets spread out over time.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        scenario: Scenario,
+        *,
+        worlds: int,
+        seed: int,
+        reward_scale: float = 1.0,
+        training: bool = True,
+    ) -> None:
+        """Build the worlds.
+
+        Args:
+            robot: The robot.
+            task: Gives observation, reward and episode length.
+            scenario: What episodes are drawn from.
+            worlds: Number of worlds, >= 1.
+            seed: Seed of every draw.
+            reward_scale: Factor on the rewards.
+            training: Start episodes where learning starts.
+        """
+        self._robot, self._task, self._reward_scale = robot, task, reward_scale
+        self._new_simulation = lambda seed: BatchSimulation(
+            robot, task, scenario, worlds=worlds, seed=seed, training=training
+        )
+        self.simulation = self._new_simulation(seed)
+        self._seed = seed
+        self._horizon = round(task.episode_s / self.simulation.control_dt)
+        observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(task.observation_names),), np.float32)
+        action_space = gymnasium.spaces.MultiBinary(len(robot.actuators.names))
+        super().__init__(worlds, observation_space, action_space)
+        self._age = np.zeros(worlds, dtype=int)
+        self._actions = np.zeros((worlds, len(robot.actuators.names)), dtype=np.float32)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed of the next `reset`."""
+        self._seed = self._seed if seed is None else seed
+        return [self._seed] * self.num_envs
+
+    def reset(self) -> np.ndarray:
+        """Begin anew in every world; returns the observations, shape (worlds, n)."""
+        self.simulation = self._new_simulation(self._seed)
+        self._age = np.random.Generator(np.random.Philox(self._seed)).integers(0, self._horizon, self.num_envs)
+        self.reset_infos = [{} for _ in range(self.num_envs)]
+        return self._observe()
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Take the actions of the coming step, shape (worlds, n)."""
+        self._actions = np.asarray(actions, dtype=np.float32)
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Move one control step; returns observations, rewards, dones and infos."""
+        simulation = self.simulation
+        before = simulation.truth
+        simulation.step(self._actions)
+        reward = self._task.reward(before, simulation.truth, simulation.goal, self._actions)
+        self._age += 1
+        lost = planar_error(simulation.truth, simulation.goal).position > self._robot.limits.geofence
+        timed_out = (self._age >= self._horizon) & ~lost
+        done = lost | timed_out
+        # One shared dictionary where nothing ended: a thousand empty ones a step would cost more than the physics.
+        infos: list[dict[str, Any]] = [_NOTHING_TO_SAY] * self.num_envs
+        ended = np.flatnonzero(done)
+        if ended.size:
+            last = self._observe()
+            for world in ended:
+                infos[world] = {"terminal_observation": last[world], "TimeLimit.truncated": bool(timed_out[world])}
+            simulation.reset(ended)
+            self._age[ended] = 0
+        return self._observe(), np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
+
+    def _observe(self) -> np.ndarray:
+        return np.asarray(self._task.observe(self.simulation.measured, self.simulation.goal), dtype=np.float32)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Attribute of this object, once for every world asked about."""
+        return [getattr(self, attr_name, None) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of this object."""
+        setattr(self, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of this object, once for every world asked about."""
+        return [getattr(self, method_name)(*args, **kwargs) for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Worlds are never wrapped one by one."""
+        return [False for _ in self._get_indices(indices)]
+
+
+_NOTHING_TO_SAY: dict[str, Any] = {}
