@@ -18,14 +18,17 @@ from typing import Any
 
 import rclpy
 from fulmar_core.errors import FulmarError
-from rclpy.executors import Executor, ExternalShutdownException
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 DONE, FAILED, BAD_USAGE = 0, 1, 2
 
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a tenth of a 50 Hz period.
 SWITCH_INTERVAL_S = 0.0005
+
+SPIN_S = 60.0
 
 RequestExit = Callable[[int], None]
 """Ends the process in order, with an exit code; from any thread, returns at once, the first call counts."""
@@ -56,27 +59,31 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         signal.signal(number, on_signal)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
-    rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        try:
-            node = make_node(exit_codes.put)
-        except FulmarError as error:
-            sys.stderr.write(f"{error}\n")
-            return BAD_USAGE
+        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot read
+        sys.stderr.write(f"the ROS arguments on the command line are wrong: {str(error).splitlines()[0]}\n")
+        return BAD_USAGE
+    try:
+        node = make_node(exit_codes.put)
         return _spin(node, exit_codes)
+    except FulmarError as error:
+        sys.stderr.write(f"{error}\n")
+        return BAD_USAGE
     finally:
         rclpy.try_shutdown()
 
 
 def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
-    executor = _executor()
+    executor, over = _executor(), Future()
     executor.add_node(node)
 
     def spin() -> None:
         try:
-            executor.spin()
-        except ExternalShutdownException:
-            exit_codes.put(DONE)
+            # Not spin(): the EventsExecutor of the wheels then waits for a deadline beyond the clock's range,
+            # which burns a core and starves the timers. A finite wait in a loop does what spin() should.
+            while not over.done():
+                executor.spin_until_future_complete(over, timeout_sec=SPIN_S)
         except Exception as error:  # noqa: BLE001 - whatever a callback raises ends the node
             node.get_logger().error(_one_line(error))
             exit_codes.put(FAILED)
@@ -87,8 +94,9 @@ def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
     gc.freeze()  # what exists now lives to the end; no need to look through it again and again
     asked = exit_codes.get()
     stopped = _stop(node)
-    executor.shutdown()
+    over.set_result(None)
     thread.join(timeout=2.0)
+    executor.shutdown()
     node.destroy_node()
     return asked or stopped
 
