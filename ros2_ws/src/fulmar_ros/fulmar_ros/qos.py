@@ -1,12 +1,13 @@
 """Quality of service of each wire, for publishers and for subscribers.
 
-Follows `Wire.delivery`; no deadline is requested anywhere, since a publisher that offers none would never match.
+Follows `Wire.delivery`. No deadline is requested anywhere: a publisher that offers none would never match.
 """
 
 from __future__ import annotations
 
-from fulmar_core.topics import Wire
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from fulmar_core.topics import Wire
 
 STREAM_DEPTH = 10
 
@@ -23,8 +24,8 @@ def publisher_qos(wire: Wire) -> QoSProfile:
 def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | None = None) -> QoSProfile:
     """How subscribers of a wire ask for it.
 
-    By default a subscriber wants the newest message only: best effort, the last 1 kept. Latched wires are asked
-    for reliably, with what was published before.
+    By default a subscriber wants the newest message only: best effort, the last 1 kept. Latched wires are
+    asked for reliably, with what was published before.
 
     Args:
         wire: The wire.

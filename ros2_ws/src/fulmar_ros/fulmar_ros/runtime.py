@@ -1,7 +1,7 @@
 """How every node process lives: start, spin, stop in order, and an exit code that says how it went.
 
-The only home of `rclpy.init` and of spinning. The executor spins in a thread of its own, so that the main thread
-is free for signals and for a control loop's last words.
+The only home of `rclpy.init` and of spinning. The executor spins in a thread of its own, so that the main
+thread is free for signals and for a control loop's last words.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from types import FrameType
 from typing import Any
 
 import rclpy
-from fulmar_core.errors import FulmarError
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from fulmar_core.errors import FulmarError
+
 DONE, FAILED, BAD_USAGE = 0, 1, 2
 
-# A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a tenth of a 50 Hz period.
+# A thread that waits for the interpreter gets it after this long; Python's own 5 ms is much of a 20 ms period.
 SWITCH_INTERVAL_S = 0.0005
 
 SPIN_S = 60.0
@@ -37,17 +38,17 @@ RequestExit = Callable[[int], None]
 def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | None = None) -> int:
     """Build one node, spin it until it is told to stop, and stop it in order.
 
-    SIGINT and SIGTERM ask for an orderly end with exit code 0. A node may have a method `stop()`: it is called
-    in the main thread while messages still flow (publish zeros, flush, close). What it returns, if anything, is
-    the exit code of a run that would otherwise end with 0.
+    SIGINT and SIGTERM ask for an orderly end with exit code 0. A node may have a method `stop()`: it is
+    called in the main thread while messages still flow (publish zeros, flush, close). What it returns, if
+    anything, is the exit code of a run that would otherwise end with 0.
 
     Args:
         make_node: Builds the node. It is given a function that ends the process with an exit code.
         argv: Command line with the ROS arguments; that of the process by default.
 
     Returns:
-        0 after an orderly end, 1 if a callback or `stop` failed, 2 if the node could not be built, or the code
-        that the node asked for.
+        0 after an orderly end, 1 if a callback or `stop` failed, 2 if the node could not be built, or the
+        code that the node asked for.
     """
     # A SimpleQueue may be filled from a signal handler; an Event may not, its lock is not reentrant.
     exit_codes: queue.SimpleQueue[int] = queue.SimpleQueue()
