@@ -26,7 +26,7 @@ from fulmar_core.errors import FulmarError
 
 DONE, FAILED, BAD_USAGE = 0, 1, 2
 
-# A thread that waits for the interpreter gets it after this long; Python's own 5 ms is much of a 20 ms period.
+# A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
 
 SPIN_S = 60.0

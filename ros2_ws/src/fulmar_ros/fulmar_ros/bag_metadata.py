@@ -1,0 +1,111 @@
+"""The `metadata.yaml` of a bag folder, rosbag2 version 9 as Jazzy writes it."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from fulmar_core.topics import Delivery
+from fulmar_ros.bag_types import MessageType, offered_qos
+
+METADATA_FILE = "metadata.yaml"
+
+
+@dataclass(frozen=True)
+class TopicCount:
+    """One topic of a bag and what it holds of it."""
+
+    name: str
+    type: MessageType
+    delivery: Delivery
+    messages: int
+
+
+@dataclass(frozen=True)
+class BagSpan:
+    """How much a bag holds, and when."""
+
+    messages: int
+    start_ns: int
+    end_ns: int
+
+
+def write_metadata(
+    directory: Path, file: str, span: BagSpan, topics: Sequence[TopicCount], custom: Mapping[str, str]
+) -> None:
+    """Write or replace `metadata.yaml`; a reader sees the old one or the new one, never half of one.
+
+    Args:
+        directory: The bag.
+        file: Name of the MCAP file in it.
+        span: Counts of all topics together.
+        topics: Counts by topic.
+        custom: Text by name, for `custom_data`.
+
+    Raises:
+        OSError: The disk refuses; what was there stays.
+    """
+    start = {"nanoseconds_since_epoch": span.start_ns}
+    duration = {"nanoseconds": span.end_ns - span.start_ns}
+    information = {
+        "version": 9,
+        "storage_identifier": "mcap",
+        "duration": duration,
+        "starting_time": start,
+        "message_count": span.messages,
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type.name,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": offered_qos(topic.delivery),
+                    "type_description_hash": topic.type.hash,
+                },
+                "message_count": topic.messages,
+            }
+            for topic in topics
+        ],
+        "compression_format": "",  # of the rosbag2 kind; MCAP compresses its own chunks
+        "compression_mode": "",
+        "relative_file_paths": [file],
+        "files": [
+            {"path": file, "starting_time": start, "duration": duration, "message_count": span.messages}
+        ],
+        "custom_data": dict(custom),
+        "ros_distro": "jazzy",
+    }
+    # A deep copy of its own for each place, because other YAML readers need not know aliases.
+    document = {"rosbag2_bagfile_information": _without_sharing(information)}
+    replace_file(directory / METADATA_FILE, yaml.safe_dump(document, sort_keys=False, width=10**6).encode())
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Write a file so that it holds all of the new bytes or all of the old ones.
+
+    Raises:
+        OSError: The disk refuses; what was there stays.
+    """
+    new = path.with_name(f".{path.name}.new")
+    try:
+        with new.open("wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        new.replace(path)
+    except OSError:
+        new.unlink(missing_ok=True)
+        raise
+
+
+def _without_sharing(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _without_sharing(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_without_sharing(part) for part in value]
+    return copy.copy(value)

@@ -1,0 +1,81 @@
+"""Reads the records of an MCAP file one after the other, as far as the file goes.
+
+Needs no index and no footer: damage costs the chunk it is in, and a torn end costs the torn piece.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
+from mcap.stream_reader import breakup_chunk
+from mcap.writer import MCAP0_MAGIC
+
+from fulmar_core.errors import BagError
+
+Record = Schema | Channel | Message | Metadata | Attachment
+
+_HEAD = struct.Struct("<BQ")  # opcode and length of every record
+_READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
+    Opcode.SCHEMA: lambda stream, _: Schema.read(stream),
+    Opcode.CHANNEL: lambda stream, _: Channel.read(stream),
+    Opcode.MESSAGE: Message.read,
+    Opcode.METADATA: lambda stream, _: Metadata.read(stream),
+    Opcode.ATTACHMENT: lambda stream, _: Attachment.read(stream),
+    Opcode.CHUNK: lambda stream, _: Chunk.read(stream),
+}
+
+
+def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
+    """Go through an MCAP file.
+
+    Args:
+        path: The file.
+        damage: Grows by one line for each part that cannot be read.
+
+    Yields:
+        Schemas, channels, messages, metadata and attachments, in the order of the file.
+
+    Raises:
+        BagError: The file cannot be opened, is empty, or is no MCAP file at all.
+    """
+    try:
+        data = memoryview(path.read_bytes())
+    except OSError as error:
+        raise BagError(f"{path}: {error.strerror}.") from error
+    if not data:
+        raise BagError(f"{path}: the file is empty. Was the recorder stopped before it wrote anything?")
+    if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
+        raise BagError(f"{path}: this is no MCAP file. Give a bag folder, or the .mcap file in it.")
+    offset = len(MCAP0_MAGIC)
+    while offset < len(data):
+        if len(data) - offset < _HEAD.size:
+            damage.append(f"{path.name}: {len(data) - offset} bytes at the end are torn off.")
+            return
+        opcode, length = _HEAD.unpack_from(data, offset)
+        start, offset = offset, offset + _HEAD.size + length
+        if opcode == Opcode.DATA_END:
+            return
+        if offset > len(data):
+            damage.append(
+                f"{path.name}: the record at byte {start} is torn off or damaged; nothing after it counts."
+            )
+            return
+        if opcode in _READERS:
+            body = bytes(data[start + _HEAD.size : offset])
+            yield from _parse(opcode, body, f"{path.name}: the record at byte {start}", damage)
+
+
+def _parse(opcode: int, body: bytes, where: str, damage: list[str]) -> list[Any]:
+    try:
+        record = _READERS[opcode](ReadDataStream(BytesIO(body)), len(body))
+        return breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
+    except Exception as error:  # noqa: BLE001 - flipped bits raise whatever they please, from four libraries
+        damage.append(f"{where} is damaged and was left out ({type(error).__name__}).")
+        return []
