@@ -7,11 +7,9 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
-
-from fulmar_core.topics import Delivery
-from fulmar_ros.bag_types import MessageType, offered_qos
 
 METADATA_FILE = "metadata.yaml"
 
@@ -21,8 +19,9 @@ class TopicCount:
     """One topic of a bag and what it holds of it."""
 
     name: str
-    type: MessageType
-    delivery: Delivery
+    type_name: str
+    type_hash: str
+    qos: list[dict[str, Any]]  # offered by its publishers
     messages: int
 
 
@@ -62,10 +61,10 @@ def write_metadata(
             {
                 "topic_metadata": {
                     "name": topic.name,
-                    "type": topic.type.name,
+                    "type": topic.type_name,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": offered_qos(topic.delivery),
-                    "type_description_hash": topic.type.hash,
+                    "offered_qos_profiles": topic.qos,
+                    "type_description_hash": topic.type_hash,
                 },
                 "message_count": topic.messages,
             }

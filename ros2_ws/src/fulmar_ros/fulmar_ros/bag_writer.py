@@ -186,6 +186,9 @@ class BagWriter:
 
     def _note_flushed(self) -> None:
         self._flushed = self._written
-        topics = [TopicCount(c.name, c.type, c.delivery, c.messages) for c in self._channels.values()]
+        topics = [
+            TopicCount(c.name, c.type.name, c.type.hash, offered_qos(c.delivery), c.messages)
+            for c in self._channels.values()
+        ]
         span = BagSpan(self._written, self._first_ns, self._last_ns)
         write_metadata(self.directory, self._file_name, span, topics, {RUN_RECORD: self._run})

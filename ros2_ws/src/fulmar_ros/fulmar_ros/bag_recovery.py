@@ -1,0 +1,140 @@
+"""Makes a bag whole again that a power cut or a damaged disk left torn."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from pathlib import Path
+
+import yaml
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.well_known import Profile
+from mcap.writer import Writer
+
+from fulmar_core.errors import BagError
+from fulmar_ros.bag_file import BagFile
+from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
+from fulmar_ros.bag_records import read_records
+
+
+def recover(directory: Path) -> tuple[str, ...]:
+    """Rewrite the MCAP file of a bag and its `metadata.yaml` with everything that can still be read.
+
+    The new file replaces the old one in one step. Where something could not be read, the old file stays
+    beside it as `<name>.damaged`.
+
+    Args:
+        directory: The bag.
+
+    Returns:
+        One line for each part that could not be read; empty if the bag was whole.
+
+    Raises:
+        BagError: There is no MCAP file, it is none at all, or the disk refuses the new one.
+    """
+    path = bag_file(directory)
+    damage: list[str] = []
+    new = path.with_name(f".{path.name}.new")
+    new.unlink(missing_ok=True)
+    copy = _Copy(new)
+    try:
+        for record in read_records(path, damage):
+            copy.add(record)
+        copy.finish()
+        if damage:
+            path.with_name(f"{path.name}.damaged").unlink(missing_ok=True)
+            os.link(path, path.with_name(f"{path.name}.damaged"))
+        new.replace(path)
+        write_metadata(directory, path.name, copy.span(), copy.topics(), copy.custom)
+    except OSError as error:
+        raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
+    finally:
+        new.unlink(missing_ok=True)
+    return tuple(damage)
+
+
+def bag_file(bag: Path) -> Path:
+    """The MCAP file of a bag.
+
+    Args:
+        bag: Bag folder, or the file itself.
+
+    Raises:
+        BagError: There is none, or more than one.
+    """
+    if bag.is_file():
+        return bag
+    if not bag.is_dir():
+        raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
+    files = sorted(bag.glob("*.mcap"))
+    if len(files) != 1:
+        raise BagError(f"{bag}: {len(files)} .mcap files where a bag folder has one. Give a bag folder.")
+    return files[0]
+
+
+class _Copy:
+    """A fresh MCAP file with the records of another one."""
+
+    def __init__(self, path: Path) -> None:
+        self.custom: dict[str, str] = {}
+        self._file = BagFile(path)
+        self._mcap = Writer(self._file)
+        self._mcap.start(profile=Profile.ROS2, library="fulmar")
+        self._schemas: dict[int, tuple[int, str]] = {0: (0, "")}  # number there: number here and name
+        self._channels: dict[int, tuple[int, str, Channel]] = {}
+        self._counts: Counter[int] = Counter()
+        self._times: list[int] = []
+
+    def add(self, record: Schema | Channel | Message | Metadata | Attachment) -> None:
+        if isinstance(record, Schema):
+            if record.id not in self._schemas:
+                number = self._mcap.register_schema(record.name, record.encoding, record.data)
+                self._schemas[record.id] = (number, record.name)
+        elif isinstance(record, Channel):
+            self._add_channel(record)
+        elif isinstance(record, Message):
+            self._add_message(record)
+        elif isinstance(record, Metadata):
+            self._mcap.add_metadata(record.name, record.metadata)
+            self.custom[record.name] = next(iter(record.metadata.values()), "")
+        else:
+            self._mcap.add_attachment(
+                record.create_time, record.log_time, record.name, record.media_type, record.data
+            )
+
+    def _add_channel(self, channel: Channel) -> None:
+        if channel.id not in self._channels and channel.schema_id in self._schemas:
+            schema, type_name = self._schemas[channel.schema_id]
+            number = self._mcap.register_channel(
+                channel.topic, channel.message_encoding, schema, channel.metadata
+            )
+            self._channels[channel.id] = (number, type_name, channel)
+
+    def _add_message(self, message: Message) -> None:
+        if message.channel_id in self._channels:
+            number = self._channels[message.channel_id][0]
+            self._mcap.add_message(
+                number, message.log_time, message.data, message.publish_time, message.sequence
+            )
+            self._counts[message.channel_id] += 1
+            self._times.append(message.log_time)
+
+    def finish(self) -> None:
+        self._mcap.finish()
+        self._file.finish()
+        self._file.close()
+
+    def span(self) -> BagSpan:
+        return BagSpan(len(self._times), min(self._times, default=0), max(self._times, default=0))
+
+    def topics(self) -> list[TopicCount]:
+        return [
+            TopicCount(
+                channel.topic,
+                type_name,
+                channel.metadata.get("topic_type_hash", ""),
+                yaml.safe_load(channel.metadata.get("offered_qos_profiles", "[]")),
+                self._counts[number],
+            )
+            for number, (_, type_name, channel) in self._channels.items()
+        ]

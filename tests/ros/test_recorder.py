@@ -1,0 +1,204 @@
+"""The recorder as a process of its own: what it keeps, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from nav_msgs.msg import Odometry
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader
+from std_msgs.msg import String
+
+from fulmar_core.topics import METADATA, ODOMETRY
+from fulmar_ros.qos import publisher_qos
+
+ROBOT = "/floating_platform"
+
+
+class Recorder:
+    """A recorder process, its output, and a publisher that it hears."""
+
+    def __init__(self, directory: Path, env: dict[str, str], *parameters: str) -> None:
+        options = [f"directory:={directory}", *parameters]
+        command = [sys.executable, "-m", "fulmar_ros.recorder_node", "--ros-args", "-r", f"__ns:={ROBOT}"]
+        command += [word for option in options for word in ("-p", option)]
+        self.directory = directory
+        self.process = subprocess.Popen(
+            command, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def wait_until_recording(self) -> None:
+        assert self.process.stdout.readline() == f"recording to {self.directory}\n"
+
+    def end(self, number: signal.Signals) -> tuple[int, str, str]:
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=20)
+        return self.process.returncode, out, err
+
+    def file(self) -> Path:
+        return next(self.directory.glob("*.mcap"))
+
+    def stamps_by_rosbags(self) -> list[int]:
+        with AnyReader([self.directory]) as reader:
+            connections = [c for c in reader.connections if c.topic == f"{ROBOT}/odom"]
+            messages = reader.messages(connections=connections)
+            return [reader.deserialize(raw, c.msgtype).header.stamp.sec for c, _, raw in messages]
+
+    def stamps_by_mcap(self) -> list[int]:
+        with self.file().open("rb") as stream:
+            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+            messages = reader.iter_decoded_messages(topics=[f"{ROBOT}/odom"])
+            return [message.header.stamp.sec for *_, message in messages]
+
+
+@pytest.fixture
+def record(ros_domain, tmp_path) -> Iterator[object]:
+    started = []
+
+    def start(*parameters: str, directory: Path | None = None) -> Recorder:
+        started.append(Recorder(directory or tmp_path / "bag", ros_domain.env, *parameters))
+        return started[-1]
+
+    yield start
+    for recorder in started:
+        recorder.process.kill()
+        recorder.process.communicate()
+
+
+@pytest.fixture
+def node(ros_domain) -> Iterator[rclpy.node.Node]:
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=ros_domain.id)
+    made = rclpy.create_node("talker", namespace=ROBOT, context=context)
+    yield made
+    made.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def odometry(node):
+    publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+    deadline = time.monotonic() + 10.0
+    while not publisher.get_subscription_count():
+        assert time.monotonic() < deadline, "the recorder never subscribed to the odometry"
+        time.sleep(0.01)
+    time.sleep(0.3)  # a publisher knows of a match a moment before the subscriber does
+    return publisher
+
+
+def publish(publisher, stamps, period_s: float = 0.002) -> None:
+    message = Odometry()
+    for stamp in stamps:
+        message.header.stamp.sec = stamp
+        publisher.publish(message)
+        time.sleep(period_s)
+
+
+def test_a_stopped_recorder_has_kept_every_message(record, node):
+    node.create_publisher(String, METADATA.name, publisher_qos(METADATA)).publish(String(data="early"))
+    recorder = record("run_info:='{\"seed\": 7}'")
+    recorder.wait_until_recording()
+    publish(odometry(node), range(500))
+    code, out, err = recorder.end(signal.SIGINT)
+    assert (code, err) == (0, "")
+    assert out.startswith("recorded 501 messages")
+    assert recorder.stamps_by_rosbags() == list(range(500))
+    assert recorder.stamps_by_mcap() == list(range(500))
+    with Reader(recorder.directory) as reader:
+        assert reader.message_count == 501
+        assert {c.topic for c in reader.connections} >= {f"{ROBOT}/odom", "/clock", "/diagnostics"}
+
+
+def test_sigterm_closes_the_bag_too(record, node):
+    recorder = record()
+    recorder.wait_until_recording()
+    publish(odometry(node), range(20))
+    assert recorder.end(signal.SIGTERM)[0] == 0
+    assert recorder.stamps_by_rosbags() == list(range(20))
+
+
+def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
+    recorder = record()
+    recorder.wait_until_recording()
+    publisher = odometry(node)
+    begin = time.monotonic()
+    sent = []
+    while time.monotonic() - begin < 3.5:
+        publish(publisher, [len(sent)], period_s=0.01)
+        sent.append(time.monotonic())
+    recorder.end(signal.SIGKILL)
+    kept = recorder.stamps_by_rosbags()
+    assert kept == recorder.stamps_by_mcap() == list(range(len(kept)))
+    lost_s = sent[-1] - sent[kept[-1]]
+    assert lost_s < 1.3, "one second between flushes, the rest for a busy machine"
+
+
+def test_a_paused_recorder_goes_on_where_it_was(record, node):
+    recorder = record()
+    recorder.wait_until_recording()
+    publisher = odometry(node)
+    publish(publisher, range(50))
+    recorder.process.send_signal(signal.SIGSTOP)
+    time.sleep(0.5)
+    recorder.process.send_signal(signal.SIGCONT)
+    publish(publisher, range(50, 100))
+    assert recorder.end(signal.SIGINT)[0] == 0
+    assert recorder.stamps_by_rosbags() == list(range(100))
+
+
+def test_an_existing_bag_is_refused_with_one_line(record, tmp_path):
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "bag_0.mcap").write_bytes(b"precious")
+    recorder = record()
+    out, err = recorder.process.communicate(timeout=20)
+    assert recorder.process.returncode == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    assert f"{tmp_path / 'bag'} exists already" in err
+    assert (tmp_path / "bag" / "bag_0.mcap").read_bytes() == b"precious"
+
+
+def test_broken_run_information_is_refused_with_one_line(record):
+    recorder = record("run_info:='{not json'")
+    _, err = recorder.process.communicate(timeout=20)
+    assert recorder.process.returncode == 2
+    assert err.count("\n") == 1
+    assert "run_info" in err
+
+
+def test_a_full_disk_ends_in_exit_code_1_with_all_before_it_kept(record, node):
+    recorder = record()
+    recorder.wait_until_recording()
+    publisher = odometry(node)
+    publish(publisher, range(10))
+    time.sleep(1.3)
+    size = recorder.file().stat().st_size
+    resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+    publish(publisher, range(10, 600))
+    time.sleep(1.3)
+    code, out, err = recorder.end(signal.SIGINT)
+    assert code == 1
+    assert out.startswith("recorded 10 messages")
+    assert err.count("10 messages are safe") == 1
+    assert "590 of 600 messages are not in the bag" in err
+    assert recorder.stamps_by_rosbags() == list(range(10))
+
+
+def test_no_process_or_thread_is_left_behind(record):
+    recorder = record()
+    recorder.wait_until_recording()
+    assert recorder.end(signal.SIGINT)[0] == 0
+    with pytest.raises(ProcessLookupError):
+        os.kill(recorder.process.pid, 0)
+    assert not [thread for thread in threading.enumerate() if thread.name == "bag"]
