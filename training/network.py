@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,23 +18,30 @@ from torch import nn
 class DeployedNetwork(nn.Module):
     """Observation in, logits and on/off command out; what `export` writes to ONNX."""
 
-    def __init__(self, learner: PPO, normaliser: VecNormalize) -> None:
-        """Copy the present weights and statistics.
+    def __init__(self, sizes: Sequence[int], *, limit: float) -> None:
+        """Build an untrained network of tanh layers.
 
         Args:
-            learner: A PPO with an MLP policy over on/off actuators.
-            normaliser: Holds the running mean and variance of the observations.
+            sizes: Number of observation terms, of units of each hidden layer, and of actuators.
+            limit: Normalised observations are cut to this.
         """
         super().__init__()
-        statistics = normaliser.obs_rms
-        assert not isinstance(statistics, dict)
-        self.limit = float(normaliser.clip_obs)
-        self.register_buffer("mean", torch.as_tensor(statistics.mean, dtype=torch.float32).clone())
-        scale = np.sqrt(statistics.var + normaliser.epsilon)
-        self.register_buffer("scale", torch.as_tensor(scale, dtype=torch.float32).clone())
-        layers = [_copy(layer) for layer in (*learner.policy.mlp_extractor.policy_net, learner.policy.action_net)]
-        self.layers = nn.Sequential(*layers)
+        self.limit = limit
+        self.register_buffer("mean", torch.zeros(sizes[0]))
+        self.register_buffer("scale", torch.ones(sizes[0]))
+        layers: list[nn.Module] = []
+        for inputs, outputs in itertools.pairwise(sizes):
+            layers += [nn.Linear(inputs, outputs), nn.Tanh()]
+        self.layers = nn.Sequential(*layers[:-1])
         self.eval()
+
+    @property
+    def observation_count(self) -> int:
+        """Number of terms it takes."""
+        return int(self.mean.shape[0])
+
+    mean: torch.Tensor
+    scale: torch.Tensor
 
     def forward(self, observation: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Choose the more likely state of each actuator.
@@ -45,6 +55,50 @@ class DeployedNetwork(nn.Module):
         normal = torch.clamp((observation - self.mean) / self.scale, -self.limit, self.limit)
         logits = self.layers(normal)
         return (logits > 0.0).to(torch.float32), logits
+
+    def infer(self, observation: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Command and logits as NumPy, shapes as in `forward`."""
+        with torch.inference_mode():
+            command, logits = self(torch.as_tensor(np.asarray(observation, dtype=np.float32)))
+        return command.numpy(), logits.numpy()
+
+
+def deployed_network(learner: PPO, normaliser: VecNormalize) -> DeployedNetwork:
+    """Copy a learner's present weights and statistics.
+
+    Args:
+        learner: A PPO with an MLP policy of tanh layers over on/off actuators.
+        normaliser: Holds the running mean and variance of the observations.
+
+    Returns:
+        A network that shares nothing with the learner.
+    """
+    statistics = normaliser.obs_rms
+    assert not isinstance(statistics, dict)
+    trained = (*learner.policy.mlp_extractor.policy_net, learner.policy.action_net)
+    linear = [layer for layer in trained if isinstance(layer, nn.Linear)]
+    network = DeployedNetwork([linear[0].in_features, *(layer.out_features for layer in linear)], limit=normaliser.clip_obs)
+    network.mean.copy_(torch.as_tensor(statistics.mean, dtype=torch.float32))
+    network.scale.copy_(torch.as_tensor(np.sqrt(statistics.var + normaliser.epsilon), dtype=torch.float32))
+    twins = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
+    for twin, layer in zip(twins, linear, strict=True):
+        twin.load_state_dict(layer.state_dict())
+    return network
+
+
+def save_network(network: DeployedNetwork, path: Path) -> None:
+    """Write weights and statistics."""
+    torch.save({"limit": network.limit, "state": network.state_dict()}, path)
+
+
+def load_network(path: Path) -> DeployedNetwork:
+    """Read what `save_network` wrote; tensors only, no pickled code."""
+    content = torch.load(path, weights_only=True)
+    state = content["state"]
+    weights = [value for name, value in state.items() if name.endswith("weight")]
+    network = DeployedNetwork([weights[0].shape[1], *(w.shape[0] for w in weights)], limit=content["limit"])
+    network.load_state_dict(state)
+    return network
 
 
 class NetworkController:
@@ -63,19 +117,10 @@ class NetworkController:
 
     def act(self, observation: Array) -> Array:
         """Choose actuators; shapes as in `Controller.act`."""
-        with torch.inference_mode():
-            batch = torch.as_tensor(np.atleast_2d(np.asarray(observation, dtype=np.float32)))
-            command = self._network(batch)[0].numpy()
+        command, _ = self._network.infer(np.atleast_2d(observation))
         return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
 
     def metadata(self) -> dict[str, Any]:
         """Its kind; an unfinished network has no identity worth recording."""
         return {"controller": self.name}
 
-
-def _copy(layer: nn.Module) -> nn.Module:
-    if not isinstance(layer, nn.Linear):
-        return type(layer)()
-    twin = nn.Linear(layer.in_features, layer.out_features)
-    twin.load_state_dict(layer.state_dict())
-    return twin

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 from fulmar_core.backend import Backend
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import Scenario
@@ -12,7 +11,10 @@ from fulmar_core.episode import draw_episode
 from fulmar_core.metrics import Trajectories, TrajectoryLog, join
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import stack_poses, stack_states
 from fulmar_core.tasks import Task
+
+SIDE_BY_SIDE = 256  # simulators alive at once
 
 Progress = Callable[[int], None]  # called with the number of control steps done
 
@@ -54,9 +56,9 @@ def roll_out_in_batch(
     return log.trajectories()
 
 
-def roll_out_in_backend(
+def roll_out_in_backends(
     controller: Controller,
-    backend: Backend,
+    make_backend: Callable[[], Backend],
     task: Task,
     scenario: Scenario,
     *,
@@ -64,22 +66,57 @@ def roll_out_in_backend(
     seed: int,
     progress: Progress = lambda steps: None,
 ) -> Trajectories:
-    """Run episodes 0 to `episodes - 1` of a seed one after the other in a backend; arguments as above."""
-    robot = backend.robot
+    """Run episodes 0 to `episodes - 1` of a seed, each in a backend of its own, stepped side by side.
+
+    Args:
+        controller: Whom to judge.
+        make_backend: Builds one simulator.
+        task: The task.
+        scenario: What episodes are drawn from.
+        episodes: Number of episodes, >= 1.
+        seed: Seed of the draws.
+        progress: Told how many control steps have been done.
+
+    Returns:
+        What happened, from the true states.
+    """
+    backends = [make_backend() for _ in range(min(episodes, SIDE_BY_SIDE))]
+    runs = []
+    for first in range(0, episodes, SIDE_BY_SIDE):
+        numbers = range(first, min(first + SIDE_BY_SIDE, episodes))
+        done = sum(run.position_error.size for run in runs)
+        runs.append(_side_by_side(controller, backends, task, scenario, numbers, seed, lambda n, d=done: progress(d + n)))
+    for backend in backends:
+        backend.close()
+    return join(runs)
+
+
+def _side_by_side(
+    controller: Controller,
+    backends: list[Backend],
+    task: Task,
+    scenario: Scenario,
+    numbers: range,
+    seed: int,
+    progress: Progress,
+) -> Trajectories:
+    robot = backends[0].robot
     substeps = robot.timing.substeps(controller.control_hz)
     control_dt = substeps * robot.timing.physics_dt
-    steps = round(task.episode_s / control_dt)
-    runs = []
-    for number in range(episodes):
-        episode = draw_episode(robot, task, scenario, seed=seed, number=number)
-        sample = backend.reset(episode.start, episode.world, seed=seed, number=number)
-        controller.reset()
-        log = TrajectoryLog(control_dt)
-        for _ in range(steps):
-            command = robot.actuators.limited(controller.act(task.observe(sample.odometry, episode.goal)))
-            sample = backend.step(command, substeps)
-            assert sample.truth is not None, "only a simulator can be judged"
-            log.add(sample.truth, episode.goal, np.asarray(command))
-        runs.append(log.trajectories())
-        progress((number + 1) * steps)
-    return join(runs)
+    episodes = [draw_episode(robot, task, scenario, seed=seed, number=number) for number in numbers]
+    backends = backends[: len(episodes)]
+    samples = [
+        backend.reset(episode.start, episode.world, seed=seed, number=number)
+        for backend, episode, number in zip(backends, episodes, numbers, strict=True)
+    ]
+    goal = stack_poses([episode.goal for episode in episodes])
+    controller.reset()
+    log = TrajectoryLog(control_dt)
+    for step in range(round(task.episode_s / control_dt)):
+        measured = stack_states([sample.odometry for sample in samples])
+        commands = robot.actuators.limited(controller.act(task.observe(measured, goal)))
+        samples = [backend.step(command, substeps) for backend, command in zip(backends, commands, strict=True)]
+        truths = [sample.truth for sample in samples if sample.truth is not None]
+        log.add(stack_states(truths), goal, commands)
+        progress((step + 1) * len(episodes))
+    return log.trajectories()

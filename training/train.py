@@ -22,7 +22,7 @@ from fulmar_core.tasks import Task
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.vec_env import VecNormalize
 
-from training.network import DeployedNetwork, NetworkController
+from training.network import DeployedNetwork, NetworkController, deployed_network, save_network
 from training.ppo import build_ppo
 from training.progress import LearningBar
 from training.rollout import roll_out_in_batch
@@ -78,7 +78,7 @@ class _TimedLearning(BaseCallback):
     def _check(self, elapsed: float) -> None:
         normaliser = self.model.get_vec_normalize_env()
         assert normaliser is not None
-        network = DeployedNetwork(self.model, normaliser)  # type: ignore[arg-type]
+        network = deployed_network(self.model, normaliser)  # type: ignore[arg-type]
         success, score = self._judge(network)
         if self.best is None or score > max(check.score for check in self.checks):
             self.best = network
@@ -103,6 +103,7 @@ def train(
     out: Path,
     time_limit_s: float | None = None,
     command: str = "",
+    git_revision: str = "",
 ) -> dict[str, Any]:
     """Learn until the time is up.
 
@@ -114,6 +115,7 @@ def train(
         out: Run folder; made if need be.
         time_limit_s: Wall-clock of learning; the settings' by default [s].
         command: Command line that started this, for the record.
+        git_revision: Commit of the code, for the record.
 
     Returns:
         What `run.json` says.
@@ -132,12 +134,13 @@ def train(
     except _TimeIsUp:
         learning.on_training_end()
     assert learning.best is not None
-    torch.save(learning.best.state_dict(), out / NETWORK_FILE)
+    save_network(learning.best, out / NETWORK_FILE)
     record = {
         "robot": robot.name,
         "task": task.name,
         "seed": seed,
         "command": command,
+        "git_revision": git_revision,
         "control_hz": robot.timing.control_hz,
         "settings": asdict(settings),
         "steps": learner.num_timesteps,

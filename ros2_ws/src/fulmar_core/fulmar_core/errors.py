@@ -37,6 +37,10 @@ class LockstepError(FulmarError):
     """The other side of a lock-stepped pair did not answer in time."""
 
 
+class RunFailed(FulmarError):  # noqa: N818 - it is an outcome, not a mistake of the caller
+    """A run did not come to its planned end."""
+
+
 class BagError(FulmarError):
     """A bag cannot be read, or lacks what was asked of it."""
 

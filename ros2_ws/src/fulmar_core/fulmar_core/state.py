@@ -110,3 +110,8 @@ def planar_pose(x: Array, y: Array, yaw: Array) -> Pose:
     """Pose in the plane z = 0, as NumPy float64, shapes (...,) [m, m, rad]."""
     state = planar_state(x, y, yaw)
     return Pose(state.position_in_world, state.quat_xyzw)
+
+
+def stack_poses(poses: list[Pose]) -> Pose:
+    """Join single poses into a batch along a new first axis."""
+    return Pose(np.stack([p.position_in_world for p in poses]), np.stack([p.quat_xyzw for p in poses]))

@@ -40,18 +40,26 @@ class PlantNode(LifecycleNode):
     The backend runs between activation and deactivation, in a thread of its own that no callback can hold up.
     """
 
-    def __init__(self, make_backend: MakeBackend, request_exit: RequestExit, *, simulated: bool = True) -> None:
+    def __init__(
+        self,
+        make_backend: MakeBackend,
+        request_exit: RequestExit,
+        *,
+        simulated: bool = True,
+        cli_args: list[str] | None = None,
+    ) -> None:
         """Read the parameters and, unless told otherwise, start.
 
         Args:
             make_backend: Builds the backend; called at configuration.
             request_exit: Ends the process.
             simulated: Whether the backend knows the truth and makes the time.
+            cli_args: ROS arguments of this node alone, where it shares a process.
 
         Raises:
             FulmarError: If a parameter or a configuration file is wrong.
         """
-        super().__init__("plant")
+        super().__init__("plant", cli_args=cli_args)
         self.settings = read_parameters(self, PlantSettings)
         self.robot = load_robot(self.settings.robot)
         self._scenario = load_scenario(self.settings.scenario)

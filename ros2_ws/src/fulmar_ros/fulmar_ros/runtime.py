@@ -6,13 +6,14 @@ thread is free for signals and for a control loop's last words.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import queue
 import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 from typing import Any
 
@@ -76,6 +77,26 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
 
 
 def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
+    def on_error(error: Exception) -> None:
+        node.get_logger().error(_one_line(error))
+        exit_codes.put(FAILED)
+
+    with spinning(node, on_error):
+        gc.collect()
+        gc.freeze()  # what exists now lives to the end; no need to look through it again and again
+        asked = exit_codes.get()
+        stopped = _stop(node)
+    return asked or stopped
+
+
+@contextlib.contextmanager
+def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None]:
+    """Serve a node's callbacks in a thread of its own; destroys the node at the end.
+
+    Args:
+        node: The node.
+        on_error: Told, in that thread, what a callback raised; no further callback is served then.
+    """
     executor, over = _executor(), Future()
     executor.add_node(node)
 
@@ -85,21 +106,18 @@ def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
             # which burns a core and starves the timers. A finite wait in a loop does what spin() should.
             while not over.done():
                 executor.spin_until_future_complete(over, timeout_sec=SPIN_S)
-        except Exception as error:  # noqa: BLE001 - whatever a callback raises ends the node
-            node.get_logger().error(_one_line(error))
-            exit_codes.put(FAILED)
+        except Exception as error:  # noqa: BLE001 - whatever a callback raises is the owner's to judge
+            on_error(error)
 
-    thread = threading.Thread(target=spin, name="executor", daemon=True)
+    thread = threading.Thread(target=spin, name=f"{node.get_name()} executor", daemon=True)
     thread.start()
-    gc.collect()
-    gc.freeze()  # what exists now lives to the end; no need to look through it again and again
-    asked = exit_codes.get()
-    stopped = _stop(node)
-    over.set_result(None)
-    thread.join(timeout=2.0)
-    executor.shutdown()
-    node.destroy_node()
-    return asked or stopped
+    try:
+        yield
+    finally:
+        over.set_result(None)
+        thread.join(timeout=2.0)
+        executor.shutdown()
+        node.destroy_node()
 
 
 def _stop(node: Any) -> int:

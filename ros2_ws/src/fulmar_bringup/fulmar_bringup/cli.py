@@ -1,0 +1,75 @@
+"""`fulmar`: the front door. Each command lives in a module of its own below `commands/`."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
+
+from fulmar_bringup.commands.bundle import bundle
+from fulmar_bringup.commands.demo import demo
+from fulmar_bringup.commands.doctor import doctor
+from fulmar_bringup.commands.evaluate import evaluate
+from fulmar_bringup.commands.export import export
+from fulmar_bringup.commands.list import list_names
+from fulmar_bringup.commands.report import report
+from fulmar_bringup.commands.run import run
+from fulmar_bringup.commands.train import train
+from fulmar_bringup.console import console
+
+DONE, FAILED, BAD_USAGE = 0, 1, 2
+
+app = typer.Typer(
+    name="fulmar",
+    help="Robots driven by learned and classical controllers over ROS 2: simulate, run, record, train, judge.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("list")(list_names)
+app.command()(run)
+app.command()(train)
+app.command()(export)
+app.command()(evaluate)
+app.add_typer(bundle, name="bundle")
+app.command()(report)
+app.command()(demo)
+app.command()(doctor)
+
+
+def main() -> None:
+    """Run the command line; mistakes end with one line and exit code 2, failures with 1."""
+    try:
+        code = app(standalone_mode=False)
+    except (ConfigError, BundleError, BagError) as error:
+        sys.exit(_complain(str(error), BAD_USAGE))
+    except FulmarError as error:
+        sys.exit(_complain(str(error), FAILED))
+    except typer.Exit as exit_request:
+        sys.exit(exit_request.exit_code)
+    except typer.Abort:
+        sys.exit(_complain("stopped by the user", FAILED))
+    except KeyboardInterrupt:
+        sys.exit(_complain("stopped by the user", FAILED))
+    except Exception as error:
+        if hasattr(error, "format_message"):  # what typer raises for bad usage, whichever click is behind it
+            sys.exit(_complain(f"{error.format_message()}{_hint(error)}", BAD_USAGE))
+        raise
+    sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _complain(message: str, code: int) -> int:
+    console.print(f"fulmar: {message}", markup=False, soft_wrap=True)
+    return code
+
+
+def _hint(error: Exception) -> str:
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return ""
+    commands = getattr(context.command, "commands", None)
+    if commands and context.args:
+        return did_you_mean(context.args[0], commands)
+    return f" Try `{context.command_path} --help`."

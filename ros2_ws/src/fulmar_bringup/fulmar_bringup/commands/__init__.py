@@ -1,0 +1,1 @@
+"""One module for each command of `fulmar`; heavy imports happen inside them."""

@@ -1,0 +1,51 @@
+"""Arguments that several commands share, and how they are read."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from fulmar_core.errors import ConfigError
+
+RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")]
+TaskArgument = Annotated[str, typer.Argument(metavar="TASK", help="A name from `fulmar list tasks`.")]
+TaskOption = Annotated[str, typer.Option("--task", metavar="T", help="A name from `fulmar list tasks`.")]
+ControllerOption = Annotated[
+    str, typer.Option("--controller", metavar="C", help="policy, or a classical controller such as lqr.")
+]
+PolicyOption = Annotated[
+    Path | None, typer.Option("--policy", metavar="DIR", help="A policy bundle; the shipped one by default.")
+]
+SeedOption = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of everything random.")]
+ScenarioOption = Annotated[
+    str, typer.Option("--scenario", metavar="NAME", help="Disturbances: a name from configs/scenarios.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+def read_pose(text: str | None, option: str) -> tuple[float, float, float] | None:
+    """Read `x,y,deg`.
+
+    Args:
+        text: What was written, or None.
+        option: Name of the option, for messages.
+
+    Returns:
+        x [m], y [m] and heading [deg], or None.
+
+    Raises:
+        ConfigError: If it is not three finite numbers.
+    """
+    if text is None:
+        return None
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3 or not all(math.isfinite(value) for value in values):
+        raise ConfigError(
+            f"{option} = '{text}' must be three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90"
+        )
+    return values[0], values[1], values[2]

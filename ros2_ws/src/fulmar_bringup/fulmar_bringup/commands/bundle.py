@@ -1,0 +1,52 @@
+"""`fulmar bundle`: look at a policy bundle, or check that it would be accepted."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.console import output, print_json
+
+bundle = typer.Typer(help="Look at policy bundles, and check them.", no_args_is_help=True, rich_markup_mode=None)
+FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A policy bundle.")]
+
+
+@bundle.command()
+def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
+    """Show the passport of a bundle."""
+    from fulmar_core.policy_bundle import read_passport
+
+    passport = asdict(read_passport(folder))
+    if as_json:
+        print_json(passport)
+        return
+    width = max(map(len, passport))
+    for key, value in passport.items():
+        if key == "training":
+            continue
+        text = ", ".join(value) if isinstance(value, tuple) else str(value)
+        output.print(f"{key:<{width}}  {text}", markup=False, soft_wrap=True)
+    for key, value in passport["training"].items():
+        if not isinstance(value, dict):
+            output.print(f"{'trained: ' + key:<{width}}  {value}", markup=False, soft_wrap=True)
+
+
+@bundle.command()
+def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
+    """Load a bundle as the robot would: hashes, robot, task, rate, names, shapes, golden vectors."""
+    from fulmar_core.policy_bundle import read_passport
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+    from policy_server.policy import Policy
+
+    passport = read_passport(folder)
+    robot, task = load_robot(passport.robot), load_task(passport.task)
+    Policy(folder, robot, task, control_hz=passport.control_hz)
+    if as_json:
+        print_json({"bundle": str(folder), "accepted": True, "sha256": passport.sha256})
+    else:
+        output.print(f"{folder}: accepted ({passport.robot}, {passport.task}, {passport.control_hz:g} Hz)", markup=False)

@@ -1,0 +1,28 @@
+"""`fulmar export`: a policy bundle out of a training run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.console import output
+from fulmar_bringup.extras import needs_extra
+
+
+def export(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder that `fulmar train` left.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the bundle.")],
+) -> None:
+    """Write a policy bundle: network, golden vectors and passport; then load it as the robot will."""
+    with needs_extra("train"):
+        from training.export import export as write
+
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+    from policy_server.policy import Policy
+
+    passport = write(run, out)
+    Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
+    output.print(f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · {passport.sha256[:12]}")

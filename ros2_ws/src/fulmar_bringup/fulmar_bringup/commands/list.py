@@ -1,0 +1,57 @@
+"""`fulmar list`: what there is."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from fulmar_core.errors import UnknownNameError
+from fulmar_core.paths import config_names
+
+from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.console import output, print_json
+
+FAMILIES = ("robots", "tasks", "controllers", "systems", "policies")
+
+
+def list_names(
+    family: Annotated[
+        str | None, typer.Argument(metavar="[robots|tasks|controllers|systems|policies]", help="All by default.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the robots, tasks, controllers, systems and policies there are."""
+    if family is not None and family not in FAMILIES:
+        raise UnknownNameError("family", family, FAMILIES)
+    chosen = FAMILIES if family is None else (family,)
+    found = {name: _entries(name) for name in chosen}
+    if as_json:
+        print_json({name: list(entries) for name, entries in found.items()})
+        return
+    for name, entries in found.items():
+        output.print(f"{name}", style="bold")
+        width = max((len(entry) for entry in entries), default=0)
+        for entry, title in entries.items():
+            output.print(f"  {entry:<{width}}  {title}".rstrip(), markup=False)
+
+
+def _entries(family: str) -> dict[str, str]:
+    """Names and titles of one family."""
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+    from policy_server.shipped import shipped_policies
+
+    from fulmar_bringup.system import CONTROLLERS, load_system
+
+    if family == "robots":
+        return {name: load_robot(name).title for name in config_names("robots")}
+    if family == "tasks":
+        return {name: load_task(name).title for name in config_names("tasks")}
+    if family == "systems":
+        return {name: load_system(name).title for name in config_names("systems")}
+    if family == "policies":
+        return {path.name: "" for path in shipped_policies()}
+    return {name: CONTROLLER_TITLES[name] for name in CONTROLLERS}
+
+
+CONTROLLER_TITLES = {"policy": "a learned policy bundle", "lqr": "linear-quadratic regulator with valve allocation"}

@@ -1,0 +1,120 @@
+"""`fulmar run`: one run over ROS, recorded, with a verdict."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from fulmar_core.errors import ConfigError
+
+from fulmar_bringup.commands.arguments import (
+    ControllerOption,
+    JsonOption,
+    PolicyOption,
+    RobotArgument,
+    ScenarioOption,
+    SeedOption,
+    TaskOption,
+    read_pose,
+)
+from fulmar_bringup.console import console, output, print_json
+
+
+def run(
+    robot: RobotArgument,
+    task: TaskOption = "go_to_pose",
+    controller: ControllerOption = "policy",
+    backend: Annotated[str, typer.Option(metavar="B", help="mujoco, mock or hardware.")] = "mujoco",
+    policy: PolicyOption = None,
+    goal: Annotated[
+        str | None, typer.Option(metavar="x,y,deg", help="Where to go; drawn from the seed by default.")
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="x,y,deg", help="Where to begin; drawn from the seed by default.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", min=0.1, help="Simulated seconds; the task's episode by default.")
+    ] = None,
+    lockstep: Annotated[
+        bool, typer.Option("--lockstep", help="As fast as it goes; one seed gives the same bytes.")
+    ] = False,
+    rate: Annotated[
+        float, typer.Option(metavar="F", min=0.01, max=50.0, help="Simulated seconds a second of wall-clock.")
+    ] = 1.0,
+    control_hz: Annotated[
+        float | None, typer.Option(metavar="HZ", min=0.01, help="Command rate; the system file's by default.")
+    ] = None,
+    scenario: ScenarioOption = "nominal",
+    seed: SeedOption = 0,
+    record: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the bag; runs/<time>... by default.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a robot once, over ROS, and record it.
+
+    Starts a plant, a controller and a recorder as processes of their own, gives the goal, and stops them in order
+    when the time is up. The exit code is 0 if the goal was met, 1 if not or if anything failed.
+
+    Examples:
+
+        fulmar run floating_platform --controller lqr --goal 0,0,0 --start 3,1,90
+
+        fulmar run floating_platform --task go_to_pose --controller policy --lockstep --seed 7
+    """
+    if lockstep and rate != 1.0:
+        raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
+    from fulmar_bringup.conductor import conduct
+    from fulmar_bringup.planning import plan_run
+
+    request = plan_run(
+        robot=robot,
+        task=task,
+        controller=controller,
+        backend=backend,
+        policy=policy,
+        goal=read_pose(goal, "--goal"),
+        start=read_pose(start, "--start"),
+        duration_s=duration,
+        lockstep=lockstep,
+        rate=rate,
+        control_hz=control_hz,
+        scenario=scenario,
+        seed=seed,
+        record=record or default_record(robot, controller),
+        command="fulmar " + " ".join(sys.argv[1:]),
+    )
+    outcome = conduct(request)
+    if as_json:
+        print_json(outcome.summary)
+    else:
+        output.print(verdict(outcome.summary))
+    if outcome.failure:
+        console.print(f"run failed: {outcome.failure}", markup=False)
+    raise typer.Exit(outcome.exit_code)
+
+
+def default_record(robot: str, controller: str) -> Path:
+    """A folder below `runs/` that says when and what."""
+    return Path("runs") / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{controller}"
+
+
+def verdict(summary: dict[str, Any]) -> str:
+    """One run in a few lines."""
+    reached = "goal met" if summary["success"] else "goal missed"
+    latency = summary["latency_ms"]
+    lines = [f"{summary['controller']}: {reached}"]
+    if summary["final_position_error_m"] is not None:
+        error, turn = summary["final_position_error_m"], summary["final_heading_error_deg"]
+        lines[0] += f", {100 * error:.1f} cm and {turn:.1f}° off after {summary['duration_s']:.0f} s"
+    if latency["p50"] is not None:
+        lines.append(
+            f"  {summary['steps']} commands, latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms; "
+            f"{summary['overruns']} overruns, {summary['watchdog_trips']} watchdog trips"
+        )
+    lines.append(f"  recorded in {summary['bag']}; look at it with: fulmar report {summary['bag']}")
+    return "\n".join(lines)
+

@@ -1,0 +1,139 @@
+"""The table of processes: which nodes a system is made of, with their parameters. Pure, starts nothing.
+
+Both `fulmar run` and `launch/system.launch.py` start exactly what this lists.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fulmar_core.robot import load_robot
+
+from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, load_system
+
+Parameter = bool | int | float | str | list[float]
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """One process with one node."""
+
+    name: str  # of the node
+    package: str  # ament package
+    executable: str  # script that the package installs
+    module: str  # the same as a Python module
+    namespace: str
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """Everything that one run is started with."""
+
+    robot: str
+    task: str
+    controller: str
+    backend: str
+    control_hz: float  # [Hz]
+    policy: str = ""  # folder of a bundle; empty: the shipped one
+    scenario: str = "nominal"
+    seed: int = 0
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x [m], y [m], heading [deg]
+    duration_s: float = 0.0  # 0: until stopped [s]
+    lockstep: bool = False
+    rate: float = 1.0  # simulated seconds a wall-clock second
+    supervised: bool = False  # somebody else activates the plant when all are ready
+
+
+def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
+    """The node that controls.
+
+    Args:
+        plan: What to run.
+        subscribers: Subscriptions of the command to wait for, in lock step.
+    """
+    executable = CONTROLLERS[plan.controller]
+    parameters: dict[str, Parameter] = {
+        "robot": plan.robot,
+        "task": plan.task,
+        "control_hz": plan.control_hz,
+        "lockstep": plan.lockstep,
+        "rate": plan.rate,
+        "wait_for_subscribers": subscribers,
+    }
+    if plan.controller == "policy" and plan.policy:
+        parameters["policy"] = plan.policy
+    return NodeSpec(
+        "controller", "policy_server", executable, f"policy_server.{executable}", f"/{plan.robot}", parameters
+    )
+
+
+def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
+    """The node that simulates.
+
+    Args:
+        plan: What to run.
+        subscribers: Subscriptions of the odometry to wait for before the first step.
+    """
+    parameters: dict[str, Parameter] = {
+        "robot": plan.robot,
+        "backend": plan.backend,
+        "scenario": plan.scenario,
+        "seed": plan.seed,
+        "start": list(plan.start),
+        "control_hz": plan.control_hz,
+        "lockstep": plan.lockstep,
+        "rate": plan.rate,
+        "duration_s": plan.duration_s,
+        "wait_for_subscribers": subscribers,
+        "autostart": not plan.supervised,
+    }
+    return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", f"/{plan.robot}", parameters)
+
+
+def recorder_spec(plan: RunPlan, *, directory: str = "", run_info: str = "", attachments: str = "") -> NodeSpec:
+    """The node that records; without a directory it makes one under `runs/`."""
+    texts = {"directory": directory, "run_info": run_info, "attachments": attachments}
+    return NodeSpec(
+        "recorder",
+        "fulmar_ros",
+        "recorder_node",
+        "fulmar_ros.recorder_node",
+        f"/{plan.robot}",
+        {key: text for key, text in texts.items() if text},
+    )
+
+
+def list_nodes(
+    *,
+    system: str | None = None,
+    robot: str | None = None,
+    task: str | None = None,
+    controller: str | None = None,
+    backend: str | None = None,
+    policy: str | None = None,
+) -> tuple[NodeSpec, ...]:
+    """Nodes of a system, each of its choices replaced by what is given.
+
+    Args:
+        system: Name of a file in `configs/systems`; `mujoco_policy` by default.
+        robot: Another robot.
+        task: Another task.
+        controller: Another controller.
+        backend: Another backend.
+        policy: Folder of a bundle; the shipped one by default.
+
+    Returns:
+        Recorder, plant and controller.
+
+    Raises:
+        ConfigError: Unknown name, or a mistake in a file.
+    """
+    base = load_system(system or "mujoco_policy")
+    chosen = (robot or base.robot, task or base.task, controller or base.controller, backend or base.backend)
+    check_names(*chosen)
+    as_written = chosen == (base.robot, base.task, base.controller, base.backend)
+    hz = base.control_hz if as_written else default_control_hz(*chosen)
+    load_robot(chosen[0]).timing.substeps(hz)
+    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "")
+    return recorder_spec(plan), plant_spec(plan), controller_spec(plan)

@@ -1,0 +1,145 @@
+"""From what a person asked for to a complete, checked plan; nothing is started here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode
+from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.policy_bundle import check_fit, read_passport
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.tasks import Task, load_task
+from policy_server.shipped import shipped_policy
+
+from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.system import check_names, default_control_hz
+
+PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What to run, where to go, and where to record."""
+
+    plan: RunPlan
+    goal: PoseTuple
+    record: Path  # folder of the bag; must not exist
+    command: str  # command line, for the record
+
+
+def plan_run(
+    *,
+    robot: str,
+    task: str,
+    controller: str,
+    backend: str,
+    policy: Path | None,
+    goal: PoseTuple | None,
+    start: PoseTuple | None,
+    duration_s: float | None,
+    lockstep: bool,
+    rate: float,
+    control_hz: float | None,
+    scenario: str,
+    seed: int,
+    record: Path,
+    command: str,
+) -> RunRequest:
+    """Complete a request and refuse what cannot work, before any process is started.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+        controller: Name of the controller.
+        backend: Name of the backend.
+        policy: Bundle; the shipped one by default.
+        goal: x [m], y [m], heading [deg]; drawn from the seed by default.
+        start: Same; by default as far from the goal as the seed's episode begins.
+        duration_s: Simulated time; the task's episode by default [s].
+        lockstep: Whether plant and controller wait for each other.
+        rate: Simulated seconds a wall-clock second.
+        control_hz: Command rate; the system file's by default [Hz].
+        scenario: Name of the scenario.
+        seed: Seed.
+        record: Folder of the bag; must not exist.
+        command: Command line.
+
+    Returns:
+        The request.
+
+    Raises:
+        ConfigError: Unknown name or impossible value.
+        BundleError: The policy is damaged or made for something else.
+    """
+    check_names(robot, task, controller, backend)
+    the_robot, the_task = load_robot(robot), load_task(task)
+    hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
+    if controller == "policy":
+        policy = checked_policy(policy, the_robot, the_task, hz)
+    if record.exists():
+        raise ConfigError(f"{record} exists already; nothing recorded is overwritten. Give --record another folder.")
+    episode = draw_episode(the_robot, the_task, load_scenario(scenario), seed=seed, number=0)
+    drawn_goal = _tuple_of(episode.goal.position_in_world, episode.goal.quat_xyzw)
+    drawn_start = _tuple_of(episode.start.position_in_world, episode.start.quat_xyzw)
+    goal = goal or drawn_goal
+    if start is None:
+        start = (goal[0] + drawn_start[0] - drawn_goal[0], goal[1] + drawn_start[1] - drawn_goal[1], drawn_start[2])
+    distance = math.hypot(start[0] - goal[0], start[1] - goal[1])
+    if distance > the_robot.limits.geofence:
+        raise ConfigError(
+            f"start and goal are {distance:.1f} m apart, the geofence of '{robot}' is {the_robot.limits.geofence:g} m. "
+            "Bring them nearer to each other."
+        )
+    plan = RunPlan(
+        robot=robot,
+        task=task,
+        controller=controller,
+        backend=backend,
+        control_hz=hz,
+        policy=str(policy.absolute()) if policy else "",
+        scenario=scenario,
+        seed=seed,
+        start=start,
+        duration_s=duration_s or the_task.episode_s,
+        lockstep=lockstep,
+        rate=rate,
+    )
+    return RunRequest(plan, goal, record, command)
+
+
+def checked_rate(robot: Robot, control_hz: float) -> float:
+    """The rate itself, if the physics can keep it.
+
+    Raises:
+        ConfigError: If the control period is no multiple of the physics step.
+    """
+    try:
+        robot.timing.substeps(control_hz)
+    except ValueError as error:
+        raise ConfigError(f"robot '{robot.name}': {error}") from error
+    return control_hz
+
+
+def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: float) -> Path:
+    """The bundle that will run, after its passport was checked.
+
+    Raises:
+        BundleError: None is shipped, or the bundle is damaged or made for something else.
+    """
+    folder = policy or shipped_policy(robot.name, task.name)
+    if folder is None:
+        raise BundleError(
+            f"no policy is shipped for '{robot.name}' and '{task.name}'. "
+            f"Train one with `fulmar train {robot.name} {task.name}`, or use --controller lqr."
+        )
+    check_fit(read_passport(folder), robot, task, control_hz, where=str(folder))
+    return folder
+
+
+def _tuple_of(position: np.ndarray, quat_xyzw: np.ndarray) -> PoseTuple:
+    yaw = 2.0 * math.atan2(float(quat_xyzw[2]), float(quat_xyzw[3]))
+    return float(position[0]), float(position[1]), math.degrees(math.remainder(yaw, 2.0 * math.pi))

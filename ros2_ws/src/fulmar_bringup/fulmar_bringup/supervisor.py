@@ -1,0 +1,131 @@
+"""The operator's side of a run: gives the goal, starts the plant when all are ready, and watches.
+
+The only module of the bringup that speaks ROS while a run is on. What came of the run is read from its bag.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from fulmar_core.errors import RunFailed
+from fulmar_core.state import Pose
+from fulmar_core.tasks import Task
+from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, STATUS
+from fulmar_ros.convert import goal_message
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
+from geometry_msgs.msg import PointStamped, PoseStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from fulmar_bringup.processes import child_environment
+
+START_TIMEOUT_S = 30.0
+SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
+
+
+@dataclass
+class Report:
+    """The newest status of one node."""
+
+    level: str = "ok"
+    message: str = ""
+    values: dict[str, str] = field(default_factory=dict)
+    heard: float = 0.0  # monotonic [s]
+
+
+class Supervisor:
+    """Operator of one robot."""
+
+    def __init__(self, node: Node, robot: str, task: Task) -> None:
+        """Listen to plant and controller."""
+        self._node, self._robot, self._task = node, robot, task
+        self.plant, self.controller = Report(), Report()
+        self._changed = threading.Condition()
+        self._error: Exception | None = None
+        wire = GOAL_WIRES[task.goal_topic]
+        goal_type = PoseStamped if wire.type.endswith("PoseStamped") else PointStamped
+        self._goal = node.create_publisher(goal_type, wire.name, publisher_qos(wire))
+        node.create_subscription(
+            DiagnosticArray, DIAGNOSTICS.name, self._hear, subscriber_qos(DIAGNOSTICS, reliable=True, depth=10)
+        )
+        node.create_subscription(DiagnosticArray, STATUS.name, self._hear, subscriber_qos(STATUS))
+        self._plant_service = node.create_client(ChangeState, "plant/change_state")
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            part = {f"{self._robot}: plant": self.plant, f"{self._robot}: controller": self.controller}.get(status.name)
+            if part is None:
+                continue
+            with self._changed:
+                part.level = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn"}.get(status.level, "error")
+                part.message = status.message
+                part.values = {pair.key: pair.value for pair in status.values}
+                part.heard = time.monotonic()
+                self._changed.notify_all()
+
+    def give_goal(self, goal: Pose, *, time_ns: int, alive: Callable[[], None]) -> None:
+        """Publish a goal and wait until the controller has it.
+
+        Args:
+            goal: The goal.
+            time_ns: Its stamp, by which the controller names it [ns].
+            alive: Called while waiting; raises to give up.
+        """
+        self._goal.publish(goal_message(goal, self._task.goal_topic, time_ns))
+        self.wait_until(lambda: self.controller.values.get("goal_stamp_ns") == str(time_ns), alive)
+
+    def start_plant(self, alive: Callable[[], None]) -> None:
+        """Configure and activate the plant.
+
+        Args:
+            alive: Called while waiting; raises to give up.
+        """
+        while not self._plant_service.wait_for_service(0.1):
+            alive()
+        for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+            future = self._plant_service.call_async(ChangeState.Request(transition=Transition(id=transition)))
+            while not future.done():
+                alive()
+                time.sleep(0.005)
+
+    def wait_until(self, condition: Callable[[], bool], alive: Callable[[], None]) -> None:
+        """Wait for something that the nodes say.
+
+        Args:
+            condition: Looked at whenever a node said something.
+            alive: Called ten times a second; raises to give up.
+        """
+        with self._changed:
+            while not self._changed.wait_for(condition, 0.1):
+                if self._error is not None:
+                    raise RunFailed(f"the supervisor failed: {self._error!r}") from self._error
+                alive()
+
+    def fail(self, error: Exception) -> None:
+        """A callback of ours raised this; whoever waits is told."""
+        self._error = error
+
+
+@contextlib.contextmanager
+def supervisor(robot: str, task: Task) -> Iterator[Supervisor]:
+    """A supervisor that listens in a thread of its own until the context ends."""
+    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    os.environ[key] = child_environment()[key]
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node("supervisor", namespace=f"/{robot}")
+    try:
+        overseer = Supervisor(node, robot, task)
+        with spinning(node, overseer.fail):
+            yield overseer
+    finally:
+        rclpy.try_shutdown()

@@ -1,0 +1,77 @@
+"""What one can start: a robot, a task, a controller and a backend, as read from `configs/systems`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fulmar_core.config import load_config
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.paths import config_names, config_path
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+
+CONTROLLERS = {"policy": "policy_node", "lqr": "lqr_node"}  # name and node in policy_server
+SIMULATED = ("mujoco", "mock")
+BACKENDS = (*SIMULATED, "hardware")
+DRIVERS: dict[str, str] = {}  # robot and module in hardware_drivers
+
+
+@dataclass(frozen=True)
+class System:
+    """One file of `configs/systems`."""
+
+    title: str
+    robot: str
+    task: str
+    controller: str
+    backend: str
+    control_hz: float  # [Hz]
+
+    def __post_init__(self) -> None:
+        """Refuse a rate that nothing could run at."""
+        if self.control_hz <= 0.0:
+            raise ValueError(f"control_hz = {self.control_hz:g} must be greater than 0.")
+
+
+def load_system(name: str) -> System:
+    """Read `configs/systems/<name>.yaml` and check that everything it names exists.
+
+    Raises:
+        ConfigError: Unknown name, or a mistake in the file.
+    """
+    system = load_config(System, config_path("systems", name))
+    check_names(system.robot, system.task, system.controller, system.backend)
+    return system
+
+
+def system_of(controller: str, backend: str) -> System | None:
+    """The system file for a controller on a backend, or None."""
+    name = f"{backend}_{controller}"
+    return load_system(name) if name in config_names("systems") else None
+
+
+def check_names(robot: str, task: str, controller: str, backend: str) -> None:
+    """Refuse unknown names and backends that do not exist for a robot.
+
+    Raises:
+        ConfigError: On the first wrong one.
+    """
+    load_robot(robot)
+    load_task(task)
+    if controller not in CONTROLLERS:
+        raise UnknownNameError("controller", controller, CONTROLLERS)
+    if backend not in BACKENDS:
+        raise UnknownNameError("backend", backend, BACKENDS)
+    if backend == "hardware" and robot not in DRIVERS:
+        known = ", ".join(sorted(DRIVERS)) or "no robot"
+        raise ConfigError(
+            f"there is no hardware driver for '{robot}' (there is one for: {known}). Use --backend mujoco or mock."
+        )
+
+
+def default_control_hz(robot: str, task: str, controller: str, backend: str) -> float:
+    """Command rate of the matching system file, else the robot's own [Hz]."""
+    system = system_of(controller, backend)
+    if system is not None and (system.robot, system.task) == (robot, task):
+        return system.control_hz
+    return load_robot(robot).timing.control_hz

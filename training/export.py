@@ -1,0 +1,107 @@
+"""From a run folder to a policy bundle: ONNX, golden vectors, passport, and proof that all agree."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import ConfigError
+from fulmar_core.policy_bundle import FORMAT, Golden, Passport, write_bundle
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import Task, load_task
+
+from training.network import DeployedNetwork, load_network
+from training.train import HELD_OUT_SEED, NETWORK_FILE, RUN_FILE
+
+GOLDEN_VECTORS = 64
+OPSET = 18
+
+
+def export(run: Path, out: Path) -> Passport:
+    """Write the bundle of a training run.
+
+    Args:
+        run: Run folder that `train` left.
+        out: Folder of the bundle.
+
+    Returns:
+        The sealed passport.
+
+    Raises:
+        ConfigError: `run` is no run folder, or its robot or task has changed since.
+    """
+    record = read_run_record(run)
+    robot, task = load_robot(record["robot"]), load_task(record["task"])
+    network = load_network(run / NETWORK_FILE)
+    if network.observation_count != len(task.observation_names):
+        raise ConfigError(
+            f"{run}: the network takes {network.observation_count} terms, task '{task.name}' now has "
+            f"{len(task.observation_names)}. Train again."
+        )
+    passport = Passport(
+        format=FORMAT,
+        robot=robot.name,
+        task=task.name,
+        control_hz=float(record["control_hz"]),
+        observation_names=task.observation_names,
+        actuator_names=robot.actuators.names,
+        network_sha256="",
+        golden_sha256="",
+        training={key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")}
+        | {"git_revision": record.get("git_revision", "")},
+    )
+    return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
+
+
+def read_run_record(run: Path) -> dict[str, Any]:
+    """What `train` wrote about a run.
+
+    Raises:
+        ConfigError: If `run` is no finished run folder.
+    """
+    path = run / RUN_FILE
+    if not path.is_file() or not (run / NETWORK_FILE).is_file():
+        raise ConfigError(f"{run}: no finished training run ({RUN_FILE} or {NETWORK_FILE} is missing). Run `fulmar train`.")
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ConfigError(f"{path}: not valid JSON: {error}. Train again.") from error
+    return dict(record)
+
+
+def _to_onnx(network: DeployedNetwork) -> bytes:
+    example = torch.zeros(2, network.observation_count)
+    buffer = io.BytesIO()
+    program = torch.onnx.export(
+        network,
+        (example,),
+        input_names=["observation"],
+        output_names=["command", "logits"],
+        dynamic_shapes=({0: torch.export.Dim("worlds")},),
+        opset_version=OPSET,
+        dynamo=True,
+        verbose=False,
+    )
+    assert program is not None
+    program.save(buffer)
+    return buffer.getvalue()
+
+
+def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
+    """Observations from the start of held-out episodes and a second later, with what the network makes of them."""
+    simulation = BatchSimulation(
+        robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
+    )
+    observations = [task.observe(simulation.measured, simulation.goal)]
+    for _ in range(5):
+        command, _ = network.infer(task.observe(simulation.measured, simulation.goal))
+        simulation.step(command)
+    observations.append(task.observe(simulation.measured, simulation.goal))
+    batch = np.concatenate(observations).astype(np.float32)
+    return Golden(batch, *network.infer(batch))

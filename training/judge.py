@@ -1,0 +1,48 @@
+"""Judging a training run in MuJoCo: another integrator, another model, episodes it has not seen."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.metrics import summary
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from sim_nodes.mujoco_backend import MujocoBackend
+
+from training.export import read_run_record
+from training.network import NetworkController, load_network
+from training.rollout import roll_out_in_backends
+from training.train import NETWORK_FILE, RUN_FILE
+
+JUDGE_SEED = 2026  # no training seed, and not the seed of the checks while learning
+
+
+def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> dict[str, Any]:
+    """Judge the best network of a run, and write the figures into its record.
+
+    Args:
+        run: Run folder.
+        episodes: Number of episodes, >= 1.
+        scenario: What episodes are drawn from.
+
+    Returns:
+        Success rate and every metric.
+    """
+    record = read_run_record(run)
+    robot, task, world = load_robot(record["robot"]), load_task(record["task"]), load_scenario(scenario)
+    controller = NetworkController(load_network(run / NETWORK_FILE), task.observation_names, record["control_hz"])
+    trajectories = roll_out_in_backends(
+        controller,
+        lambda: MujocoBackend(robot, sensor_noise=world.sensor_noise),
+        task,
+        world,
+        episodes=episodes,
+        seed=JUDGE_SEED,
+    )
+    figures: dict[str, Any] = summary(trajectories, task)
+    record["mujoco"] = {"scenario": scenario, "seed": JUDGE_SEED, **figures}
+    (run / RUN_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    return figures
