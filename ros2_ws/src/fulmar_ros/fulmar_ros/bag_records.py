@@ -32,6 +32,25 @@ _READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
 }
 
 
+def bag_file(bag: Path) -> Path:
+    """The MCAP file of a bag.
+
+    Args:
+        bag: Bag folder, or the file itself.
+
+    Raises:
+        BagError: There is none, or more than one.
+    """
+    if bag.is_file():
+        return bag
+    if not bag.is_dir():
+        raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
+    files = sorted(bag.glob("*.mcap"))
+    if len(files) != 1:
+        raise BagError(f"{bag}: {len(files)} .mcap files where a bag folder has one. Give a bag folder.")
+    return files[0]
+
+
 def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
     """Go through an MCAP file.
 

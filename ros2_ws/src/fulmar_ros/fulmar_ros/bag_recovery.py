@@ -14,7 +14,7 @@ from mcap.writer import Writer
 from fulmar_core.errors import BagError
 from fulmar_ros.bag_file import BagFile
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
-from fulmar_ros.bag_records import read_records
+from fulmar_ros.bag_records import bag_file, read_records
 
 
 def recover(directory: Path) -> tuple[str, ...]:
@@ -51,25 +51,6 @@ def recover(directory: Path) -> tuple[str, ...]:
     finally:
         new.unlink(missing_ok=True)
     return tuple(damage)
-
-
-def bag_file(bag: Path) -> Path:
-    """The MCAP file of a bag.
-
-    Args:
-        bag: Bag folder, or the file itself.
-
-    Raises:
-        BagError: There is none, or more than one.
-    """
-    if bag.is_file():
-        return bag
-    if not bag.is_dir():
-        raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
-    files = sorted(bag.glob("*.mcap"))
-    if len(files) != 1:
-        raise BagError(f"{bag}: {len(files)} .mcap files where a bag folder has one. Give a bag folder.")
-    return files[0]
 
 
 class _Copy:

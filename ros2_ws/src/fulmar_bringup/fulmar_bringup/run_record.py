@@ -1,0 +1,94 @@
+"""One recorded run as arrays: what was true, measured, commanded, applied and reported."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.state import Pose, RigidBodyState
+
+
+@dataclass(frozen=True)
+class Motion:
+    """States of one body over time; all arrays begin with the same axis."""
+
+    stamp_s: np.ndarray  # (n,) time of measurement [s]
+    log_s: np.ndarray  # (n,) when the recorder got it [s]
+    position: np.ndarray  # (n, 3) in the world [m]
+    quat_xyzw: np.ndarray  # (n, 4) [-]
+    velocity_in_world: np.ndarray  # (n, 3) [m/s]
+    yaw_rate: np.ndarray  # (n,) [rad/s]
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.stamp_s)
+
+    @property
+    def states(self) -> RigidBodyState:
+        """The same as a batch of states."""
+        turn = np.zeros((len(self), 3))
+        turn[:, 2] = self.yaw_rate
+        return RigidBodyState(self.position, self.quat_xyzw, self.velocity_in_world, turn)
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """Actuator vectors over time."""
+
+    stamp_s: np.ndarray  # (n,) [s]
+    log_s: np.ndarray  # (n,) [s]
+    names: tuple[str, ...]  # of the columns
+    effort: np.ndarray  # (n, m)
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.stamp_s)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A goal as it was given."""
+
+    stamp_s: float  # [s]
+    log_s: float  # [s]
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class HealthSample:
+    """One diagnostic status."""
+
+    log_s: float  # [s]
+    name: str  # `<robot>: plant`, `<robot>: controller`
+    level: int  # 0 ok, 1 warn, 2 error, 3 stale
+    message: str
+    values: dict[str, str]
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Everything a bag tells about one run."""
+
+    path: Path
+    info: dict[str, Any]  # what was asked for
+    truth: Motion
+    odom: Motion
+    applied: Actuation  # `actuators/state`
+    commanded: Actuation  # `actuators/command`; the stamp is that of the observation it answers
+    goals: tuple[Goal, ...]
+    controller: dict[str, Any]  # its metadata
+    health: tuple[HealthSample, ...]
+    warnings: tuple[str, ...]  # what could not be read
+
+    @property
+    def motion(self) -> Motion:
+        """The truth where there is one, else the odometry."""
+        return self.truth if len(self.truth) else self.odom
+
+    def last_health(self, part: str) -> HealthSample | None:
+        """Newest status of `plant` or `controller`, None if there is none."""
+        mine = (sample for sample in reversed(self.health) if sample.name.endswith(f": {part}"))
+        return next(mine, None)

@@ -1,0 +1,112 @@
+"""A recorded run in a few figures, ready for JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fulmar_bringup.run_judgement import Judgement, judge
+from fulmar_bringup.run_record import HealthSample, RunRecord
+
+ASKED = ("robot", "task", "controller", "backend", "seed")
+PERCENTILES = ("p50", "p99", "max")
+Spread = dict[str, float | None]
+
+
+def summarise(record: RunRecord) -> dict[str, Any]:
+    """Sum up a run.
+
+    Args:
+        record: The run.
+
+    Returns:
+        Figures by name, ready for JSON; None for what is not known.
+
+    Raises:
+        FulmarError: The record names no goal, or no task that is known here.
+    """
+    judgement = judge(record)
+    plant, controller = record.last_health("plant"), record.last_health("controller")
+    period_error = _spread(controller, "period_error_ms")
+    return {
+        **{key: record.info.get(key) for key in ASKED},
+        "steps": len(np.unique(record.commanded.stamp_s)),
+        "duration_s": judgement.duration_s if judgement else 0.0,
+        **_errors(judgement),
+        "success": judgement is not None and judgement.success,
+        "time_to_target_s": judgement.time_to_target_s if judgement else None,
+        "control_rate_hz": _number(controller, "control_rate_hz") or _rate_hz(record),
+        "latency_ms": _known(_spread(plant, "latency_ms")) or percentiles(latencies_ms(record)),
+        "period_error_ms": _known(period_error) or _spread(plant, "period_error_ms"),
+        "inference_ms": _spread(controller, "inference_ms"),
+        "overruns": _total(plant, controller, "overruns"),
+        "watchdog_trips": _total(plant, None, "watchdog_trips"),
+        "actuator_use": _finite(np.mean(judgement.run.actuators_in_use)) if judgement else None,
+        "bag": str(record.path),
+    }
+
+
+def latencies_ms(record: RunRecord) -> np.ndarray:
+    """From an odometry message to the command that answers it, both as the recorder got them.
+
+    Returns:
+        One value for each stamp that was answered [ms].
+    """
+    came: dict[float, float] = {}
+    for stamp_s, log_s in zip(record.odom.stamp_s, record.odom.log_s, strict=True):
+        came.setdefault(stamp_s, log_s)
+    answered: dict[float, float] = {}
+    for stamp_s, log_s in zip(record.commanded.stamp_s, record.commanded.log_s, strict=True):
+        if stamp_s in came:
+            answered.setdefault(stamp_s, log_s)
+    return np.array([1e3 * (log_s - came[stamp_s]) for stamp_s, log_s in answered.items()])
+
+
+def percentiles(values: np.ndarray) -> Spread:
+    """Median, 99th percentile and largest of some values; None if there are none."""
+    if not values.size:
+        return dict.fromkeys(PERCENTILES)
+    p50, p99 = np.percentile(values, (50, 99))
+    return {"p50": float(p50), "p99": float(p99), "max": float(values.max())}
+
+
+def _errors(judgement: Judgement | None) -> Spread:
+    if judgement is None:
+        return {"final_position_error_m": None, "final_heading_error_deg": None}
+    return {
+        "final_position_error_m": _finite(judgement.run.position_error[0, -1]),
+        "final_heading_error_deg": _finite(abs(np.rad2deg(judgement.run.heading_error[0, -1]))),
+    }
+
+
+def _rate_hz(record: RunRecord) -> float | None:
+    """Commands a second of wall-clock time, from when they were recorded."""
+    times = np.unique(record.commanded.log_s)
+    return float((len(times) - 1) / (times[-1] - times[0])) if len(times) > 1 else None
+
+
+def _spread(sample: HealthSample | None, name: str) -> Spread:
+    return {key: _number(sample, f"{name}_{key}") for key in PERCENTILES}
+
+
+def _known(spread: Spread) -> Spread | None:
+    return spread if any(value is not None for value in spread.values()) else None
+
+
+def _total(first: HealthSample | None, second: HealthSample | None, name: str) -> int | None:
+    numbers = [_number(first, name), _number(second, name)]
+    known = [number for number in numbers if number is not None]
+    return round(sum(known)) if known else None
+
+
+def _number(sample: HealthSample | None, name: str) -> float | None:
+    try:
+        return _finite(float(sample.values[name])) if sample else None
+    except (KeyError, ValueError):
+        return None
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
