@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
+import logging
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import torch
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
@@ -77,7 +78,7 @@ def read_run_record(run: Path) -> dict[str, Any]:
 
 def _to_onnx(network: DeployedNetwork) -> bytes:
     example = torch.zeros(2, network.observation_count)
-    buffer = io.BytesIO()
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of optional packages that nobody needs
     program = torch.onnx.export(
         network,
         (example,),
@@ -89,8 +90,17 @@ def _to_onnx(network: DeployedNetwork) -> bytes:
         verbose=False,
     )
     assert program is not None
-    program.save(buffer)
-    return buffer.getvalue()
+    model = program.model_proto
+    _strip_metadata(model)
+    return bytes(model.SerializeToString())
+
+
+def _strip_metadata(model: onnx.ModelProto) -> None:
+    """Take out the stack traces that the exporter leaves: they name files of this machine."""
+    graph = model.graph
+    for part in (model, graph, *graph.node, *graph.value_info, *graph.input, *graph.output, *graph.initializer):
+        del part.metadata_props[:]
+        part.doc_string = ""
 
 
 def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:

@@ -125,6 +125,8 @@ class ControllerNode(LifecycleNode):
         if hasattr(self, "wires"):
             for _ in range(SAFE_REPEATS):
                 self._publish_safe()
+            self._said_at = 0.0  # the last status has the figures of the whole run
+            self._tell_status(self._decide())
 
     def _halt(self) -> None:
         self._stop.set()

@@ -83,6 +83,8 @@ class LockstepLoop:
             self.steps += 1
             if on_step is not None:
                 on_step(sample, command)
+        # Nobody shall answer the last state, but where it ended belongs into the bag.
+        self._wires.publish_truth(sample, self._clock.now_ns)
 
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp = self._clock.now_ns

@@ -73,12 +73,16 @@ class PlantWires:
             return
         if sample.imu is not None:
             self._imu.publish(self._write_imu.write(sample.imu, time_ns))
-        if self._truth is not None and sample.truth is not None and self._truth.get_subscription_count():
-            self._truth.publish(self._write_truth.write(sample.truth, time_ns))
+        self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
             self._clock.publish(Clock(clock=stamp_of(time_ns)))
             self._clock_ns = now
+
+    def publish_truth(self, sample: Sample, time_ns: int) -> None:
+        """Publish where the robot really is, if the backend knows and somebody listens."""
+        if self._truth is not None and sample.truth is not None and self._truth.get_subscription_count():
+            self._truth.publish(self._write_truth.write(sample.truth, time_ns))
 
     def publish_applied(self, command: np.ndarray, time_ns: int) -> None:
         """Publish what the actuators are doing from this time on."""

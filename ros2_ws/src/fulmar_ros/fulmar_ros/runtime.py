@@ -7,7 +7,9 @@ thread is free for signals and for a control loop's last words.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import gc
+import os
 import queue
 import signal
 import sys
@@ -59,6 +61,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
+    end_with_parent()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
     try:
@@ -74,6 +77,20 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         return BAD_USAGE
     finally:
         rclpy.try_shutdown()
+
+
+def end_with_parent() -> None:
+    """Ask the kernel for SIGINT when the launcher that started us dies, so that no node is left behind.
+
+    Only for children that were told their launcher's id; a node that a person started outlives the shell as usual.
+    """
+    parent = os.environ.get("FULMAR_PARENT_PID", "")
+    if not parent.isdecimal() or not sys.platform.startswith("linux"):
+        return
+    pr_set_pdeathsig = 1  # prctl(2)
+    ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGINT)
+    if os.getppid() != int(parent):  # it died before we asked
+        os.kill(os.getpid(), signal.SIGINT)
 
 
 def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
