@@ -75,9 +75,9 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
     bag = _Messages(folder, plan, robot.actuators.names)
     bag.goal(task.goal_topic, plan.goal)
     bag.text("controller/metadata", json.dumps(controller.metadata()))
-    jitter = np.random.default_rng(plan.seed)
+    jitter = np.random.default_rng([plan.seed, len(plan.controller)])
     substeps = round(1.0 / (plan.control_hz * TICK_S))
-    command, heard_s, trips, steps = np.zeros(8), -np.inf, 0, 0
+    command, heard_s, closed, trips, steps = np.zeros(8), -np.inf, False, 0, 0
     for tick in range(round(min(plan.duration_s, plan.gone_after_s) / TICK_S) + 1):
         time_s = tick * TICK_S
         now_ns = EPOCH_NS + round(time_s * NS) + int(jitter.integers(0, 200_000))
@@ -88,8 +88,8 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
             heard_s, steps = time_s, steps + 1
             late_ns = LATENCY_NS + int(jitter.gamma(2.0, 300_000))
             bag.joints("actuators/command", command, time_s, now_ns + late_ns)
-        closed = time_s - heard_s > WATCHDOG_S
-        trips += closed and time_s - TICK_S - heard_s <= WATCHDOG_S
+        was_closed, closed = closed, time_s - heard_s > WATCHDOG_S
+        trips += closed and not was_closed
         applied = np.zeros(8) if closed else command
         bag.joints("actuators/state", applied, time_s, now_ns + 4_000_000)
         if tick % 25 == 0:

@@ -161,11 +161,14 @@ def _actuation(messages: Decoded, wire: Wire, warnings: list[str]) -> Actuation:
     alike = [(t, m) for t, m in messages if tuple(m.name) == names and len(m.effort) == len(names)]
     if len(alike) < len(messages):
         warnings.append(f"{len(messages) - len(alike)} messages of {wire.name} have other names or lengths.")
+    effort = [message.effort for _, message in alike]
     return Actuation(
         stamp_s=np.array([_stamp_s(message.header) for _, message in alike]),
         log_s=np.array([log_s for log_s, _ in alike]),
         names=names,
-        effort=np.array([message.effort for _, message in alike], dtype=float).reshape(-1, len(names)),
+        effort=np.array([message.effort for _, message in alike], dtype=float).reshape(
+            len(alike), len(names)
+        ),
     )
 
 

@@ -1,0 +1,99 @@
+"""Colours, type and axes that every picture shares.
+
+Pictures in a page are drawn once and serve light and dark screens: what is drawn in INK, FAINT or PAPER
+becomes a colour of the page's style sheet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from io import BytesIO, StringIO
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+INK, FAINT, PAPER = "#1f2430", "#8a919e", "#fefefd"
+ALARM = "#d6336c"
+DASHED = (0, (4, 3))
+VARIABLES = {INK: "var(--ink)", FAINT: "var(--faint)", PAPER: "var(--paper)"}
+
+# A controller keeps its colour from report to report; each is readable on white and on near-black.
+CONTROLLER_COLOURS = {"policy": "#3b7ddd", "lqr": "#d9780f"}
+OTHER_COLOURS = ("#1a9e84", "#8d62d9", "#b8860b", "#c2477f", "#5f7a8c")
+
+_RC = {
+    "font.family": "sans-serif",
+    "font.size": 9.5,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.5,
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "axes.facecolor": "none",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "text.color": INK,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "grid.color": FAINT,
+    "grid.alpha": 0.22,
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.borderaxespad": 0.2,
+    "lines.linewidth": 1.6,
+    "lines.solid_capstyle": "round",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fulmar",
+    "path.simplify_threshold": 0.3,
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw in the style of the house."""
+    with mpl.rc_context(_RC):
+        yield
+
+
+def colours(controllers: Sequence[str]) -> list[str]:
+    """One colour for each run; two runs of one controller differ.
+
+    Args:
+        controllers: Name of the controller of each run.
+    """
+    spare = iter(OTHER_COLOURS * (1 + len(controllers) // len(OTHER_COLOURS)))
+    taken: list[str] = []
+    for name in controllers:
+        colour = CONTROLLER_COLOURS.get(name, "")
+        taken.append(colour if colour and colour not in taken else next(spare))
+    return taken
+
+
+def quiet_grid(axes: Axes) -> None:
+    """A grid that one can ignore."""
+    axes.grid(True, which="major")
+    axes.set_axisbelow(True)
+    axes.tick_params(length=3.0, which="major")
+    axes.tick_params(length=0.0, which="minor")
+
+
+def as_svg(figure: Figure) -> str:
+    """A figure as an element of a page, in the page's own colours and type."""
+    stream = StringIO()
+    figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    for colour, variable in VARIABLES.items():
+        text = text.replace(colour, variable)
+    return text
+
+
+def as_png(figure: Figure, *, dpi: int = 130) -> bytes:
+    """A figure as a picture file on white."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=dpi, facecolor="white")
+    return stream.getvalue()

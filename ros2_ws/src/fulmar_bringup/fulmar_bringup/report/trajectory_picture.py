@@ -1,0 +1,94 @@
+"""The path seen from above, and a close look at the goal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+
+from fulmar_bringup.report.style import DASHED, INK, PAPER, quiet_grid
+from fulmar_bringup.report.view import View, judged
+from fulmar_bringup.run_judgement import Judgement
+from fulmar_core.robot import load_robot
+from fulmar_core.rotation import yaw_of
+
+OUTLINES = 5  # of the body along the path
+CLOSE_UP = 2.4  # half width of the close look, in tolerances
+
+
+def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
+    """Paths, start, goal, and the outline of the body at some instants."""
+    quiet_grid(axes)
+    axes.set_aspect("equal")
+    for order, (run, judgement) in enumerate(judged(runs)):
+        motion = run.record.motion
+        xy = motion.position[judgement.samples, :2]
+        axes.plot(*xy.T, color=run.colour, label=run.label, zorder=4)
+        radius = load_robot(run.summary["robot"]).body.radius
+        for index in _instants(xy):
+            yaw = float(yaw_of(motion.quat_xyzw[judgement.samples[index]]))
+            _body(axes, xy[index], yaw, radius, run.colour)
+        if order == 0:
+            axes.text(xy[0, 0], xy[0, 1] + 1.15 * radius, "start", ha="center", va="bottom")
+        _goal(axes, judgement, radius, named=order == 0)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.margins(0.1)
+
+
+def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
+    """The last seconds around the goal, with the tolerance."""
+    quiet_grid(axes)
+    axes.set_aspect("equal")
+    half_cm = 15.0
+    for run, judgement in judged(runs):
+        tolerance_cm = 100.0 * judgement.task.tolerance.position
+        half_cm = CLOSE_UP * tolerance_cm
+        offset = run.record.motion.position[judgement.samples] - judgement.goal.position_in_world
+        x, y = 100.0 * offset[:, 0], 100.0 * offset[:, 1]
+        late = judgement.time_s >= judgement.window_start_s
+        axes.plot(x, y, color=run.colour, linewidth=1.0, alpha=0.35)
+        axes.plot(x[late], y[late], color=run.colour, linewidth=1.8)
+        axes.plot(x[-1], y[-1], "o", color=run.colour, markersize=5, markeredgecolor=PAPER, zorder=5)
+        axes.add_patch(Circle((0, 0), tolerance_cm, fill=False, color=INK, linestyle=DASHED, linewidth=1.0))
+    axes.plot(0, 0, "+", color=INK, markersize=9)
+    axes.set_xlim(-half_cm, half_cm)
+    axes.set_ylim(-half_cm, half_cm)
+    axes.set_xlabel("from the goal [cm]")
+    axes.set_title("close to the goal")
+
+
+def _instants(xy: np.ndarray) -> list[int]:
+    """Samples that are evenly spaced along the path."""
+    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))))
+    return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], OUTLINES))).clip(0, len(xy) - 1).tolist()
+
+
+def _body(axes: Axes, centre: np.ndarray, yaw: float, radius: float, colour: str) -> None:
+    axes.add_patch(Circle(tuple(centre), radius, facecolor=colour, alpha=0.10, zorder=2))
+    axes.add_patch(
+        Circle(tuple(centre), radius, fill=False, edgecolor=colour, alpha=0.6, linewidth=0.9, zorder=3)
+    )
+    nose = centre + radius * np.array([np.cos(yaw), np.sin(yaw)])
+    axes.plot(*np.stack((centre, nose)).T, color=colour, linewidth=1.4, alpha=0.8, zorder=3)
+
+
+def _goal(axes: Axes, judgement: Judgement, radius: float, *, named: bool) -> None:
+    x, y = judgement.goal.position_in_world[:2]
+    tolerance = judgement.task.tolerance
+    axes.add_patch(
+        Circle((x, y), tolerance.position, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=6)
+    )
+    if tolerance.heading_deg < 180.0:
+        yaw = float(yaw_of(judgement.goal.quat_xyzw))
+        axes.annotate(
+            "",
+            (x + 1.6 * radius * np.cos(yaw), y + 1.6 * radius * np.sin(yaw)),
+            (x, y),
+            arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0},
+            zorder=7,
+        )
+    if named:
+        axes.text(x, y - 1.15 * radius, "goal", ha="center", va="top")

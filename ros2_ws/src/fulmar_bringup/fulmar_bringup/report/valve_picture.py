@@ -1,0 +1,86 @@
+"""Which valves were really open, and when the watchdog closed them."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from fulmar_bringup.report.style import ALARM, FAINT, INK
+from fulmar_bringup.report.view import View, judged
+from fulmar_bringup.run_record import RunRecord
+
+Span = tuple[float, float]  # begin and end, in simulated time since the first state [s]
+
+
+def open_spans(record: RunRecord, actuator: int) -> list[Span]:
+    """When one actuator was in use.
+
+    Args:
+        record: The run.
+        actuator: Column of `record.applied.effort`.
+    """
+    return _spans(record, record.applied.effort[:, actuator] != 0.0)
+
+
+def watchdog_spans(record: RunRecord) -> list[Span]:
+    """When everything was shut although the newest command said otherwise and had grown old."""
+    applied, commanded = record.applied, record.commanded
+    if not len(applied) or not len(commanded) or record.info.get("lockstep"):
+        return []
+    newest = np.searchsorted(commanded.log_s, applied.log_s, side="right") - 1
+    hz = float(record.info.get("control_hz") or 1.0) * float(record.info.get("rate") or 1.0)
+    age_s = applied.log_s - commanded.log_s[newest.clip(0)]
+    wanted = np.any(commanded.effort[newest.clip(0)] != 0.0, axis=1)
+    shut = ~np.any(applied.effort != 0.0, axis=1)
+    return _spans(record, shut & wanted & (newest >= 0) & (age_s > 1.5 / hz))
+
+
+def _spans(record: RunRecord, flags: np.ndarray) -> list[Span]:
+    """Times between which a flag of each sample of `record.applied` is set."""
+    stamp_s = record.applied.stamp_s
+    if not len(stamp_s):
+        return []
+    begin_s = record.motion.stamp_s[0] if len(record.motion) else stamp_s[0]
+    ends = np.append(stamp_s[1:], stamp_s[-1]) - begin_s  # a sample counts until the next one
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
+    return [
+        (float(stamp_s[first] - begin_s), float(ends[last - 1]))
+        for first, last in zip(edges[::2], edges[1::2], strict=True)
+    ]
+
+
+def draw_valves(axes: Axes, run: View) -> None:
+    """One row for each valve, a bar wherever it was open."""
+    names = run.record.applied.names
+    for row in range(len(names)):
+        bars = [(begin, end - begin) for begin, end in open_spans(run.record, row)]
+        axes.broken_barh(bars, (row + 0.6, 0.8), facecolors=run.colour, linewidth=0)
+    for begin, end in watchdog_spans(run.record):
+        axes.axvspan(begin, end, facecolor=ALARM, alpha=0.14, linewidth=0)
+        axes.text(
+            0.5 * (begin + end), 1.02, "closed by the watchdog",
+            ha="center", va="bottom", fontsize=8.5, color=ALARM,
+            transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
+    axes.set_ylim(len(names) + 0.7, 0.3)
+    axes.set_yticks(range(1, len(names) + 1))
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylabel("valve")
+    axes.set_title(run.label, loc="left", color=INK)
+    axes.spines["left"].set_visible(False)
+    for row in range(1, len(names)):
+        axes.axhline(row + 0.5, color=FAINT, alpha=0.25, linewidth=0.6)
+    for _, judgement in judged([run]):
+        axes.set_xlim(0.0, judgement.duration_s)
+
+
+def draw_gas(axes: Axes, runs: list[View]) -> None:
+    """Open-valve time added up over the run."""
+    for run, judgement in judged(runs):
+        count = len(run.record.applied.names)
+        spent = np.cumsum(judgement.run.actuators_in_use[0]) * count * judgement.run.control_dt
+        axes.plot(judgement.time_s, spent, color=run.colour, label=run.label)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlim(0.0, max((judgement.duration_s for _, judgement in judged(runs)), default=1.0))
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("open-valve time [s]")

@@ -1,0 +1,83 @@
+"""What a report says about a run, in plain language and in figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fulmar_bringup.report.view import View
+
+Row = tuple[str, str, list[str]]  # what, an explanation, and the cell of each run
+
+
+def verdict(run: View) -> tuple[str, str]:
+    """One word and one or two sentences on how a run went."""
+    judgement, summary = run.judgement, run.summary
+    if judgement is None:
+        return "No result", "The bag holds fewer than two states, so there is nothing to judge."
+    tolerance = judgement.task.tolerance
+    error = f"{_length(summary['final_position_error_m'])}"
+    if tolerance.heading_deg < 180.0:
+        error += f" and {_value(summary['final_heading_error_deg'], '°', 1)}"
+    if judgement.success:
+        reached = judgement.time_to_target_s
+        return "Reached", (
+            f"The goal was reached after {reached:.1f} s and held to the end. "
+            f"At the end of {judgement.duration_s:.0f} s the platform was {error} away."
+        )
+    if judgement.duration_s < tolerance.hold_s:
+        return "Missed", f"The run ended after {judgement.duration_s:.1f} s, too early to judge."
+    return "Missed", (
+        f"The platform was not within the tolerance for all of the last {tolerance.hold_s:g} s. "
+        f"At the end of {judgement.duration_s:.0f} s it was {error} away."
+    )
+
+
+def rule(runs: Sequence[View]) -> str:
+    """What counts as success, for the first run that can be judged."""
+    for run in runs:
+        if run.judgement is not None:
+            tolerance = run.judgement.task.tolerance
+            heading = f" and {tolerance.heading_deg:g}°" if tolerance.heading_deg < 180.0 else ""
+            return (
+                f"A run counts as reached if the platform stays within {100 * tolerance.position:g} cm"
+                f"{heading} of the goal for all of the last {tolerance.hold_s:g} s."
+            )
+    return ""
+
+
+def table(runs: Sequence[View]) -> list[Row]:
+    """The figures of every run, one row each."""
+
+    def row(what: str, why: str, cell: Callable[[dict[str, Any]], str]) -> Row:
+        return what, why, [cell(run.summary) for run in runs]
+
+    def spread(key: str) -> Callable[[dict[str, Any]], str]:
+        return lambda s: " / ".join(_value(s[key][name], "", 2) for name in ("p50", "p99", "max"))
+
+    return [
+        row("Final position error", "", lambda s: _length(s["final_position_error_m"])),
+        row("Final heading error", "", lambda s: _value(s["final_heading_error_deg"], "°", 1)),
+        row("Time to goal", "from when on it stayed", lambda s: _value(s["time_to_target_s"], " s", 1)),
+        row("Length of the run", "simulated time", lambda s: _value(s["duration_s"], " s", 1)),
+        row("Valves in use", "average share of open valves", lambda s: _percent(s["actuator_use"])),
+        row("Commands", "answered measurements", lambda s: f"{s['steps']}"),
+        row("Control rate", "wall-clock", lambda s: _value(s["control_rate_hz"], " Hz", 2)),
+        row("Latency [ms]", "median / p99 / longest", spread("latency_ms")),
+        row("Period error [ms]", "median / p99 / largest", spread("period_error_ms")),
+        row("Inference [ms]", "median / p99 / longest", spread("inference_ms")),
+        row("Overruns", "deadlines missed", lambda s: _value(s["overruns"], "", 0)),
+        row("Watchdog trips", "no fresh command", lambda s: _value(s["watchdog_trips"], "", 0)),
+    ]
+
+
+def _length(metres: float | None) -> str:
+    return "–" if metres is None else f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.1f} cm"
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.0f} %"
+
+
+def _value(value: float | None, unit: str, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}{unit}"

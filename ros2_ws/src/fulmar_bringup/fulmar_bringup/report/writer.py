@@ -1,0 +1,53 @@
+"""From recorded runs to a file: a page, or one overview picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fulmar_bringup.report.page import page
+from fulmar_bringup.report.pictures import overview, pictures
+from fulmar_bringup.report.style import as_png, house_style
+from fulmar_bringup.report.view import View, views
+from fulmar_bringup.run_record import RunRecord
+from fulmar_core.errors import ConfigError
+
+
+def write_report(records: Sequence[RunRecord], out: Path, title: str | None = None) -> Path:
+    """Write a report.
+
+    Args:
+        records: At least one run; several are compared.
+        out: A `.html` page that works offline, or a `.png` picture. Its folder is made.
+        title: Heading; made from the runs by default.
+
+    Returns:
+        The file.
+
+    Raises:
+        ConfigError: Another kind of file was asked for, or there is no run.
+        BagError: A run names no task or no goal.
+    """
+    out = Path(out)
+    if out.suffix not in (".html", ".png"):
+        raise ConfigError(f"{out}: a report is a .html page or a .png picture. Give such a name.")
+    if not records:
+        raise ConfigError("there is no run to report on. Give at least one bag.")
+    runs = views(records)
+    title = title or _title(runs)
+    with house_style():
+        if out.suffix == ".png":
+            data = as_png(overview(runs, title))
+        else:
+            data = page(runs, pictures(runs), title).encode()
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_bytes(data)
+    except OSError as error:
+        raise ConfigError(f"{out}: cannot write the report: {error.strerror}.") from error
+    return out
+
+
+def _title(runs: Sequence[View]) -> str:
+    task = str(runs[0].summary["task"] or "run").replace("_", " ").capitalize()
+    return f"{task}: {' and '.join(run.label for run in runs)}"

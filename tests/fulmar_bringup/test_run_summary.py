@@ -1,0 +1,130 @@
+"""A run's figures are true, ready for JSON, and there also for runs that went wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from fulmar_bringup.bag_reader import read_run
+from fulmar_bringup.run_judgement import judge
+from fulmar_bringup.run_record import Motion
+from fulmar_bringup.run_summary import summarise
+from fulmar_core.errors import BagError
+from fulmar_core.rotation import yaw_of
+from fulmar_ros.bag_writer import BagWriter
+from tests.fulmar_bringup.synthetic_run import Plan, write_run
+
+
+def pick(motion: Motion, index: object) -> Motion:
+    names = [field.name for field in dataclasses.fields(motion)]
+    return Motion(**{name: getattr(motion, name)[index] for name in names})
+
+
+def test_a_run_that_reached_its_goal_says_so(reached):
+    record = read_run(reached)
+    summary = summarise(record)
+    end = record.truth.position[-1]
+    assert summary["success"] is True
+    assert summary["final_position_error_m"] == pytest.approx(float(np.hypot(end[0], end[1])))
+    degrees = abs(np.rad2deg(yaw_of(record.truth.quat_xyzw[-1])))
+    assert summary["final_heading_error_deg"] == pytest.approx(float(degrees))
+    assert summary["duration_s"] == pytest.approx(40.0)
+    assert summary["steps"] == 201
+    assert 5.0 < summary["time_to_target_s"] < 15.0
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+
+
+def test_figures_of_the_nodes_are_taken_over(reached):
+    summary = summarise(read_run(reached))
+    assert summary["control_rate_hz"] == 5.0002
+    assert summary["inference_ms"] == {"p50": 0.1, "p99": 0.3, "max": 0.9}
+    assert summary["period_error_ms"] == {"p50": 0.05, "p99": 0.4, "max": 1.2}
+    assert summary["overruns"] == 3
+    assert summary["watchdog_trips"] == 0
+
+
+def test_latency_comes_from_the_bag_where_the_plant_does_not_tell_it(reached):
+    latency = summarise(read_run(reached))["latency_ms"]
+    assert 1.5 < latency["p50"] < latency["p99"] <= latency["max"] < 6.0
+
+
+def test_latency_of_the_plant_counts_where_it_tells_it(reached):
+    record = read_run(reached)
+    plant = record.last_health("plant")
+    told = {"latency_ms_p50": "1.0", "latency_ms_p99": "2.0", "latency_ms_max": "3.0"}
+    newer = dataclasses.replace(plant, values={**plant.values, **told})
+    summary = summarise(dataclasses.replace(record, health=(*record.health, newer)))
+    assert summary["latency_ms"] == {"p50": 1.0, "p99": 2.0, "max": 3.0}
+
+
+def test_a_silent_controller_shows_as_a_trip_and_a_miss(silenced):
+    summary = summarise(read_run(silenced))
+    assert summary["watchdog_trips"] == 1
+    assert summary["success"] is False
+
+
+def test_a_run_shorter_than_the_window_is_no_success(tmp_path):
+    at_goal = Plan(duration_s=3.0, start=(0.0, 0.0, 0.0))
+    summary = summarise(read_run(write_run(tmp_path / "bag", at_goal)))
+    assert summary["final_position_error_m"] < 0.05
+    assert summary["success"] is False
+
+
+def test_leaving_the_tolerance_once_in_the_window_is_no_success(reached):
+    record = read_run(reached)
+    assert judge(record).success
+    position = record.truth.position.copy()
+    position[-100, 0] += 0.06
+    assert not judge(
+        dataclasses.replace(record, truth=dataclasses.replace(record.truth, position=position))
+    ).success
+
+
+def test_lost_samples_do_not_shift_the_window(reached):
+    record = read_run(reached)
+    kept = np.ones(len(record.truth), dtype=bool)
+    kept[-150::3] = False
+    fields = {
+        field.name: getattr(record.truth, field.name)[kept] for field in dataclasses.fields(record.truth)
+    }
+    thinned = judge(dataclasses.replace(record, truth=type(record.truth)(**fields)))
+    assert thinned.duration_s == pytest.approx(40.0)
+    assert thinned.run.control_dt == pytest.approx(0.02)
+    assert thinned.success
+
+
+def test_a_robot_without_truth_is_judged_by_its_odometry(reached):
+    record = read_run(reached)
+    nothing = type(record.truth)(
+        **{f.name: getattr(record.truth, f.name)[:0] for f in dataclasses.fields(record.truth)}
+    )
+    assert summarise(dataclasses.replace(record, truth=nothing))["success"] is True
+
+
+def test_a_goal_that_is_no_number_is_a_miss_with_unknown_errors(reached):
+    record = read_run(reached)
+    broken = dataclasses.replace(record, goals=(), info={**record.info, "goal": [float("nan"), 0.0, 0.0]})
+    summary = summarise(broken)
+    assert summary["success"] is False
+    assert summary["final_position_error_m"] is None
+
+
+def test_a_run_that_recorded_nothing_has_a_summary_of_unknowns(tmp_path):
+    BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_to_pose"}).close()
+    summary = summarise(read_run(tmp_path / "bag"))
+    assert summary["success"] is False
+    assert summary["steps"] == 0
+    assert summary["final_position_error_m"] is None
+    assert summary["latency_ms"] == {"p50": None, "p99": None, "max": None}
+    assert summary["watchdog_trips"] is None
+
+
+def test_a_record_without_a_task_or_a_goal_is_refused(reached):
+    record = read_run(reached)
+    with pytest.raises(BagError, match="names no task"):
+        summarise(dataclasses.replace(record, info={}))
+    with pytest.raises(BagError, match="holds no goal"):
+        summarise(dataclasses.replace(record, goals=(), info={"task": "go_to_pose"}))
