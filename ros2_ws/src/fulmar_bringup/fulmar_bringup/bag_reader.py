@@ -166,9 +166,7 @@ def _actuation(messages: Decoded, wire: Wire, warnings: list[str]) -> Actuation:
         stamp_s=np.array([_stamp_s(message.header) for _, message in alike]),
         log_s=np.array([log_s for log_s, _ in alike]),
         names=names,
-        effort=np.array([message.effort for _, message in alike], dtype=float).reshape(
-            len(alike), len(names)
-        ),
+        effort=np.array(effort, dtype=float).reshape(len(alike), len(names)),
     )
 
 
