@@ -46,9 +46,7 @@ def message_type(name: str) -> MessageType:
     """
     store = type_store()
     if name not in store.fielddefs:
-        raise BagError(
-            f"message type '{name}' is not one of Jazzy's. Record only types that Jazzy has."
-        )
+        raise BagError(f"message type '{name}' is not one of Jazzy's. Record only types that Jazzy has.")
     return MessageType(name, store.generate_msgdef(name, ros_version=2)[0], store.hash_rihs01(name))
 
 

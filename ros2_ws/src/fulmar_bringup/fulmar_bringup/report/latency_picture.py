@@ -3,53 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from fulmar_bringup.report.style import DASHED, quiet_grid
 from fulmar_bringup.report.view import View
 from fulmar_bringup.run_summary import percentiles
 
-BINS = 40
+BINS = 48
+SHORTEST_MS = 0.01
 
 
 def draw_latency(axes: Axes, runs: Sequence[View]) -> None:
-    """Share of commands by the time from measurement to answer, with p50 and p99."""
-    known = [run for run in runs if run.latencies_ms.size]
+    """Share of commands by the time from measurement to answer, with p50 and p99.
+
+    The scale is logarithmic, because a few answers take ten times as long as most.
+    """
+    known = [(run, np.maximum(run.latencies_ms, SHORTEST_MS)) for run in runs if run.latencies_ms.size]
     if not known:
         axes.text(0.5, 0.5, "no command answers a recorded odometry", ha="center", transform=axes.transAxes)
         return
-    widest = max(float(np.percentile(run.latencies_ms, 99.5)) for run in known)
-    bins = np.linspace(0.0, 1.15 * widest, BINS)
-    for run in known:
-        share = np.full(run.latencies_ms.size, 100.0 / run.latencies_ms.size)
-        inside = np.minimum(run.latencies_ms, bins[-1])  # the last bar stands for all that is longer
-        axes.hist(inside, bins, weights=share, color=run.colour, alpha=0.22, histtype="stepfilled")
-        axes.hist(inside, bins, weights=share, color=run.colour, histtype="step", label=run.label)
+    shortest = min(float(latency.min()) for _, latency in known)
+    longest = max(float(latency.max()) for _, latency in known)
+    bins = np.geomspace(0.8 * shortest, 1.25 * longest, BINS)
+    for run, latency in known:
+        share = np.full(latency.size, 100.0 / latency.size)
+        spread = percentiles(run.latencies_ms)
+        label = f"{run.label}: p50 {spread['p50']:.2g} ms, p99 {spread['p99']:.2g} ms"
+        axes.hist(latency, bins, weights=share, color=run.colour, alpha=0.22, histtype="stepfilled")
+        axes.hist(latency, bins, weights=share, color=run.colour, histtype="step", label=label)
+        axes.axvline(spread["p50"], color=run.colour, linewidth=1.2)
+        axes.axvline(spread["p99"], color=run.colour, linewidth=1.2, linestyle=DASHED)
     quiet_grid(axes)
-    axes.set_ylim(top=1.35 * axes.get_ylim()[1])
-    axes.set_xlim(0.0, bins[-1])
-    for name, line in (("p50", "-"), ("p99", DASHED)):
-        _mark(axes, known, name, line)
+    axes.set_xscale("log")
+    axes.set_xlim(bins[0], bins[-1])
+    axes.xaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("from measurement to command [ms]")
     axes.set_ylabel("commands [%]")
-
-
-def _mark(axes: Axes, runs: Sequence[View], name: str, line: Any) -> None:
-    """A line for each run at one percentile; the smallest has its name to the left, where no other is."""
-    values = sorted((percentiles(run.latencies_ms)[name], run.colour) for run in runs)
-    for order, (value, colour) in enumerate(values):
-        axes.axvline(value, color=colour, linestyle=line, linewidth=1.2)
-        axes.annotate(
-            f"{name} {value:.2g} ms",
-            xy=(value, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(-3 if order == 0 else 3, -2 - 12 * max(0, order - 1)),
-            textcoords="offset points",
-            ha="right" if order == 0 else "left",
-            va="top",
-            fontsize=8.5,
-            color=colour,
-        )
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8.5, handlelength=1.2)

@@ -105,14 +105,12 @@ def _gas(runs: Sequence[View]) -> Picture:
 
 
 def _latency(runs: Sequence[View]) -> Picture:
-    figure = Figure(figsize=(WIDTH, 2.5), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 2.7), layout="constrained")
     axes = figure.subplots()
     draw_latency(axes, runs)
-    axes.legend(loc="upper left")
     caption = """
-    Time from a measurement to the command that answers it, as the recorder saw both pass. The solid
-    line is the median; 99 of 100 commands are faster than the dashed one. The last bar also counts all
-    that took longer."""
+    Time from a measurement to the command that answers it, as the recorder saw both pass; the scale is
+    logarithmic. The solid line is the median (p50); 99 of 100 commands come before the dashed one (p99)."""
     return Picture("How fast the controller answers", _words(caption), figure)
 
 
