@@ -55,10 +55,12 @@ def _compose(path: Path) -> Node:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise ConfigError(f"{path}:{line}: not valid YAML: {error.problem or error.context}.") from error
     except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: not valid YAML: {error}.") from error
+        raise ConfigError(f"{path}: not valid YAML: {_one_line(error)}.") from error
+    except RecursionError as error:
+        raise ConfigError(f"{path}: is nested too deeply.") from error
     if root is None:
         raise ConfigError(f"{path}:1: the file is empty.")
-    return typing.cast(Node, root)
+    return root
 
 
 class _Builder:
@@ -92,6 +94,8 @@ class _Builder:
             self.fail(node, f"{where} must be a mapping of keys to values.")
         seen: set[str] = set()
         for key_node, _ in node.value:
+            if not isinstance(key_node, ScalarNode):
+                self.fail(key_node, f"a key of {where} must be a single word.")
             if key_node.value in seen:
                 self.fail(key_node, f"key '{key_node.value}' is written twice.")
             seen.add(key_node.value)
@@ -150,8 +154,9 @@ class _Builder:
             self.fail(node, f"{where} must be a single value.")
         try:
             return yaml.SafeLoader("").construct_object(node)
-        except (yaml.YAMLError, ValueError) as error:
-            self.fail(node, f"{where} = {node.value!r} cannot be read: {error}.")
+        except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
+            # PyYAML's own converters let slip whatever they stumble over, as in `!!bool maybe`.
+            self.fail(node, f"{where} = {node.value!r} cannot be read: {_one_line(error)}.")
 
     def _choice(self, allowed: tuple[Any, ...], value: Any, node: Node, where: str) -> Any:
         if value not in allowed:
@@ -160,7 +165,10 @@ class _Builder:
 
     def _checked(self, kind: Any, value: Any, node: Node, where: str) -> Any:
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
+            try:
+                value = float(value)
+            except OverflowError:
+                value = math.inf
         if kind is float and isinstance(value, str) and _YAML_1_2_NUMBER.fullmatch(value):
             value = float(value)
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
@@ -170,6 +178,10 @@ class _Builder:
         return value
 
 
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
 # PyYAML follows YAML 1.1, which reads 1e-3 as text.
-_YAML_1_2_NUMBER = re.compile(r"[-+]?[0-9.]+[eE][-+]?[0-9]+")
+_YAML_1_2_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+")
 _PLAIN_NAME = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
