@@ -29,6 +29,10 @@ class Body:
         """Refuse bodies that cannot exist."""
         if min(self.mass, self.radius, self.height, *self.inertia) <= 0.0:
             raise ValueError("mass, inertia, radius and height must be greater than 0.")
+        if 2.0 * max(self.inertia) > sum(self.inertia) * (1.0 + 1e-9):
+            raise ValueError(
+                f"'inertia' = {list(self.inertia)}: no body has a moment greater than the sum of the two others."
+            )
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,10 @@ class Timing:
             Whole number of steps, >= 1.
 
         Raises:
-            ValueError: If the control period is not a multiple of the physics step.
+            ValueError: If the rate is not positive, or the control period is no multiple of the physics step.
         """
+        if not control_hz > 0.0:
+            raise ValueError(f"control_hz = {control_hz:g} must be greater than 0.")
         ratio = 1.0 / (control_hz * self.physics_dt)
         if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6:
             raise ValueError(
@@ -130,5 +136,7 @@ def load_robot(name: str) -> Robot:
     path = config_path("robots", name)
     robot = load_config(Robot, path)
     if robot.name != name:
-        raise ConfigError(f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal.")
+        raise ConfigError(
+            f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
+        )
     return robot

@@ -1,0 +1,81 @@
+"""A robot's YAML, and what no robot can be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.paths import config_directory
+from fulmar_core.robot import Limits, Timing, Uncertainty, load_robot
+from fulmar_core.sensors.imu import ImuSpec
+
+ROBOT = load_robot("floating_platform")
+
+
+@pytest.mark.parametrize(
+    "change", [{"mass": 0.0}, {"radius": -1.0}, {"height": 0.0}, {"inertia": (0.1, 0.0, 0.1)}]
+)
+def test_a_body_without_mass_or_size_is_refused(change):
+    with pytest.raises(ValueError, match="must be greater than 0"):
+        replace(ROBOT.body, **change)
+
+
+def test_a_moment_of_inertia_beyond_the_sum_of_the_others_is_refused():
+    with pytest.raises(ValueError, match="no body has a moment greater than the sum"):
+        replace(ROBOT.body, inertia=(0.1, 0.1, 0.5))
+
+
+def test_a_flat_disc_is_a_body():
+    assert replace(ROBOT.body, inertia=(0.1, 0.2, 0.3)).inertia == (0.1, 0.2, 0.3)
+
+
+@pytest.mark.parametrize("span", [(2.0, 1.0), (0.0, 1.0), (-1.0, 1.0)])
+def test_an_empty_or_impossible_span_is_refused(span):
+    with pytest.raises(ValueError, match="'mass' must be"):
+        Uncertainty(span, (0.1, 0.2))
+    with pytest.raises(ValueError, match="'yaw_inertia' must be"):
+        Uncertainty((1.0, 2.0), span)
+
+
+@pytest.mark.parametrize(("hz", "steps"), [(50.0, 1), (25.0, 2), (5.0, 10), (0.5, 100)])
+def test_a_control_step_is_a_whole_number_of_physics_steps(hz, steps):
+    assert Timing(0.02, 5.0).substeps(hz) == steps
+
+
+@pytest.mark.parametrize("hz", [100.0, 7.0, 49.9, 51.0])
+def test_a_rate_that_does_not_divide_the_physics_rate_is_refused(hz):
+    with pytest.raises(ValueError, match="must divide the physics rate of 50 Hz evenly"):
+        Timing(0.02, 5.0).substeps(hz)
+
+
+@pytest.mark.parametrize("hz", [float("nan"), 0.0, -5.0])
+def test_a_rate_that_is_no_rate_is_refused(hz):
+    with pytest.raises(ValueError, match="control_hz"):
+        Timing(0.02, 5.0).substeps(hz)
+
+
+def test_limits_and_noises_have_to_mean_something():
+    with pytest.raises(ValueError, match="greater than 0"):
+        Limits(0.0, 1.0, 1.0)
+    with pytest.raises(ValueError, match="must not be negative"):
+        ImuSpec(-1.0, 0.0)
+    with pytest.raises(ValueError, match="rate_hz"):
+        replace(ROBOT.sensors.odometry, rate_hz=0.0)
+    with pytest.raises(ValueError, match="must not be negative"):
+        replace(ROBOT.sensors.odometry, velocity_std=(0.0, -0.1, 0.0))
+
+
+def test_an_unknown_robot_gets_the_nearest_name():
+    with pytest.raises(UnknownNameError, match="Did you mean 'floating_platform'"):
+        load_robot("floating_plattform")
+
+
+def test_a_robot_whose_file_is_called_otherwise_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "robots").mkdir()
+    text = (config_directory() / "robots" / "floating_platform.yaml").read_text()
+    (tmp_path / "robots" / "other.yaml").write_text(text)
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    with pytest.raises(ConfigError, match="'name' is 'floating_platform', the file's own name is 'other'"):
+        load_robot("other")
