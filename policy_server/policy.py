@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 import onnxruntime
+
 from fulmar_core.errors import BundleError
 from fulmar_core.policy_bundle import NETWORK, Passport, check_fit, read_golden, read_passport
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
 
-GOLDEN_TOLERANCE = 1e-4  # of the logits: float32 sums in another order on another processor differ by about 1e-6
+GOLDEN_TOLERANCE = (
+    1e-4  # of the logits: float32 sums in another order on another processor differ by about 1e-6
+)
 
 
 class Policy:
@@ -65,9 +68,11 @@ def _open(folder: Path) -> onnxruntime.InferenceSession:
         return onnxruntime.InferenceSession(
             (folder / NETWORK).read_bytes(), options, providers=["CPUExecutionProvider"]
         )
-    except Exception as error:  # noqa: BLE001 - onnxruntime's exceptions share no base class
+    except Exception as error:
         reason = str(error).splitlines()[0]
-        raise BundleError(f"{folder / NETWORK}: onnxruntime refuses it: {reason}. Export the policy again.") from error
+        raise BundleError(
+            f"{folder / NETWORK}: onnxruntime refuses it: {reason}. Export the policy again."
+        ) from error
 
 
 def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:

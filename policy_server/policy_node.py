@@ -12,7 +12,6 @@ from fulmar_core.tasks import Task
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.runtime import run_node
-
 from policy_server.policy import Policy
 from policy_server.shipped import shipped_policy
 
@@ -21,7 +20,9 @@ def make_policy(robot: Robot, task: Task, settings: ControllerSettings) -> Contr
     """Load the bundle that the parameters name, or the shipped one for this robot and task."""
     folder = Path(settings.policy) if settings.policy else shipped_policy(robot.name, task.name)
     if folder is None:
-        raise BundleError(f"no policy is shipped for '{robot.name}' and '{task.name}'. Set the parameter 'policy'.")
+        raise BundleError(
+            f"no policy is shipped for '{robot.name}' and '{task.name}'. Set the parameter 'policy'."
+        )
     return Policy(folder, robot, task, control_hz=settings.control_rate(robot))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import World
 from fulmar_core.dynamics.rigid_body import Disturbance, MassProperties, step

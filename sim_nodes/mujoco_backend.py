@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+
 from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import World
 from fulmar_core.episode import NOISE, episode_rng
@@ -12,7 +13,6 @@ from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample, measure_imu
 from fulmar_core.sensors.odometry import measure_odometry
 from fulmar_core.state import RigidBodyState
-
 from sim_nodes.mujoco_model import BODY, build_model
 
 
@@ -35,7 +35,13 @@ class MujocoBackend:
         self._height = float(self.model.body(BODY).pos[2])
         self._at = {
             name: slice(int(self.model.sensor(name).adr[0]), int(self.model.sensor(name).adr[0] + width))
-            for name, width in (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), ("accelerometer", 3))
+            for name, width in (
+                ("position", 3),
+                ("attitude", 4),
+                ("velocity", 3),
+                ("gyroscope", 3),
+                ("accelerometer", 3),
+            )
         }
 
     def reset(self, start: RigidBodyState, world: World, *, seed: int, number: int = 0) -> Sample:
@@ -65,7 +71,9 @@ class MujocoBackend:
         self.data.ctrl[:] = self.robot.actuators.thrusts(np.asarray(command, dtype=float))
         mujoco.mj_step(self.model, self.data, ticks)
         if not np.isfinite(self.data.qpos).all():
-            raise SafetyError(f"MuJoCo's state is not finite at t = {self.data.time:.2f} s: {self.data.qpos}.")
+            raise SafetyError(
+                f"MuJoCo's state is not finite at t = {self.data.time:.2f} s: {self.data.qpos}."
+            )
         return self._sample()
 
     def close(self) -> None:
@@ -85,4 +93,8 @@ class MujocoBackend:
         if not self._noisy:
             return Sample(truth, imu, truth)
         sensors = self.robot.sensors
-        return Sample(measure_odometry(truth, sensors.odometry, self._rng), measure_imu(imu, sensors.imu, self._rng), truth)
+        return Sample(
+            measure_odometry(truth, sensors.odometry, self._rng),
+            measure_imu(imu, sensors.imu, self._rng),
+            truth,
+        )

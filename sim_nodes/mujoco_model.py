@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mujoco
+
 from fulmar_core.robot import Robot
 
 BODY, IMU_SITE = "base_link", "imu_link"

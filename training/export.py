@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
+
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.policy_bundle import FORMAT, Golden, Passport, write_bundle
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
-
 from training.network import DeployedNetwork, load_network
 from training.train import HELD_OUT_SEED, NETWORK_FILE, RUN_FILE
 
@@ -54,7 +54,9 @@ def export(run: Path, out: Path) -> Passport:
         actuator_names=robot.actuators.names,
         network_sha256="",
         golden_sha256="",
-        training={key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")}
+        training={
+            key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
+        }
         | {"git_revision": record.get("git_revision", "")},
     )
     return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
@@ -68,7 +70,9 @@ def read_run_record(run: Path) -> dict[str, Any]:
     """
     path = run / RUN_FILE
     if not path.is_file() or not (run / NETWORK_FILE).is_file():
-        raise ConfigError(f"{run}: no finished training run ({RUN_FILE} or {NETWORK_FILE} is missing). Run `fulmar train`.")
+        raise ConfigError(
+            f"{run}: no finished training run ({RUN_FILE} or {NETWORK_FILE} is missing). Run `fulmar train`."
+        )
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
@@ -98,7 +102,15 @@ def _to_onnx(network: DeployedNetwork) -> bytes:
 def _strip_metadata(model: onnx.ModelProto) -> None:
     """Take out the stack traces that the exporter leaves: they name files of this machine."""
     graph = model.graph
-    for part in (model, graph, *graph.node, *graph.value_info, *graph.input, *graph.output, *graph.initializer):
+    for part in (
+        model,
+        graph,
+        *graph.node,
+        *graph.value_info,
+        *graph.input,
+        *graph.output,
+        *graph.initializer,
+    ):
         del part.metadata_props[:]
         part.doc_string = ""
 

@@ -11,7 +11,6 @@ from fulmar_core.metrics import summary
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from sim_nodes.mujoco_backend import MujocoBackend
-
 from training.export import read_run_record
 from training.network import NetworkController, load_network
 from training.rollout import roll_out_in_backends
@@ -33,7 +32,9 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
     """
     record = read_run_record(run)
     robot, task, world = load_robot(record["robot"]), load_task(record["task"]), load_scenario(scenario)
-    controller = NetworkController(load_network(run / NETWORK_FILE), task.observation_names, record["control_hz"])
+    controller = NetworkController(
+        load_network(run / NETWORK_FILE), task.observation_names, record["control_hz"]
+    )
     trajectories = roll_out_in_backends(
         controller,
         lambda: MujocoBackend(robot, sensor_noise=world.sensor_noise),

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import torch
-from fulmar_core.rotation import Array
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
+
+from fulmar_core.rotation import Array
 
 
 class DeployedNetwork(nn.Module):
@@ -77,7 +78,9 @@ def deployed_network(learner: PPO, normaliser: VecNormalize) -> DeployedNetwork:
     assert not isinstance(statistics, dict)
     trained = (*learner.policy.mlp_extractor.policy_net, learner.policy.action_net)
     linear = [layer for layer in trained if isinstance(layer, nn.Linear)]
-    network = DeployedNetwork([linear[0].in_features, *(layer.out_features for layer in linear)], limit=normaliser.clip_obs)
+    network = DeployedNetwork(
+        [linear[0].in_features, *(layer.out_features for layer in linear)], limit=normaliser.clip_obs
+    )
     network.mean.copy_(torch.as_tensor(statistics.mean, dtype=torch.float32))
     network.scale.copy_(torch.as_tensor(np.sqrt(statistics.var + normaliser.epsilon), dtype=torch.float32))
     twins = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
@@ -106,7 +109,9 @@ class NetworkController:
 
     name = "policy"
 
-    def __init__(self, network: DeployedNetwork, observation_names: tuple[str, ...], control_hz: float) -> None:
+    def __init__(
+        self, network: DeployedNetwork, observation_names: tuple[str, ...], control_hz: float
+    ) -> None:
         """Wrap a network; rate in Hz."""
         self._network = network
         self.observation_names = observation_names
@@ -123,4 +128,3 @@ class NetworkController:
     def metadata(self) -> dict[str, Any]:
         """Its kind; an unfinished network has no identity worth recording."""
         return {"controller": self.name}
-

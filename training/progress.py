@@ -17,7 +17,9 @@ class LearningBar:
         self._bar = Progress(
             TextColumn("learning"),
             BarColumn(),
-            TextColumn("{task.fields[steps]:,} steps  {task.fields[rate]:,.0f} steps/s  {task.fields[verdict]}"),
+            TextColumn(
+                "{task.fields[steps]:,} steps  {task.fields[rate]:,.0f} steps/s  {task.fields[verdict]}"
+            ),
             TimeRemainingColumn(),
             console=self._console,
             disable=not self._console.is_terminal,
@@ -29,7 +31,9 @@ class LearningBar:
         self._bar.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """Stop drawing."""
         self._bar.stop()
 

@@ -85,7 +85,11 @@ def roll_out_in_backends(
     for first in range(0, episodes, SIDE_BY_SIDE):
         numbers = range(first, min(first + SIDE_BY_SIDE, episodes))
         done = sum(run.position_error.size for run in runs)
-        runs.append(_side_by_side(controller, backends, task, scenario, numbers, seed, lambda n, d=done: progress(d + n)))
+        runs.append(
+            _side_by_side(
+                controller, backends, task, scenario, numbers, seed, lambda n, d=done: progress(d + n)
+            )
+        )
     for backend in backends:
         backend.close()
     return join(runs)
@@ -115,7 +119,9 @@ def _side_by_side(
     for step in range(round(task.episode_s / control_dt)):
         measured = stack_states([sample.odometry for sample in samples])
         commands = robot.actuators.limited(controller.act(task.observe(measured, goal)))
-        samples = [backend.step(command, substeps) for backend, command in zip(backends, commands, strict=True)]
+        samples = [
+            backend.step(command, substeps) for backend, command in zip(backends, commands, strict=True)
+        ]
         truths = [sample.truth for sample in samples if sample.truth is not None]
         log.add(stack_states(truths), goal, commands)
         progress((step + 1) * len(episodes))

@@ -31,7 +31,9 @@ class PpoSettings:
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""
         if (self.worlds * self.steps) % self.minibatch:
-            raise ValueError(f"worlds · steps = {self.worlds * self.steps} must be a multiple of 'minibatch'.")
+            raise ValueError(
+                f"worlds · steps = {self.worlds * self.steps} must be a multiple of 'minibatch'."
+            )
 
 
 @dataclass(frozen=True)
@@ -60,5 +62,7 @@ def load_training_settings(robot: str, task: str) -> TrainingSettings:
     """
     name = f"{robot}_{task}"
     if name not in config_names("training"):
-        raise ConfigError(f"no training settings for '{robot}' and '{task}'. Write configs/training/{name}.yaml.")
+        raise ConfigError(
+            f"no training settings for '{robot}' and '{task}'. Write configs/training/{name}.yaml."
+        )
     return load_config(TrainingSettings, config_path("training", name))

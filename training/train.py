@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
+from stable_baselines3.common.vec_env import VecNormalize
+
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.metrics import summary
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from stable_baselines3.common.callbacks import BaseCallback, CallbackList
-from stable_baselines3.common.vec_env import VecNormalize
-
 from training.network import DeployedNetwork, NetworkController, deployed_network, save_network
 from training.ppo import build_ppo
 from training.progress import LearningBar
@@ -47,7 +47,12 @@ class Check:
 class _TimedLearning(BaseCallback):
     """Checks the learner now and then, keeps the best network, and stops when time is up."""
 
-    def __init__(self, judge: Callable[[DeployedNetwork], tuple[float, float]], settings: TrainingSettings, limit: float) -> None:
+    def __init__(
+        self,
+        judge: Callable[[DeployedNetwork], tuple[float, float]],
+        settings: TrainingSettings,
+        limit: float,
+    ) -> None:
         super().__init__()
         self._judge, self._settings, self._limit = judge, settings, limit
         self._began = time.monotonic()
@@ -90,7 +95,7 @@ class _TimedLearning(BaseCallback):
             raise _TimeIsUp
 
 
-class _TimeIsUp(Exception):
+class _TimeIsUp(Exception):  # noqa: N818 - it is the planned end, no error
     """Ends learning between two updates."""
 
 
@@ -154,7 +159,9 @@ def train(
     return record
 
 
-def _judge_of(robot: Robot, task: Task, scenario: Scenario) -> Callable[[DeployedNetwork], tuple[float, float]]:
+def _judge_of(
+    robot: Robot, task: Task, scenario: Scenario
+) -> Callable[[DeployedNetwork], tuple[float, float]]:
     def judge(network: DeployedNetwork) -> tuple[float, float]:
         controller = NetworkController(network, task.observation_names, robot.timing.control_hz)
         run = roll_out_in_batch(controller, robot, task, scenario, episodes=256, seed=HELD_OUT_SEED)

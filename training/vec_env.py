@@ -7,12 +7,13 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.planar import planar_error
-from stable_baselines3.common.vec_env import VecEnv
 
 
 class BatchVecEnv(VecEnv):
@@ -65,7 +66,9 @@ class BatchVecEnv(VecEnv):
     def reset(self) -> np.ndarray:
         """Begin anew in every world; returns the observations, shape (worlds, n)."""
         self.simulation = self._new_simulation(self._seed)
-        self._age = np.random.Generator(np.random.Philox(self._seed)).integers(0, self._horizon, self.num_envs)
+        self._age = np.random.Generator(np.random.Philox(self._seed)).integers(
+            0, self._horizon, self.num_envs
+        )
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return self._observe()
 
@@ -89,13 +92,18 @@ class BatchVecEnv(VecEnv):
         if ended.size:
             last = self._observe()
             for world in ended:
-                infos[world] = {"terminal_observation": last[world], "TimeLimit.truncated": bool(timed_out[world])}
+                infos[world] = {
+                    "terminal_observation": last[world],
+                    "TimeLimit.truncated": bool(timed_out[world]),
+                }
             simulation.reset(ended)
             self._age[ended] = 0
         return self._observe(), np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
 
     def _observe(self) -> np.ndarray:
-        return np.asarray(self._task.observe(self.simulation.measured, self.simulation.goal), dtype=np.float32)
+        return np.asarray(
+            self._task.observe(self.simulation.measured, self.simulation.goal), dtype=np.float32
+        )
 
     def close(self) -> None:
         """Nothing to release."""

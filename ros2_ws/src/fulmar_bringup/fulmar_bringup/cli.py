@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 
 import typer
-from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
 
 from fulmar_bringup.commands.bundle import bundle
 from fulmar_bringup.commands.demo import demo
@@ -17,6 +16,7 @@ from fulmar_bringup.commands.report import report
 from fulmar_bringup.commands.run import run
 from fulmar_bringup.commands.train import train
 from fulmar_bringup.console import console
+from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
 
 DONE, FAILED, BAD_USAGE = 0, 1, 2
 
@@ -73,3 +73,7 @@ def _hint(error: Exception) -> str:
     if commands and context.args:
         return did_you_mean(context.args[0], commands)
     return f" Try `{context.command_path} --help`."
+
+
+if __name__ == "__main__":
+    main()

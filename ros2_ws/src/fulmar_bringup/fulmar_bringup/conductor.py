@@ -9,10 +9,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from fulmar_core.errors import RunFailed
-from fulmar_core.paths import config_path
-from fulmar_core.state import planar_pose
-from fulmar_core.tasks import load_task
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fulmar_bringup.bag_reader import read_run
@@ -24,6 +20,10 @@ from fulmar_bringup.provenance import fulmar_version, git_revision
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import SILENT_S, START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_bringup.system import CONTROLLERS
+from fulmar_core.errors import RunFailed
+from fulmar_core.paths import config_path
+from fulmar_core.state import planar_pose
+from fulmar_core.tasks import load_task
 
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 GOAL_STAMP_NS = 1_000_000_000  # the simulated time at which every run begins
@@ -116,7 +116,9 @@ def _wait_for_end(
         if overseer.controller.level == "error":
             raise RunFailed(f"controller: {overseer.controller.message}")
         if not plan.lockstep and overseer.controller.heard and now - overseer.controller.heard > SILENT_S:
-            raise RunFailed(f"controller: has not reported for {now - overseer.controller.heard:.1f} s; it hangs")
+            raise RunFailed(
+                f"controller: has not reported for {now - overseer.controller.heard:.1f} s; it hangs"
+            )
         if now - began > limit_s:
             raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from fulmar_core.errors import FulmarError
 from fulmar_core.paths import config_directory, config_names
 from fulmar_core.robot import load_robot
@@ -47,14 +48,18 @@ def diagnose() -> list[Finding]:
 
 def _python() -> Finding:
     found = ".".join(map(str, sys.version_info[:3]))
-    return Finding("Python", (3, 11) <= sys.version_info[:2] <= (3, 13), found, "Use Python 3.11, 3.12 or 3.13.")
+    return Finding(
+        "Python", (3, 11) <= sys.version_info[:2] <= (3, 13), found, "Use Python 3.11, 3.12 or 3.13."
+    )
 
 
 def _part(module: str, extra: str) -> Finding:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        return Finding(module, False, str(error), f"Install the extra '{extra}': `make setup` in the checkout.")
+        return Finding(
+            module, False, str(error), f"Install the extra '{extra}': `make setup` in the checkout."
+        )
     try:
         return Finding(module, True, version(module))
     except PackageNotFoundError:
@@ -81,10 +86,16 @@ def _policies() -> Finding:
             from fulmar_core.policy_bundle import read_passport
 
             passport = read_passport(folder)
-            Policy(folder, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
+            Policy(
+                folder, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz
+            )
     except (FulmarError, ImportError) as error:
-        return Finding("shipped policies", False, str(error), "Check the files out again: `git checkout policy_server`.")
-    return Finding("shipped policies", True, ", ".join(folder.name for folder in shipped_policies()) or "none")
+        return Finding(
+            "shipped policies", False, str(error), "Check the files out again: `git checkout policy_server`."
+        )
+    return Finding(
+        "shipped policies", True, ", ".join(folder.name for folder in shipped_policies()) or "none"
+    )
 
 
 def _ros_round_trip() -> Finding:
@@ -100,7 +111,9 @@ def _ros_round_trip() -> Finding:
     return Finding("ROS 2 publish and receive", True, f"{best:.2f} ms (median) in domain {domain}")
 
 
-_ROS_ADVICE = "Is loopback up and /dev/shm writable? Try another ROS_DOMAIN_ID, or FASTDDS_BUILTIN_TRANSPORTS=UDPv4."
+_ROS_ADVICE = (
+    "Is loopback up and /dev/shm writable? Try another ROS_DOMAIN_ID, or FASTDDS_BUILTIN_TRANSPORTS=UDPv4."
+)
 
 
 def _timing() -> Finding:
@@ -116,4 +129,6 @@ def _timing() -> Finding:
 
 def _disk() -> Finding:
     free = shutil.disk_usage(Path.cwd()).free
-    return Finding("disk", free > FREE_BYTES, f"{free / 1e9:.1f} GB free here", "Bags need room: at least 1 GB.")
+    return Finding(
+        "disk", free > FREE_BYTES, f"{free / 1e9:.1f} GB free here", "Bags need room: at least 1 GB."
+    )

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fulmar_core.robot import load_robot
-
 from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, load_system
+from fulmar_core.robot import load_robot
 
 Parameter = bool | int | float | str | list[float]
 
@@ -91,7 +90,9 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
     return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", f"/{plan.robot}", parameters)
 
 
-def recorder_spec(plan: RunPlan, *, directory: str = "", run_info: str = "", attachments: str = "") -> NodeSpec:
+def recorder_spec(
+    plan: RunPlan, *, directory: str = "", run_info: str = "", attachments: str = ""
+) -> NodeSpec:
     """The node that records; without a directory it makes one under `runs/`."""
     texts = {"directory": directory, "run_info": run_info, "attachments": attachments}
     return NodeSpec(

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
+from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.system import check_names, default_control_hz
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError
@@ -14,9 +17,6 @@ from fulmar_core.policy_bundle import check_fit, read_passport
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
 from policy_server.shipped import shipped_policy
-
-from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.system import check_names, default_control_hz
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
 
@@ -81,13 +81,19 @@ def plan_run(
     if controller == "policy":
         policy = checked_policy(policy, the_robot, the_task, hz)
     if record.exists():
-        raise ConfigError(f"{record} exists already; nothing recorded is overwritten. Give --record another folder.")
+        raise ConfigError(
+            f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
+        )
     episode = draw_episode(the_robot, the_task, load_scenario(scenario), seed=seed, number=0)
     drawn_goal = _tuple_of(episode.goal.position_in_world, episode.goal.quat_xyzw)
     drawn_start = _tuple_of(episode.start.position_in_world, episode.start.quat_xyzw)
     goal = goal or drawn_goal
     if start is None:
-        start = (goal[0] + drawn_start[0] - drawn_goal[0], goal[1] + drawn_start[1] - drawn_goal[1], drawn_start[2])
+        start = (
+            goal[0] + drawn_start[0] - drawn_goal[0],
+            goal[1] + drawn_start[1] - drawn_goal[1],
+            drawn_start[2],
+        )
     distance = math.hypot(start[0] - goal[0], start[1] - goal[1])
     if distance > the_robot.limits.geofence:
         raise ConfigError(

@@ -21,7 +21,12 @@ def step_bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
     Yields:
         A function to call with the steps done so far.
     """
-    columns = (TextColumn(what), BarColumn(), TextColumn("{task.completed:,} of {task.total:,} steps"), TimeRemainingColumn())
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        TextColumn("{task.completed:,} of {task.total:,} steps"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task(what, total=total)
         yield lambda steps: bar.update(task, completed=steps)

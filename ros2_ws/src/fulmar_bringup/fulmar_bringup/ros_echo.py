@@ -7,12 +7,12 @@ import time
 
 import numpy as np
 import rclpy
-from fulmar_core.topics import METADATA
-from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
+from fulmar_core.topics import METADATA
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
 
 ROUNDS = 20
 

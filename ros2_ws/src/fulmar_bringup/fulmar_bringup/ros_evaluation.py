@@ -13,6 +13,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import rclpy
+from rclpy.lifecycle import TransitionCallbackReturn
+
+from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
+from fulmar_bringup.processes import ProcessGroup, command_line
+from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import RunFailed
@@ -21,17 +26,14 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import spinning
-from rclpy.lifecycle import TransitionCallbackReturn
 from sim_nodes.sim_node import make_backend
-
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
-from fulmar_bringup.processes import ProcessGroup, command_line
-from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 
 Progress = Callable[[int], None]
 
 
-def roll_out_through_ros(plan: RunPlan, *, episodes: int, progress: Progress = lambda steps: None) -> Trajectories:
+def roll_out_through_ros(
+    plan: RunPlan, *, episodes: int, progress: Progress = lambda steps: None
+) -> Trajectories:
     """Run episodes 0 to `episodes - 1` of the plan's seed one after the other.
 
     Args:
@@ -65,7 +67,12 @@ def roll_out_through_ros(plan: RunPlan, *, episodes: int, progress: Progress = l
 
 
 def _episodes(
-    plan: RunPlan, plant: PlantNode, overseer: Supervisor, group: ProcessGroup, episodes: int, progress: Progress
+    plan: RunPlan,
+    plant: PlantNode,
+    overseer: Supervisor,
+    group: ProcessGroup,
+    episodes: int,
+    progress: Progress,
 ) -> Trajectories:
     robot, task, scenario = load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario)
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
@@ -79,7 +86,9 @@ def _episodes(
         if end is not None:
             raise RunFailed(f"{end.text}; its own words are above")
         if time.monotonic() - began > START_TIMEOUT_S:
-            raise RunFailed(f"the controller did not take its goal within {START_TIMEOUT_S:g} s. Try `fulmar doctor`.")
+            raise RunFailed(
+                f"the controller did not take its goal within {START_TIMEOUT_S:g} s. Try `fulmar doctor`."
+            )
 
     for number in range(episodes):
         began = time.monotonic()

@@ -14,13 +14,6 @@ from dataclasses import dataclass, field
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from fulmar_core.errors import RunFailed
-from fulmar_core.state import Pose
-from fulmar_core.tasks import Task
-from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, STATUS
-from fulmar_ros.convert import goal_message
-from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
 from geometry_msgs.msg import PointStamped, PoseStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
@@ -28,6 +21,13 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bringup.processes import child_environment
+from fulmar_core.errors import RunFailed
+from fulmar_core.state import Pose
+from fulmar_core.tasks import Task
+from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, STATUS
+from fulmar_ros.convert import goal_message
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
 
 START_TIMEOUT_S = 30.0
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
@@ -56,18 +56,25 @@ class Supervisor:
         goal_type = PoseStamped if wire.type.endswith("PoseStamped") else PointStamped
         self._goal = node.create_publisher(goal_type, wire.name, publisher_qos(wire))
         node.create_subscription(
-            DiagnosticArray, DIAGNOSTICS.name, self._hear, subscriber_qos(DIAGNOSTICS, reliable=True, depth=10)
+            DiagnosticArray,
+            DIAGNOSTICS.name,
+            self._hear,
+            subscriber_qos(DIAGNOSTICS, reliable=True, depth=10),
         )
         node.create_subscription(DiagnosticArray, STATUS.name, self._hear, subscriber_qos(STATUS))
         self._plant_service = node.create_client(ChangeState, "plant/change_state")
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            part = {f"{self._robot}: plant": self.plant, f"{self._robot}: controller": self.controller}.get(status.name)
+            part = {f"{self._robot}: plant": self.plant, f"{self._robot}: controller": self.controller}.get(
+                status.name
+            )
             if part is None:
                 continue
             with self._changed:
-                part.level = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn"}.get(status.level, "error")
+                part.level = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn"}.get(
+                    status.level, "error"
+                )
                 part.message = status.message
                 part.values = {pair.key: pair.value for pair in status.values}
                 part.heard = time.monotonic()

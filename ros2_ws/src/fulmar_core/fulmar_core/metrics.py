@@ -26,6 +26,9 @@ class Trajectories:
     control_dt: float  # [s]
 
 
+COLUMNS = ("position_error", "heading_error", "speed", "yaw_rate", "actuators_in_use")
+
+
 class TrajectoryLog:
     """Collects steps of a batch of episodes."""
 
@@ -55,14 +58,13 @@ class TrajectoryLog:
 
     def trajectories(self) -> Trajectories:
         """Everything noted so far."""
-        columns = [np.stack(column, axis=-1) for column in zip(*self._steps, strict=True)]
-        return Trajectories(*columns, control_dt=self._control_dt)
+        columns = (np.stack(column, axis=-1) for column in zip(*self._steps, strict=True))
+        return Trajectories(**dict(zip(COLUMNS, columns, strict=True)), control_dt=self._control_dt)
 
 
 def join(runs: list[Trajectories]) -> Trajectories:
     """One set of trajectories out of several of equal length and rate."""
-    names = ("position_error", "heading_error", "speed", "yaw_rate", "actuators_in_use")
-    arrays = {name: np.concatenate([np.atleast_2d(getattr(run, name)) for run in runs]) for name in names}
+    arrays = {name: np.concatenate([np.atleast_2d(getattr(run, name)) for run in runs]) for name in COLUMNS}
     return Trajectories(**arrays, control_dt=runs[0].control_dt)
 
 
@@ -77,7 +79,7 @@ def successes(run: Trajectories, task: Task) -> np.ndarray:
         One truth value an episode, shape (episodes,).
     """
     window = max(1, round(task.tolerance.hold_s / run.control_dt))
-    return np.all(_inside(run, task)[:, -window:], axis=1)
+    return np.asarray(np.all(_inside(run, task)[:, -window:], axis=1))
 
 
 def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
@@ -128,7 +130,7 @@ def summary(run: Trajectories, task: Task) -> dict[str, object]:
 
 def _inside(run: Trajectories, task: Task) -> np.ndarray:
     near = run.position_error < task.tolerance.position
-    return near & (np.abs(np.rad2deg(run.heading_error)) <= task.tolerance.heading_deg)
+    return np.asarray(near & (np.abs(np.rad2deg(run.heading_error)) <= task.tolerance.heading_deg))
 
 
 def _time_to_target(run: Trajectories, task: Task) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zipfile
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -105,18 +106,26 @@ def read_passport(folder: Path) -> Passport:
     for name in (PASSPORT, NETWORK, GOLDEN):
         path = folder / name
         if not path.is_file():
-            raise BundleError(f"policy '{folder}' has no {name}. Export one with `fulmar export RUN --out DIR`.")
+            raise BundleError(
+                f"policy '{folder}' has no {name}. Export one with `fulmar export RUN --out DIR`."
+            )
         if path.stat().st_size > MAX_BYTES:
             raise BundleError(f"{path}: {path.stat().st_size} bytes, at most {MAX_BYTES} are accepted.")
     try:
         values = json.loads((folder / PASSPORT).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BundleError(f"{folder / PASSPORT}: cannot be read: {error}. Export the policy again.") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise BundleError(
+            f"{folder / PASSPORT}: cannot be read: {error}. Export the policy again."
+        ) from error
     passport = _passport_of(values, folder / PASSPORT)
     if passport.format != FORMAT:
-        raise BundleError(f"policy '{folder}' has format {passport.format}, this Fulmar reads {FORMAT}. Export it again.")
+        raise BundleError(
+            f"policy '{folder}' has format {passport.format}, this Fulmar reads {FORMAT}. Export it again."
+        )
     if passport.sha256 != passport.expected_sha256():
-        raise BundleError(f"{folder / PASSPORT}: was changed after export (its hash does not match). Export it again.")
+        raise BundleError(
+            f"{folder / PASSPORT}: was changed after export (its hash does not match). Export it again."
+        )
     for name, expected in ((NETWORK, passport.network_sha256), (GOLDEN, passport.golden_sha256)):
         found = _sha256(folder / name)
         if found != expected:
@@ -136,7 +145,7 @@ def read_golden(folder: Path) -> Golden:
     try:
         with np.load(folder / GOLDEN, allow_pickle=False) as arrays:
             return Golden(arrays["observations"], arrays["commands"], arrays["logits"])
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise BundleError(f"{folder / GOLDEN}: cannot be read: {error}. Export the policy again.") from error
 
 
@@ -157,7 +166,7 @@ def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *
         raise BundleError(f"policy '{where}' was trained for robot '{passport.robot}', not '{robot.name}'.")
     if passport.task != task.name:
         raise BundleError(f"policy '{where}' was trained for task '{passport.task}', not '{task.name}'.")
-    if abs(passport.control_hz - control_hz) > 1e-9:
+    if not abs(passport.control_hz - control_hz) <= 1e-9:  # so that what is not a number is refused too
         raise BundleError(
             f"policy '{where}' was trained at {passport.control_hz:g} Hz, but would run at {control_hz:g} Hz. "
             f"Train and export it at {control_hz:g} Hz, or run it with control_hz = {passport.control_hz:g}."
@@ -172,7 +181,9 @@ def _check_names(what: str, found: tuple[str, ...], needed: tuple[str, ...], whe
     if len(found) != len(needed):
         raise BundleError(f"policy '{where}' has {len(found)} {what} names, {len(needed)} are needed.")
     index = next(i for i, (a, b) in enumerate(zip(found, needed, strict=True)) if a != b)
-    raise BundleError(f"policy '{where}': {what} {index + 1} is '{found[index]}', it must be '{needed[index]}'.")
+    raise BundleError(
+        f"policy '{where}': {what} {index + 1} is '{found[index]}', it must be '{needed[index]}'."
+    )
 
 
 def _passport_of(values: Any, path: Path) -> Passport:
@@ -185,9 +196,28 @@ def _passport_of(values: Any, path: Path) -> Passport:
     missing = known - values.keys()
     if missing:
         raise BundleError(f"{path}: lacks the key '{min(missing)}'. Export the policy again.")
+    for name, kinds in _KINDS.items():
+        if not isinstance(values[name], kinds) or isinstance(values[name], bool):
+            raise BundleError(
+                f"{path}: '{name}' is {values[name]!r}, which is of the wrong type. Export the policy again."
+            )
     for name in ("observation_names", "actuator_names"):
-        values[name] = tuple(values[name]) if isinstance(values[name], list | tuple) else (str(values[name]),)
+        values[name] = tuple(map(str, values[name]))
     return Passport(**values)
+
+
+_KINDS: dict[str, type | tuple[type, ...]] = {
+    "format": int,
+    "robot": str,
+    "task": str,
+    "control_hz": (int, float),
+    "observation_names": (list, tuple),
+    "actuator_names": (list, tuple),
+    "network_sha256": str,
+    "golden_sha256": str,
+    "training": dict,
+    "sha256": str,
+}
 
 
 def _sha256(path: Path) -> str:

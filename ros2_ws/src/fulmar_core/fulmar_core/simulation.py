@@ -59,7 +59,9 @@ class BatchSimulation:
         self.truth: RigidBodyState = planar_state(zeros, zeros, zeros).astype(dtype)
         self.goal: Pose = planar_pose(zeros, zeros, zeros).astype(dtype)
         self._body = MassProperties(np.ones((worlds, 1), dtype=dtype), np.ones((worlds, 3), dtype=dtype))
-        self._disturbance = Disturbance(np.zeros((worlds, 3), dtype=dtype), np.zeros((worlds, 3), dtype=dtype))
+        self._disturbance = Disturbance(
+            np.zeros((worlds, 3), dtype=dtype), np.zeros((worlds, 3), dtype=dtype)
+        )
         self.reset(range(worlds))
 
     @property

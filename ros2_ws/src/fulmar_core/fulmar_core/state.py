@@ -69,7 +69,9 @@ def planar_state(
     Returns:
         State with leading shape (...).
     """
-    x, y, yaw, vx, vy, yaw_rate = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, y, yaw, vx, vy, yaw_rate)))
+    x, y, yaw, vx, vy, yaw_rate = np.broadcast_arrays(
+        *(np.asarray(v, dtype=float) for v in (x, y, yaw, vx, vy, yaw_rate))
+    )
     zero = np.zeros_like(x)
     return RigidBodyState(
         np.stack((x, y, zero), axis=-1),

@@ -8,6 +8,10 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from geometry_msgs.msg import PointStamped, PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
 from fulmar_core.robot import Robot, load_robot
@@ -18,10 +22,6 @@ from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.state import Pose, RigidBodyState
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.planar import planar_error
-from geometry_msgs.msg import PointStamped, PoseStamped
-from nav_msgs.msg import Odometry
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
@@ -110,7 +110,9 @@ class ControllerNode(LifecycleNode):
             self._thread.start()
         else:
             # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
-            self._status_timer = self.create_timer(STATUS_PERIOD_S / 4, lambda: self._tell_status(self._decide()))
+            self._status_timer = self.create_timer(
+                STATUS_PERIOD_S / 4, lambda: self._tell_status(self._decide())
+            )
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -125,6 +127,7 @@ class ControllerNode(LifecycleNode):
         if hasattr(self, "wires"):
             for _ in range(SAFE_REPEATS):
                 self._publish_safe()
+            self.wires.flush()
             self._said_at = 0.0  # the last status has the figures of the whole run
             self._tell_status(self._decide())
 
@@ -211,7 +214,12 @@ class ControllerNode(LifecycleNode):
 
     def _tell_status(self, decision: Decision) -> None:
         """Publish the status when it changed, and at least twice a second."""
-        changed = (decision.mode, decision.reason.split(" (")[0][:24], self._goal_stamp_ns, self._rejections.total)
+        changed = (
+            decision.mode,
+            decision.reason.split(" (")[0][:24],
+            self._goal_stamp_ns,
+            self._rejections.total,
+        )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < STATUS_PERIOD_S:
             return

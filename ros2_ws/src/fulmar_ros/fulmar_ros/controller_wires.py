@@ -8,6 +8,13 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped, PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleNode
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -21,15 +28,11 @@ from fulmar_core.topics import (
     ODOMETRY,
     STATUS,
 )
-from geometry_msgs.msg import PointStamped, PoseStamped
-from nav_msgs.msg import Odometry
-from rclpy.lifecycle import LifecycleNode
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
-
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.health import Health
 from fulmar_ros.qos import publisher_qos, subscriber_qos
+
+FLUSH = Duration(seconds=0.3)
 
 
 class ControllerWires:
@@ -80,6 +83,10 @@ class ControllerWires:
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""
         self._command.publish(self._write_command.write(command, stamp))
+
+    def flush(self) -> None:
+        """Wait, not for ever, until every subscriber has the last commands."""
+        self._command.wait_for_all_acked(FLUSH)
 
     def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
         """Publish the very vectors behind a command, where somebody listens."""

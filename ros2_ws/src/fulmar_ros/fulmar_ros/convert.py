@@ -11,15 +11,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PointStamped, PoseStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, JointState
+
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import from_yaw, rotate, rotate_inverse
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.odometry import OdometrySpec
 from fulmar_core.state import Pose, RigidBodyState
-from geometry_msgs.msg import PointStamped, PoseStamped
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, JointState
 
 NS = 1_000_000_000
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
@@ -38,7 +39,9 @@ def stamp_ns(stamp: Time) -> int:
 class OdometryWriter:
     """States as `odom` → `base_link` odometry."""
 
-    def __init__(self, spec: OdometrySpec | None, *, frame: str = "odom", child_frame: str = "base_link") -> None:
+    def __init__(
+        self, spec: OdometrySpec | None, *, frame: str = "odom", child_frame: str = "base_link"
+    ) -> None:
         """Fill in what never changes.
 
         Args:

@@ -30,7 +30,11 @@ class Spread:
             return {f"{name}_{key}": "" for key in ("p50", "p99", "max")}
         values = np.fromiter(self._samples, dtype=float)
         p50, p99 = np.percentile(values, (50, 99))
-        return {f"{name}_p50": f"{p50:.4f}", f"{name}_p99": f"{p99:.4f}", f"{name}_max": f"{values.max():.4f}"}
+        return {
+            f"{name}_p50": f"{p50:.4f}",
+            f"{name}_p99": f"{p99:.4f}",
+            f"{name}_max": f"{values.max():.4f}",
+        }
 
 
 class Deadlines:

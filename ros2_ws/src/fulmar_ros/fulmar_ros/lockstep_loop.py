@@ -8,15 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.errors import LockstepError
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-
 from fulmar_ros.plant_wires import PlantWires
 
 RESEND_S = 0.5
-OnStep = Callable[[Sample, np.ndarray], None]  # called with the sample after a step and the command of the step
+OnStep = Callable[
+    [Sample, np.ndarray], None
+]  # called with the sample after a step and the command of the step
 
 
 @dataclass
@@ -60,7 +62,9 @@ class LockstepLoop:
         self._answer_timeout_s = answer_timeout_s
         self.steps = 0
 
-    def run(self, sample: Sample, steps: int | None, stop: threading.Event, on_step: OnStep | None = None) -> None:
+    def run(
+        self, sample: Sample, steps: int | None, stop: threading.Event, on_step: OnStep | None = None
+    ) -> None:
         """Step until the number of steps is done or somebody stops it.
 
         Args:

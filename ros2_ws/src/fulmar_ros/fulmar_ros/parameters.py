@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 from typing import TypeVar
 
-from fulmar_core.errors import ConfigError
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+
+from fulmar_core.errors import ConfigError
 
 T = TypeVar("T")
 
@@ -44,7 +45,7 @@ def read_parameters(node: Node, cls: type[T]) -> T:
 
 def _as_number(node: Node, name: str, default: object, error: Exception) -> float:
     """A whole number where a fraction is expected, which `-p rate:=2` sends."""
-    given = node._parameter_overrides.get(name)  # noqa: SLF001 - rclpy has no public way to see a refused override
+    given = node._parameter_overrides.get(name)
     if isinstance(default, float) and isinstance(given, Parameter) and isinstance(given.value, int):
         node.declare_parameter(name, default, ignore_override=True)
         return float(given.value)

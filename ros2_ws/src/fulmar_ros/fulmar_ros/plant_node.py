@@ -8,6 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
 from fulmar_core.backend import Backend
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
 from fulmar_core.episode import WORLD, Episode, episode_rng
@@ -17,8 +19,6 @@ from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.state import planar_state
 from fulmar_core.topics import DIAGNOSTICS
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-
 from fulmar_ros.health import Health
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep, SimulatedTime
 from fulmar_ros.parameters import read_parameters
@@ -32,6 +32,7 @@ MakeBackend = Callable[[Robot, PlantSettings], Backend]
 SAFE_REPEATS = 5  # the safe command is published this often on the way out
 HEALTH_PERIOD_S = 0.1  # how soon a change is noticed
 HEALTH_AT_LEAST_S = 1.0
+SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
 
 
 class PlantNode(LifecycleNode):
@@ -71,7 +72,9 @@ class PlantNode(LifecycleNode):
         self._said_at = 0.0
         timeout_s = self.settings.timeout_s(self.robot)
         if timeout_s <= 0.0:
-            self.get_logger().warning("THE COMMAND WATCHDOG IS OFF: actuators stay as they are when a controller dies.")
+            self.get_logger().warning(
+                "THE COMMAND WATCHDOG IS OFF: actuators stay as they are when a controller dies."
+            )
             timeout_s = 1e9
         self.guard = ActuatorGuard(self.robot.actuators, Watchdog(round(timeout_s * 1e9)))
         self.clock = SimulatedTime()
@@ -100,7 +103,9 @@ class PlantNode(LifecycleNode):
             control_hz=hz,
             answer_timeout_s=self.settings.answer_timeout_s,
         )
-        self._realtime = RealtimeLoop(self.backend, self.wires, self.guard, self.clock, rate=self.settings.rate)
+        self._realtime = RealtimeLoop(
+            self.backend, self.wires, self.guard, self.clock, rate=self.settings.rate
+        )
         self.create_timer(HEALTH_PERIOD_S, self._tell_health)
         return TransitionCallbackReturn.SUCCESS
 
@@ -156,7 +161,9 @@ class PlantNode(LifecycleNode):
             world = draw_world(self.robot, self._scenario, episode_rng(self.settings.seed, 0, stream=WORLD))
             sample = self.backend.reset(start, world, seed=self.settings.seed)
             if self.settings.lockstep:
-                self._lockstep.run(sample, self._count(1.0 / self.settings.control_rate(self.robot)), self._stop)
+                self._lockstep.run(
+                    sample, self._count(1.0 / self.settings.control_rate(self.robot)), self._stop
+                )
             else:
                 self._realtime.run(sample, self._count(self.robot.timing.physics_dt), self._stop)
             self._make_safe()
@@ -171,8 +178,11 @@ class PlantNode(LifecycleNode):
         return round(self.settings.duration_s / dt) if self.settings.duration_s > 0.0 else None
 
     def _wait_for_subscribers(self) -> None:
+        if not self.settings.wait_for_subscribers:
+            return
         while self.wires.subscribers() < self.settings.wait_for_subscribers and not self._stop.wait(0.01):
             pass
+        self._stop.wait(SETTLE_S)
 
     def _fail(self, reason: str) -> None:
         self._mode, self._reason = "fault", reason
@@ -186,6 +196,7 @@ class PlantNode(LifecycleNode):
         self.backend.step(safe, 0)
         for _ in range(SAFE_REPEATS):
             self.wires.publish_applied(safe, self.clock.now_ns)
+        self.wires.flush()
 
     def _tell_health(self) -> None:
         """Publish the plant's health when something changed, and now and then."""
@@ -202,11 +213,16 @@ class PlantNode(LifecycleNode):
         if tripped:
             limit_ms = self.guard.watchdog.timeout_ns / 1e6
             level = "error"
-            message = f"no command for {silent_ms:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state"
+            message = (
+                f"no command for {silent_ms:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state"
+            )
         elif self._mode == "fault":
             level, message = "error", self._reason
         elif self.guard.last_rejection:
-            level, message = "warn", f"{self.guard.rejected} commands refused, the last: {self.guard.last_rejection}"
+            level, message = (
+                "warn",
+                f"{self.guard.rejected} commands refused, the last: {self.guard.last_rejection}",
+            )
         self._health.publish(level, message, self._values())
 
     def _values(self) -> dict[str, str]:
@@ -223,4 +239,3 @@ class PlantNode(LifecycleNode):
             **self.wires.latency_ms.percentiles("latency_ms"),
             **deadlines.period_error_ms.percentiles("period_error_ms"),
         }
-

@@ -32,7 +32,9 @@ class PlantSettings:
     def __post_init__(self) -> None:
         """Refuse values without meaning."""
         if len(self.start) != 3 or not all(math.isfinite(value) for value in self.start):
-            raise ValueError(f"start = {list(self.start)} must be three finite numbers: x [m], y [m], heading [deg].")
+            raise ValueError(
+                f"start = {list(self.start)} must be three finite numbers: x [m], y [m], heading [deg]."
+            )
         if not self.rate > 0.0:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
         if self.seed < 0:

@@ -7,20 +7,22 @@ import time
 from collections import OrderedDict
 
 import numpy as np
-from fulmar_core.backend import Sample
-from fulmar_core.robot import Robot
-from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_core.topics import ACTUATORS_STATE, CLOCK, COMMAND, IMU, ODOMETRY, TRUTH
 from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
+from fulmar_core.backend import Sample
+from fulmar_core.robot import Robot
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.topics import ACTUATORS_STATE, CLOCK, COMMAND, IMU, ODOMETRY, TRUTH
 from fulmar_ros.convert import ImuWriter, OdometryWriter, VectorWriter, stamp_ns, stamp_of
 from fulmar_ros.deadline import Spread
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
+FLUSH = Duration(seconds=0.3)
 REMEMBERED = 256  # odometry messages whose answer may still come
 
 
@@ -51,7 +53,9 @@ class PlantWires:
         self._write_truth = OdometryWriter(None, frame="map")
         self._write_imu = ImuWriter(robot)
         self._write_state = VectorWriter(robot.actuators.names)
-        node.create_subscription(JointState, COMMAND.name, self._on_command, subscriber_qos(COMMAND, reliable=True))
+        node.create_subscription(
+            JointState, COMMAND.name, self._on_command, subscriber_qos(COMMAND, reliable=True)
+        )
 
     def subscribers(self) -> int:
         """Matched subscriptions of the odometry."""
@@ -87,6 +91,10 @@ class PlantWires:
     def publish_applied(self, command: np.ndarray, time_ns: int) -> None:
         """Publish what the actuators are doing from this time on."""
         self._state.publish(self._write_state.write(command, time_ns))
+
+    def flush(self) -> None:
+        """Wait, not for ever, until every subscriber has the last states."""
+        self._state.wait_for_all_acked(FLUSH)
 
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""

@@ -6,9 +6,9 @@ import threading
 import time
 
 import numpy as np
+
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.lockstep_loop import SimulatedTime
 from fulmar_ros.plant_wires import PlantWires

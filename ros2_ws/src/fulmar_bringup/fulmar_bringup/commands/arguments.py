@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
 from fulmar_core.errors import ConfigError
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")]
@@ -46,6 +47,7 @@ def read_pose(text: str | None, option: str) -> tuple[float, float, float] | Non
         values = []
     if len(values) != 3 or not all(math.isfinite(value) for value in values):
         raise ConfigError(
-            f"{option} = '{text}' must be three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90"
+            f"{option} = '{text}' must be three finite numbers: x [m], y [m], heading [deg]. "
+            f"Example: {option} 1,-0.5,90"
         )
     return values[0], values[1], values[2]

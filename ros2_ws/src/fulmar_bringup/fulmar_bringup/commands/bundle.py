@@ -11,7 +11,9 @@ import typer
 from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
 
-bundle = typer.Typer(help="Look at policy bundles, and check them.", no_args_is_help=True, rich_markup_mode=None)
+bundle = typer.Typer(
+    help="Look at policy bundles, and check them.", no_args_is_help=True, rich_markup_mode=None
+)
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A policy bundle.")]
 
 
@@ -49,4 +51,7 @@ def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
     if as_json:
         print_json({"bundle": str(folder), "accepted": True, "sha256": passport.sha256})
     else:
-        output.print(f"{folder}: accepted ({passport.robot}, {passport.task}, {passport.control_hz:g} Hz)", markup=False)
+        output.print(
+            f"{folder}: accepted ({passport.robot}, {passport.task}, {passport.control_hz:g} Hz)",
+            markup=False,
+        )

@@ -17,7 +17,8 @@ START, GOAL, DURATION_S, RATE = (2.5, 1.5, 120.0), (0.0, 0.0, 0.0), 30.0, 2.0
 
 def demo(
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of bags and report; runs/demo_<time> by default.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of bags and report; runs/demo_<time> by default."),
     ] = None,
 ) -> None:
     """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
@@ -64,7 +65,16 @@ def demo(
 
 def _table(summaries: list[dict[str, Any]]) -> Table:
     table = Table(title="floating platform, go to pose, over ROS 2")
-    columns = ("controller", "goal", "position error", "heading error", "valves open", "rate", "latency p99", "trips")
+    columns = (
+        "controller",
+        "goal",
+        "position error",
+        "heading error",
+        "valves open",
+        "rate",
+        "latency p99",
+        "trips",
+    )
     for column in columns:
         table.add_column(column, justify="left" if column in ("controller", "goal") else "right")
     for s in summaries:

@@ -8,9 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.metrics import Trajectories
 from rich.table import Table
 
 from fulmar_bringup.commands.arguments import (
@@ -25,6 +22,9 @@ from fulmar_bringup.commands.arguments import (
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.errors import UnknownNameError
+from fulmar_core.metrics import Trajectories
 
 WAYS = ("batch", "mujoco", "ros")
 Progress = Callable[[int], None]
@@ -56,15 +56,13 @@ def evaluate(
     for its whole closing window.
 
     Example:
-
         fulmar evaluate floating_platform go_to_pose --controller lqr --through ros --episodes 256
     """
+    from fulmar_bringup.planning import checked_policy, checked_rate
+    from fulmar_bringup.system import check_names
     from fulmar_core.metrics import summary
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
-
-    from fulmar_bringup.planning import checked_policy, checked_rate
-    from fulmar_bringup.system import check_names
 
     if through not in WAYS:
         raise UnknownNameError("way", through, WAYS)
@@ -149,12 +147,16 @@ def _controller(plan: RunPlan) -> Controller:
 
 
 def _print(figures: dict[str, Any]) -> None:
-    table = Table(title=f"{figures['robot']} · {figures['task']} · {figures['controller']} · {figures['scenario']}")
+    table = Table(
+        title=f"{figures['robot']} · {figures['task']} · {figures['controller']} · {figures['scenario']}"
+    )
     for column in ("", "mean", "median", "p95"):
         table.add_column(column, justify="left" if not column else "right")
     for name, value in figures.items():
         if isinstance(value, dict):
-            numbers = ("–" if value[key] is None else f"{value[key]:.3f}" for key in ("mean", "median", "p95"))
+            numbers = (
+                "–" if value[key] is None else f"{value[key]:.3f}" for key in ("mean", "median", "p95")
+            )
             table.add_row(name, *numbers)
     output.print(table)
     output.print(

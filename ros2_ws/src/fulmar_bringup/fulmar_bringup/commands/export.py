@@ -25,4 +25,6 @@ def export(
 
     passport = write(run, out)
     Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
-    output.print(f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · {passport.sha256[:12]}")
+    output.print(
+        f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · {passport.sha256[:12]}"
+    )

@@ -5,18 +5,19 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.paths import config_names
 
 from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
+from fulmar_core.errors import UnknownNameError
+from fulmar_core.paths import config_names
 
 FAMILIES = ("robots", "tasks", "controllers", "systems", "policies")
 
 
 def list_names(
     family: Annotated[
-        str | None, typer.Argument(metavar="[robots|tasks|controllers|systems|policies]", help="All by default.")
+        str | None,
+        typer.Argument(metavar="[robots|tasks|controllers|systems|policies]", help="All by default."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -37,11 +38,10 @@ def list_names(
 
 def _entries(family: str) -> dict[str, str]:
     """Names and titles of one family."""
+    from fulmar_bringup.system import CONTROLLERS, load_system
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from policy_server.shipped import shipped_policies
-
-    from fulmar_bringup.system import CONTROLLERS, load_system
 
     if family == "robots":
         return {name: load_robot(name).title for name in config_names("robots")}
@@ -54,4 +54,7 @@ def _entries(family: str) -> dict[str, str]:
     return {name: CONTROLLER_TITLES[name] for name in CONTROLLERS}
 
 
-CONTROLLER_TITLES = {"policy": "a learned policy bundle", "lqr": "linear-quadratic regulator with valve allocation"}
+CONTROLLER_TITLES = {
+    "policy": "a learned policy bundle",
+    "lqr": "linear-quadratic regulator with valve allocation",
+}

@@ -13,7 +13,8 @@ from fulmar_bringup.console import console, output
 def report(
     bags: Annotated[list[Path], typer.Argument(metavar="BAG...", help="Bags of runs; several are compared.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="An .html page or a .png picture; beside the bag by default.")
+        Path | None,
+        typer.Option(metavar="FILE", help="An .html page or a .png picture; beside the bag by default."),
     ] = None,
 ) -> None:
     """Make a report with pictures from recorded runs."""

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from fulmar_core.errors import ConfigError
 
 from fulmar_bringup.commands.arguments import (
     ControllerOption,
@@ -21,6 +20,7 @@ from fulmar_bringup.commands.arguments import (
     read_pose,
 )
 from fulmar_bringup.console import console, output, print_json
+from fulmar_core.errors import ConfigError
 
 
 def run(
@@ -36,7 +36,8 @@ def run(
         str | None, typer.Option(metavar="x,y,deg", help="Where to begin; drawn from the seed by default.")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", min=0.1, help="Simulated seconds; the task's episode by default.")
+        float | None,
+        typer.Option(metavar="S", min=0.1, help="Simulated seconds; the task's episode by default."),
     ] = None,
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="As fast as it goes; one seed gives the same bytes.")
@@ -60,7 +61,6 @@ def run(
     when the time is up. The exit code is 0 if the goal was met, 1 if not or if anything failed.
 
     Examples:
-
         fulmar run floating_platform --controller lqr --goal 0,0,0 --start 3,1,90
 
         fulmar run floating_platform --task go_to_pose --controller policy --lockstep --seed 7
@@ -117,4 +117,3 @@ def verdict(summary: dict[str, Any]) -> str:
         )
     lines.append(f"  recorded in {summary['bag']}; look at it with: fulmar report {summary['bag']}")
     return "\n".join(lines)
-

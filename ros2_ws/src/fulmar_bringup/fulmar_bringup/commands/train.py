@@ -35,7 +35,6 @@ def train(
     curve and TensorBoard logs; `fulmar export` makes a policy bundle of it.
 
     Example:
-
         fulmar train floating_platform go_to_pose --seed 3 --out runs/train/mine
     """
     from fulmar_core.robot import load_robot

@@ -92,7 +92,9 @@ class Lqr:
 
     name = "lqr"
 
-    def __init__(self, robot: Robot, task: Task, weights: LqrWeights, *, control_hz: float | None = None) -> None:
+    def __init__(
+        self, robot: Robot, task: Task, weights: LqrWeights, *, control_hz: float | None = None
+    ) -> None:
         """Solve for the gain and list the valve combinations.
 
         Args:
@@ -110,12 +112,16 @@ class Lqr:
         q = [weights.position] * 2 + [weights.heading if self._heads else 0.0]
         q += [weights.velocity] * 2 + [weights.yaw_rate]
         r = dt * np.diag([weights.force, weights.force, weights.torque])
-        used = [0, 1, 2, 3, 4, 5] if self._heads else [0, 1, 3, 4, 5]  # a heading without a goal is not a state
+        used = (
+            [0, 1, 2, 3, 4, 5] if self._heads else [0, 1, 3, 4, 5]
+        )  # a heading without a goal is not a state
         a, b = a[np.ix_(used, used)], b[used]
         p = solve_discrete_are(a, b, dt * np.diag(np.array(q)[used]), r)
         hessian = r + b.T @ p @ b
         self._gain = np.linalg.solve(hessian, b.T @ p @ a)
-        self._allocation = ValveAllocation(robot.actuators, weight=hessian, valve_cost=dt * weights.open_valve)
+        self._allocation = ValveAllocation(
+            robot.actuators, weight=hessian, valve_cost=dt * weights.open_valve
+        )
         self._column = {name: i for i, name in enumerate(self.observation_names)}
 
     def reset(self) -> None:
@@ -127,7 +133,10 @@ class Lqr:
 
     def _error_state(self, observation: np.ndarray) -> np.ndarray:
         """State minus goal in the body frame, with far errors cut to the limits."""
-        term = lambda name: observation[..., self._column[name]]  # noqa: E731
+
+        def term(name: str) -> np.ndarray:
+            return np.asarray(observation[..., self._column[name]])
+
         to_goal = np.stack((term("goal_x_in_body"), term("goal_y_in_body")), axis=-1)
         distance = np.linalg.norm(to_goal, axis=-1, keepdims=True)
         limit = self._weights.position_error_limit
@@ -172,4 +181,5 @@ def load_lqr(robot: Robot, task: Task, *, control_hz: float | None = None) -> Lq
     try:
         return Lqr(robot, task, weights, control_hz=control_hz)
     except ValueError as error:
-        raise ConfigError(f"LQR for '{robot.name}' at {control_hz:g} Hz: {error}") from error
+        hz = control_hz or robot.timing.control_hz
+        raise ConfigError(f"LQR for '{robot.name}' at {hz:g} Hz: {error}") from error

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from array_api_compat import array_namespace
+from array_api_compat import array_namespace, device
 
 from fulmar_core.rotation import Array, cross, from_rotation_vector, multiply, rotate, rotate_inverse
 from fulmar_core.state import RigidBodyState
@@ -62,8 +62,9 @@ def step(
     position, quat = state.position_in_world, state.quat_xyzw
     velocity, omega = state.velocity_in_world, state.angular_velocity_in_body
     if planar:
-        in_plane = xp.asarray([1.0, 1.0, 0.0], dtype=force_in_body.dtype)
-        about_z = xp.asarray([0.0, 0.0, 1.0], dtype=force_in_body.dtype)
+        kind = {"dtype": force_in_body.dtype, "device": device(force_in_body)}
+        in_plane = xp.asarray([1.0, 1.0, 0.0], **kind)
+        about_z = xp.asarray([0.0, 0.0, 1.0], **kind)
         acceleration_from_outside = acceleration_from_outside * in_plane
         specific_force = specific_force * in_plane
         angular_acceleration = about_z * (torque_in_body + disturbance.torque_in_world) / body.inertia

@@ -38,7 +38,9 @@ class ActuatorGuard:
             Whether it was taken.
         """
         command = np.asarray(values, dtype=float)
-        problem = name_problem(names, self._actuators.names) or command_problem(command, len(self._actuators.names))
+        problem = name_problem(names, self._actuators.names) or command_problem(
+            command, len(self._actuators.names)
+        )
         if problem:
             self.rejected += 1
             self.last_rejection = problem

@@ -62,13 +62,17 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
     if age_ns > flags.input_timeout_ns:
         cause = f" ({flags.input_problem})" if flags.input_problem else ""
         limit = flags.input_timeout_ns / 1e6
-        return Decision(Mode.ARMED, False, f"no usable odom for {age_ns / 1e6:.0f} ms (limit {limit:.0f} ms){cause}")
+        return Decision(
+            Mode.ARMED, False, f"no usable odom for {age_ns / 1e6:.0f} ms (limit {limit:.0f} ms){cause}"
+        )
     if flags.input_problem:
         return Decision(Mode.ARMED, False, flags.input_problem)
     if not flags.has_goal:
         return Decision(Mode.ARMED, False, "no goal yet")
-    if flags.goal_distance > flags.geofence:
+    if not flags.goal_distance <= flags.geofence:  # so that a distance that is not a number is beyond it too
         return Decision(
-            Mode.ARMED, False, f"goal is {flags.goal_distance:.1f} m away, beyond the geofence of {flags.geofence:g} m"
+            Mode.ARMED,
+            False,
+            f"goal is {flags.goal_distance:.1f} m away, beyond the geofence of {flags.geofence:g} m",
         )
     return Decision(Mode.ACTIVE, True, "")

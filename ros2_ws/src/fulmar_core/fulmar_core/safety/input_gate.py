@@ -61,11 +61,18 @@ class InputGate:
 
     def _frame_problem(self, measurement: Measurement) -> str | None:
         if measurement.frame != "odom" or measurement.child_frame != "base_link":
-            return f"odom is '{measurement.frame}' → '{measurement.child_frame}', must be 'odom' → 'base_link'"
+            return (
+                f"odom is '{measurement.frame}' → '{measurement.child_frame}', must be 'odom' → 'base_link'"
+            )
         return None
 
     def _value_problem(self, state: RigidBodyState) -> str | None:
-        parts = (state.position_in_world, state.quat_xyzw, state.velocity_in_world, state.angular_velocity_in_body)
+        parts = (
+            state.position_in_world,
+            state.quat_xyzw,
+            state.velocity_in_world,
+            state.angular_velocity_in_body,
+        )
         if not all(np.isfinite(part).all() for part in parts):
             return "odom holds a value that is not finite"
         norm = float(np.linalg.norm(state.quat_xyzw))
@@ -76,7 +83,9 @@ class InputGate:
             return f"odom speed {speed:.2f} m/s is beyond the possible {self._limits.speed:g} m/s"
         yaw_rate = abs(float(state.angular_velocity_in_body[2]))
         if yaw_rate > self._limits.yaw_rate:
-            return f"odom yaw rate {yaw_rate:.2f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
+            return (
+                f"odom yaw rate {yaw_rate:.2f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
+            )
         return None
 
     def _frozen_problem(self, measurement: Measurement) -> str | None:
@@ -90,4 +99,6 @@ class InputGate:
 
 
 def _same(a: RigidBodyState, b: RigidBodyState) -> bool:
-    return np.array_equal(a.position_in_world, b.position_in_world) and np.array_equal(a.quat_xyzw, b.quat_xyzw)
+    return np.array_equal(a.position_in_world, b.position_in_world) and np.array_equal(
+        a.quat_xyzw, b.quat_xyzw
+    )

@@ -43,7 +43,9 @@ def measure_odometry(truth: RigidBodyState, spec: OdometrySpec, rng: np.random.G
         Measured state of the same shape and floating type.
     """
     dtype = truth.position_in_world.dtype
-    noise = rng.standard_normal((*truth.position_in_world.shape[:-1], 12), dtype=np.float32).astype(dtype, copy=False)
+    noise = rng.standard_normal((*truth.position_in_world.shape[:-1], 12), dtype=np.float32).astype(
+        dtype, copy=False
+    )
     scale = np.asarray(
         (*spec.position_std, *spec.rotation_std, *spec.velocity_std, *spec.angular_velocity_std), dtype=dtype
     )

@@ -31,5 +31,7 @@ def load_task(name: str) -> Task:
     path = config_path("tasks", name)
     task = cast(Task, load_config(Task, path))  # type: ignore[arg-type]
     if task.name != name:
-        raise ConfigError(f"{path}: 'name' is '{task.name}', the file's own name is '{name}'. Make them equal.")
+        raise ConfigError(
+            f"{path}: 'name' is '{task.name}', the file's own name is '{name}'. Make them equal."
+        )
     return task

@@ -52,7 +52,12 @@ class GoToPose:
     reward_weights: PoseReward
 
     goal_topic: ClassVar[str] = "goal_pose"
-    observation_names: ClassVar[tuple[str, ...]] = (*POSITION_TERMS, *HEADING_TERMS, *MOTION_TERMS, *FINE_TERMS)
+    observation_names: ClassVar[tuple[str, ...]] = (
+        *POSITION_TERMS,
+        *HEADING_TERMS,
+        *MOTION_TERMS,
+        *FINE_TERMS,
+    )
 
     def observe(self, state: RigidBodyState, goal: Pose) -> Array:
         """What every controller of this task sees, in training and on the robot.

@@ -62,7 +62,9 @@ class GoToPosition:
         """
         xp = array_namespace(state.position_in_world)
         offset = goal_in_body(state, goal)
-        return xp.concat((offset, motion_terms(state), fine_terms(offset, saturation=self.fine_distance)), axis=-1)
+        return xp.concat(
+            (offset, motion_terms(state), fine_terms(offset, saturation=self.fine_distance)), axis=-1
+        )
 
     def reward(self, before: RigidBodyState, after: RigidBodyState, goal: Pose, command: Array) -> Array:
         """Reward of one control step; arguments and shape as in `GoToPose.reward`."""

@@ -31,7 +31,9 @@ class Start:
         """Refuse empty spans."""
         for low, high in (self.distance, self.training_distance):
             if not 0.0 <= low <= high:
-                raise ValueError(f"distances must be [low, high] with 0 <= low <= high, found [{low}, {high}].")
+                raise ValueError(
+                    f"distances must be [low, high] with 0 <= low <= high, found [{low}, {high}]."
+                )
         if self.goal_area < 0.0:
             raise ValueError("'goal_area' must not be negative.")
 
@@ -49,7 +51,9 @@ class Start:
         goal_x, goal_y = rng.uniform(-0.5 * self.goal_area, 0.5 * self.goal_area, 2)
         goal_yaw, bearing, yaw = rng.uniform(-math.pi, math.pi, 3)
         distance = rng.uniform(low, high)
-        start = planar_state(goal_x + distance * math.cos(bearing), goal_y + distance * math.sin(bearing), yaw)
+        start = planar_state(
+            goal_x + distance * math.cos(bearing), goal_y + distance * math.sin(bearing), yaw
+        )
         return start, planar_pose(goal_x, goal_y, goal_yaw)
 
 
@@ -79,7 +83,9 @@ def planar_error(state: RigidBodyState, goal: Pose) -> PlanarError:
     """Errors of a state against a goal, in the plane."""
     xp = array_namespace(state.position_in_world)
     offset = (goal.position_in_world - state.position_in_world)[..., 0:2]
-    return PlanarError(xp.sqrt(xp.sum(offset * offset, axis=-1)), wrap_angle(yaw_of(goal.quat_xyzw) - state.yaw))
+    return PlanarError(
+        xp.sqrt(xp.sum(offset * offset, axis=-1)), wrap_angle(yaw_of(goal.quat_xyzw) - state.yaw)
+    )
 
 
 def goal_in_body(state: RigidBodyState, goal: Pose) -> Array:

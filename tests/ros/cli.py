@@ -1,0 +1,75 @@
+"""Running `fulmar` as a person does, in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+FULMAR = [sys.executable, "-m", "fulmar_bringup.cli"]
+
+
+def fulmar(
+    *arguments: str, env: dict[str, str], cwd: Path, timeout_s: float = 90.0
+) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    return subprocess.run(
+        [*FULMAR, *arguments],
+        env=env,
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def start_fulmar(*arguments: str, env: dict[str, str], cwd: Path) -> psutil.Popen:
+    """Start a command in the background."""
+    return psutil.Popen(
+        [*FULMAR, *arguments],
+        env=env,
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def child_running(parent: psutil.Popen, module: str, timeout_s: float = 30.0) -> psutil.Process:
+    """The child of a run that runs a module, as soon as it is there."""
+    until = time.monotonic() + timeout_s
+    while time.monotonic() < until:
+        for child in parent.children(recursive=True):
+            if module in child.cmdline():
+                return child
+        time.sleep(0.05)
+    raise AssertionError(f"no child runs {module}")
+
+
+def wait_for_messages(bag: Path, size: int, timeout_s: float = 40.0) -> None:
+    """Wait until a bag has grown to a size: the run is under way."""
+    until = time.monotonic() + timeout_s
+    while time.monotonic() < until:
+        if sum(path.stat().st_size for path in bag.glob("*.mcap")) >= size:
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{bag} did not grow to {size} bytes")
+
+
+def json_of(output: str) -> dict[str, Any]:
+    """The one JSON object that standard output must be."""
+    return dict(json.loads(output))
+
+
+def nothing_left(children: list[psutil.Process], timeout_s: float = 10.0) -> bool:
+    """Whether every one of these processes ends in time."""
+    _, alive = psutil.wait_procs(children, timeout=timeout_s)
+    return not alive

@@ -1,0 +1,166 @@
+"""Whole runs: plant, controller and recorder as processes, started and judged by `fulmar run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from fulmar_bringup.bag_reader import read_run
+from tests.conftest import RosDomain
+from tests.ros.cli import fulmar, json_of
+
+REQUIRED = {
+    "robot",
+    "task",
+    "controller",
+    "backend",
+    "steps",
+    "duration_s",
+    "final_position_error_m",
+    "final_heading_error_deg",
+    "success",
+    "control_rate_hz",
+    "latency_ms",
+    "overruns",
+    "watchdog_trips",
+    "bag",
+}
+
+
+def command_bytes(bag: Path) -> list[bytes]:
+    """Every command in a bag, as it was on the wire."""
+    (file,) = bag.glob("*.mcap")
+    with file.open("rb") as stream:
+        messages = make_reader(stream).iter_messages()
+        return [
+            message.data for _, channel, message in messages if channel.topic.endswith("actuators/command")
+        ]
+
+
+@pytest.mark.parametrize("controller", ["policy", "lqr"])
+def test_a_lockstep_run_reaches_its_goal_and_says_so_in_json(
+    controller: str, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """The very command of the README, with the figures that outside checks read."""
+    asked = (
+        "floating_platform",
+        "--task",
+        "go_to_pose",
+        "--controller",
+        controller,
+        "--lockstep",
+        "--seed",
+        "7",
+    )
+    done = fulmar(
+        "run", *asked, "--control-hz", "5", "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    summary = json_of(done.stdout)
+    assert summary.keys() >= REQUIRED
+    assert summary["success"]
+    assert summary["steps"] == 250
+    assert summary["duration_s"] == pytest.approx(50.0)
+    assert (tmp_path / "bag" / "metadata.yaml").is_file()
+
+
+def test_two_lockstep_runs_with_one_seed_give_the_same_command_bytes(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """Lock step leaves nothing to chance."""
+    for name in ("one", "two"):
+        asked = (
+            "floating_platform",
+            "--controller",
+            "policy",
+            "--lockstep",
+            "--seed",
+            "7",
+            "--duration",
+            "10",
+        )
+        fulmar("run", *asked, "--record", name, env=ros_domain.env, cwd=tmp_path)
+    one, two = command_bytes(tmp_path / "one"), command_bytes(tmp_path / "two")
+    assert len(one) >= 50
+    assert one == two
+
+
+def test_the_mock_backend_runs_without_mujoco(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """The same nodes on the core's own dynamics."""
+    asked = (
+        "floating_platform",
+        "--controller",
+        "lqr",
+        "--backend",
+        "mock",
+        "--lockstep",
+        "--control-hz",
+        "5",
+    )
+    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_go_to_position_runs_on_its_own_goal_topic(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """`goal_point` instead of `goal_pose`."""
+    asked = ("floating_platform", "--task", "go_to_position", "--controller", "lqr", "--lockstep")
+    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_missed_goal_is_exit_code_one_and_no_failure(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """Two seconds do not suffice for three metres."""
+    asked = ("floating_platform", "--controller", "lqr", "--lockstep", "--duration", "2")
+    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 1
+    summary = json_of(done.stdout)
+    assert summary["success"] is False
+    assert summary["failure"] is None
+
+
+def test_a_realtime_run_holds_its_rate_and_records_every_wire(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """Rate and figures of a real-time run; how punctual it was is for an idle machine to say."""
+    asked = (
+        "floating_platform",
+        "--controller",
+        "policy",
+        "--start",
+        "0.2,0,0",
+        "--goal",
+        "0,0,0",
+        "--duration",
+        "8",
+    )
+    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    summary = json_of(done.stdout)
+    assert summary["failure"] is None, done.stderr
+    assert summary["control_rate_hz"] == pytest.approx(5.0, rel=0.02)
+    assert summary["period_error_ms"]["p99"] is not None
+    assert summary["watchdog_trips"] == 0
+    record = read_run(tmp_path / "bag")
+    assert not record.warnings
+    assert len(record.truth.stamp_s) == pytest.approx(401, abs=2)  # 8 s at 50 Hz and the first
+    assert record.controller["sha256"]
+
+
+def test_evaluation_through_ros_agrees_with_mujoco_alone(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """The same episodes, the same simulator, the same law: ROS in between must not change the verdict."""
+    asked = (
+        "evaluate",
+        "floating_platform",
+        "go_to_pose",
+        "--controller",
+        "lqr",
+        "--episodes",
+        "4",
+        "--json",
+    )
+    through_ros, alone = (
+        json_of(fulmar(*asked, "--through", way, env=ros_domain.env, cwd=tmp_path).stdout)
+        for way in ("ros", "mujoco")
+    )
+    assert through_ros["success_rate"] == alone["success_rate"] == 1.0
+    assert through_ros["PT5_percent"] == alone["PT5_percent"]
+    assert through_ros["AAS"] == alone["AAS"]
