@@ -23,7 +23,7 @@ def test_a_body_without_mass_or_size_is_refused(change):
 
 
 def test_a_moment_of_inertia_beyond_the_sum_of_the_others_is_refused():
-    with pytest.raises(ValueError, match="no body has a moment greater than the sum"):
+    with pytest.raises(ValueError, match="no body has a moment beyond the sum"):
         replace(ROBOT.body, inertia=(0.1, 0.1, 0.5))
 
 

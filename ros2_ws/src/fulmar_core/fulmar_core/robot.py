@@ -31,7 +31,7 @@ class Body:
             raise ValueError("mass, inertia, radius and height must be greater than 0.")
         if 2.0 * max(self.inertia) > sum(self.inertia) * (1.0 + 1e-9):
             raise ValueError(
-                f"'inertia' = {list(self.inertia)}: no body has a moment greater than the sum of the two others."
+                f"'inertia' = {list(self.inertia)}: no body has a moment beyond the sum of the two others."
             )
 
 
