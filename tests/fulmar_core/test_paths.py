@@ -42,7 +42,7 @@ def test_a_family_without_a_folder_has_no_names(own_configs):
 
 
 def test_an_unknown_name_gets_the_nearest_one(own_configs):
-    with pytest.raises(UnknownNameError, match="unknown robot 'zebar'. Did you mean 'zebra'?") as caught:
+    with pytest.raises(UnknownNameError, match=r"^unknown robot 'zebar'\. Did you mean 'zebra'\?$") as caught:
         config_path("robots", "zebar")
     assert caught.value.known == ["ant", "zebra"]
 

@@ -1,0 +1,78 @@
+"""The last word before the actuators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fulmar_core.robot import load_robot
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.watchdog import Watchdog
+
+THRUSTERS = load_robot("floating_platform").actuators
+NAMES = THRUSTERS.names
+MS = 1_000_000
+GOOD = [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.fixture
+def guard():
+    return ActuatorGuard(THRUSTERS, Watchdog(200 * MS))
+
+
+def test_before_any_command_the_valves_are_closed(guard):
+    assert not guard.output(0).any()
+
+
+def test_a_good_command_is_applied_until_the_watchdog_ends_it(guard):
+    assert guard.offer(NAMES, GOOD, 0)
+    assert guard.output(200 * MS).tolist() == GOOD
+    assert guard.output(201 * MS).tolist() == [0.0] * 8
+    assert guard.watchdog.trips == 1
+
+
+def test_commands_are_limited_before_they_are_applied(guard):
+    guard.offer(NAMES, [0.7, -4.0, 0.2, 9.0, 0.5, 0.0, 0.0, 0.0], 0)
+    assert guard.output(0).tolist() == GOOD
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "reason"),
+    [
+        (NAMES[::-1], GOOD, "command names 'thruster_8' as actuator 1"),
+        (NAMES[:-1], GOOD[:-1], "command names 7 actuators"),
+        (NAMES, GOOD[:-1], "command has shape (7,)"),
+        (NAMES, [], "command has shape (0,)"),
+        (NAMES, [*GOOD[:-1], float("nan")], "command for actuator 8 is not finite"),
+    ],
+)
+def test_a_refused_command_is_counted_and_leaves_the_last_one_in_place(guard, names, values, reason):
+    guard.offer(NAMES, GOOD, 0)
+    assert not guard.offer(names, values, 50 * MS)
+    assert guard.output(60 * MS).tolist() == GOOD
+    assert guard.rejected == 1
+    assert reason in guard.last_rejection
+
+
+def test_a_refused_command_does_not_feed_the_watchdog(guard):
+    guard.offer(NAMES, GOOD, 0)
+    for t in range(10, 300, 10):
+        guard.offer(NAMES, [float("nan")] * 8, t * MS)
+    assert not guard.output(300 * MS).any()
+    assert guard.watchdog.tripped
+
+
+def test_after_a_silence_the_old_command_does_not_come_back(guard):
+    guard.offer(NAMES, GOOD, 0)
+    assert not guard.output(500 * MS).any()
+    guard.offer(NAMES, [float("nan")] * 8, 510 * MS)
+    assert not guard.output(511 * MS).any()
+    guard.offer(NAMES, GOOD[::-1], 520 * MS)
+    assert guard.output(521 * MS).tolist() == GOOD[::-1]
+
+
+def test_what_the_caller_does_with_his_list_later_does_not_matter(guard):
+    values = np.array(GOOD)
+    guard.offer(NAMES, values, 0)
+    values[:] = 1.0
+    assert guard.output(1).tolist() == GOOD

@@ -1,0 +1,94 @@
+"""Only believable, fresh measurements pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.robot import Limits
+from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
+from fulmar_core.state import RigidBodyState, planar_state
+
+LIMITS = Limits(geofence=8.0, speed=2.0, yaw_rate=6.0)
+
+
+def measurement(stamp_ns=1, x=0.0, **changes):
+    return replace(Measurement(stamp_ns, "odom", "base_link", planar_state(x, 0.0, 0.0)), **changes)
+
+
+def state(**changes) -> RigidBodyState:
+    return replace(planar_state(0.0, 0.0, 0.0), **changes)
+
+
+def test_a_plain_measurement_passes():
+    gate = InputGate(LIMITS)
+    assert [gate.problem(measurement(i, x=0.1 * i)) for i in range(1, 30)] == [None] * 29
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        ({"frame": "map"}, "odom is 'map' → 'base_link', must be 'odom' → 'base_link'"),
+        ({"child_frame": "imu_link"}, "odom is 'odom' → 'imu_link'"),
+        ({"state": state(position_in_world=np.array([0.0, np.nan, 0.0]))}, "not finite"),
+        ({"state": state(quat_xyzw=np.array([0.0, 0.0, np.inf, 1.0]))}, "not finite"),
+        ({"state": state(velocity_in_world=np.array([np.nan, 0.0, 0.0]))}, "not finite"),
+        ({"state": state(angular_velocity_in_body=np.array([0.0, 0.0, np.nan]))}, "not finite"),
+        ({"state": state(quat_xyzw=np.zeros(4))}, "quaternion has norm 0.000, must be 1"),
+        ({"state": state(quat_xyzw=np.array([0.0, 0.0, 0.0, 1.02]))}, "quaternion has norm 1.020"),
+        (
+            {"state": planar_state(0.0, 0.0, 0.0, vx=1.5, vy=1.5)},
+            "speed 2.12 m/s is beyond the possible 2 m/s",
+        ),
+        (
+            {"state": planar_state(0.0, 0.0, 0.0, yaw_rate=-6.1)},
+            "yaw rate 6.10 rad/s is beyond the possible 6 rad/s",
+        ),
+    ],
+)
+def test_an_unbelievable_measurement_is_refused_with_its_reason(wrong, reason):
+    assert reason in (InputGate(LIMITS).problem(measurement(**wrong)) or "")
+
+
+def test_values_at_the_limits_pass():
+    at_limits = planar_state(0.0, 0.0, 0.0, vx=2.0, yaw_rate=6.0)
+    assert InputGate(LIMITS).problem(measurement(state=at_limits)) is None
+
+
+@pytest.mark.parametrize(
+    ("stamp", "reason"), [(5_000_000, "went back by 5 ms"), (10_000_000, "did not advance")]
+)
+def test_stamps_have_to_advance(stamp, reason):
+    gate = InputGate(LIMITS)
+    gate.problem(measurement(10_000_000))
+    assert reason in (gate.problem(measurement(stamp, x=1.0)) or "")
+
+
+def test_a_refused_measurement_does_not_become_the_last_one():
+    gate = InputGate(LIMITS)
+    gate.problem(measurement(10))
+    gate.problem(measurement(99, frame="map"))
+    assert gate.problem(measurement(11, x=1.0)) is None
+
+
+def test_a_sensor_that_repeats_itself_is_stuck_until_it_changes():
+    gate = InputGate(LIMITS)
+    reasons = [gate.problem(measurement(i)) for i in range(1, FROZEN_AFTER + 3)]
+    assert reasons[:FROZEN_AFTER] == [None] * FROZEN_AFTER
+    assert reasons[FROZEN_AFTER] == f"odom has not changed for {FROZEN_AFTER} messages: the sensor is stuck"
+    assert reasons[-1] is not None
+    assert gate.problem(measurement(100, x=0.001)) is None
+
+
+def test_where_the_sensor_is_noiseless_repetition_is_no_fault():
+    gate = InputGate(LIMITS, frozen_after=0)
+    assert not any(gate.problem(measurement(i)) for i in range(1, 50))
+
+
+def test_after_forgetting_time_may_start_anew():
+    gate = InputGate(LIMITS)
+    gate.problem(measurement(10**9))
+    gate.forget()
+    assert gate.problem(measurement(1, x=1.0)) is None
