@@ -6,6 +6,7 @@ PT, OT, ALV, AAV and AAS are the figures of DRIFT (thesis Table 3.5) as defined 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -109,12 +110,12 @@ def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     return figures
 
 
-def summary(run: Trajectories, task: Task) -> dict[str, object]:
+def summary(run: Trajectories, task: Task) -> dict[str, Any]:
     """Success rate, and mean, median and 95th percentile of every figure, JSON-ready.
 
     Figures that no episode has (the time to a target that was never reached) are None.
     """
-    statistics: dict[str, object] = {
+    statistics: dict[str, Any] = {
         "episodes": int(run.position_error.shape[0]),
         "success_rate": float(np.mean(successes(run, task))),
     }

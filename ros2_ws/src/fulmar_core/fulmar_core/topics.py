@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Source = Literal["plant", "controller", "operator"]
+Source = Literal["plant", "controller", "operator", "every node"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
 
@@ -116,7 +116,7 @@ STATUS = Wire(
 DIAGNOSTICS = Wire(
     "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
-    "plant",
+    "every node",
     "stream",
     "on change and at least 1 Hz",
     "health of each node: `<robot>: plant`, `<robot>: controller`",

@@ -38,17 +38,20 @@ STATUS_PERIOD_S = 0.4  # at least 2 Hz
 class ControllerNode(LifecycleNode):
     """Turns odometry and a goal into commands, by the clock or in lock step with a simulator."""
 
-    def __init__(self, make_controller: MakeController, request_exit: RequestExit) -> None:
+    def __init__(
+        self, make_controller: MakeController, request_exit: RequestExit, *, cli_args: list[str] | None = None
+    ) -> None:
         """Read the parameters and, unless told otherwise, start.
 
         Args:
             make_controller: Loads the controller; called at configuration.
             request_exit: Ends the process.
+            cli_args: ROS arguments of this node alone, where it shares a process.
 
         Raises:
             FulmarError: If a parameter, a configuration file or a policy is wrong.
         """
-        super().__init__("controller")
+        super().__init__("controller", cli_args=cli_args)
         self.settings = read_parameters(self, ControllerSettings)
         self.robot = load_robot(self.settings.robot)
         self.task = load_task(self.settings.task)
