@@ -173,7 +173,7 @@ def _judge_of(robot: Robot, task: Task, scenario: Scenario) -> Judge:
             for world in worlds
         ]
         success = _mean(figures, "success_rate")
-        return success, success + 0.5 * _mean(figures, "PT2_percent") / 100.0 - 0.5 * _mean(figures, "AAS")
+        return success, success + 0.5 * _mean(figures, "PT2_percent") / 100.0 - _mean(figures, "AAS")
 
     return judge
 
