@@ -10,7 +10,7 @@ import numpy as np
 import onnxruntime
 
 from fulmar_core.errors import BundleError
-from fulmar_core.policy_bundle import NETWORK, Passport, check_fit, read_golden, read_passport
+from fulmar_core.policy_bundle import GOLDEN, NETWORK, Passport, check_fit, read_golden, read_passport
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
@@ -44,7 +44,7 @@ class Policy:
         self.observation_names = self.passport.observation_names
         self._session = _open(folder)
         _check_shapes(self._session, self.passport, folder)
-        _check_golden(self._session, folder)
+        _check_golden(self._session, self.passport, folder)
 
     def reset(self) -> None:
         """Nothing to forget: the network has no memory."""
@@ -76,8 +76,8 @@ def _open(folder: Path) -> onnxruntime.InferenceSession:
 
 
 def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:
-    inputs = {node.name: node.shape for node in session.get_inputs()}
-    outputs = {node.name: node.shape for node in session.get_outputs()}
+    inputs = {node.name: node for node in session.get_inputs()}
+    outputs = {node.name: node for node in session.get_outputs()}
     wanted = (
         (inputs, "observation", len(passport.observation_names)),
         (outputs, "command", len(passport.actuator_names)),
@@ -86,16 +86,37 @@ def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, fol
     for found, name, width in wanted:
         if name not in found:
             raise BundleError(f"{folder / NETWORK}: has no tensor '{name}', only {', '.join(found)}.")
-        if len(found[name]) != 2 or found[name][1] != width:
+        shape, kind = found[name].shape, found[name].type
+        if len(shape) != 2 or isinstance(shape[0], int) or shape[1] != width:
             raise BundleError(
-                f"{folder / NETWORK}: '{name}' has shape {found[name]}, the passport's names need (worlds, {width})."
+                f"{folder / NETWORK}: '{name}' has shape {shape}, the passport's names need (any number, {width})."
             )
+        if kind != "tensor(float)":
+            raise BundleError(f"{folder / NETWORK}: '{name}' is a {kind}, it must be a tensor(float).")
+    if len(inputs) > 1:
+        raise BundleError(f"{folder / NETWORK}: takes {', '.join(inputs)}; it must take 'observation' alone.")
 
 
-def _check_golden(session: onnxruntime.InferenceSession, folder: Path) -> None:
+def _check_golden(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:
     golden = read_golden(folder)
-    command, logits = session.run(["command", "logits"], {"observation": golden.observations})
-    worst = float(np.max(np.abs(logits - golden.logits))) if golden.logits.size else float("inf")
+    count = len(golden.observations) if golden.observations.ndim else 0
+    for name, width in (
+        ("observations", len(passport.observation_names)),
+        ("commands", len(passport.actuator_names)),
+        ("logits", len(passport.actuator_names)),
+    ):
+        found = getattr(golden, name)
+        if count == 0 or found.shape != (count, width) or found.dtype != np.float32:
+            raise BundleError(
+                f"{folder / GOLDEN}: '{name}' is {found.dtype} of shape {found.shape}, it must be float32 of shape "
+                f"({count or 'at least 1'}, {width}). Export the policy again."
+            )
+    try:
+        command, logits = session.run(["command", "logits"], {"observation": golden.observations})
+    except Exception as error:
+        reason = str(error).splitlines()[0]
+        raise BundleError(f"{folder / NETWORK}: cannot be run: {reason}. Export the policy again.") from error
+    worst = float(np.max(np.abs(logits - golden.logits)))
     if not worst <= GOLDEN_TOLERANCE:
         raise BundleError(
             f"policy '{folder}' differs from its golden vectors by {worst:.2g} (at most {GOLDEN_TOLERANCE:g}). "

@@ -32,6 +32,7 @@ from fulmar_ros.runtime import RequestExit
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 WARM_UP = 20  # the first inferences are slow; they happen before anything moves
 SAFE_REPEATS = 5
+AFTER_ODOMETRY_NS = 2_000_000  # the beat comes this long after the odometry, which may be a little late itself
 STATUS_PERIOD_S = 0.4  # at least 2 Hz
 
 
@@ -174,6 +175,8 @@ class ControllerNode(LifecycleNode):
             problem = self._input_gate.problem(measurement) or ""
             changes: dict[str, object] = {"input_problem": problem}
             if not problem:
+                if self._newest is None:
+                    self._deadlines.align(time.monotonic_ns() + AFTER_ODOMETRY_NS)
                 self._newest = measurement
                 changes["last_input_ns"] = time.monotonic_ns()
                 if self._goal is not None:

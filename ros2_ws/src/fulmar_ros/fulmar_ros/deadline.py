@@ -46,9 +46,20 @@ class Deadlines:
         self._next_ns: int | None = None
         self._last_ns: int | None = None
         self._first_ns: int | None = None
+        self._anchor_ns: int | None = None
         self.beats = 0
         self.overruns = 0
         self.period_error_ms = Spread()
+
+    def align(self, anchor_ns: int) -> None:
+        """Beat from now on at this instant and whole periods after it.
+
+        A controller that beats shortly after its measurements come acts on fresh ones.
+
+        Args:
+            anchor_ns: Monotonic clock [ns].
+        """
+        self._anchor_ns = anchor_ns
 
     def wait(self, stop: threading.Event) -> bool:
         """Sleep until the next deadline; the first one is now.
@@ -78,6 +89,11 @@ class Deadlines:
         while self._next_ns <= now:
             self._next_ns += self._period_ns
             self.overruns += 1
+        if self._anchor_ns is not None:
+            self._next_ns = now + self._period_ns - (now - self._anchor_ns) % self._period_ns
+            # The step to the new beat is no error of the period; the rate counts from here.
+            self._anchor_ns = self._last_ns = self._first_ns = None
+            self.beats = 0
         return True
 
     @property

@@ -1,0 +1,76 @@
+"""Absolute deadlines: steady, honest about lateness, never a burst."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from fulmar_ros.deadline import Deadlines, Spread
+
+
+class FakeClock:
+    """A monotonic clock that moves only when somebody sleeps or works."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_ns = 1_000_000_000
+        monkeypatch.setattr(time, "monotonic_ns", lambda: self.now_ns)
+        monkeypatch.setattr(time, "sleep", self.work)
+
+    def work(self, seconds: float) -> None:
+        self.now_ns += round(seconds * 1e9)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> FakeClock:
+    return FakeClock(monkeypatch)
+
+
+def beats(deadlines: Deadlines, clock: FakeClock, work_s: list[float]) -> list[float]:
+    """Times of the beats, relative to the first, with some work after each [s]."""
+    times = []
+    for seconds in work_s:
+        assert deadlines.wait(threading.Event())
+        times.append(clock.now_ns / 1e9)
+        clock.work(seconds)
+    return [round(each - times[0], 9) for each in times]
+
+
+def test_work_shorter_than_the_period_does_not_shift_the_beat(clock):
+    assert beats(Deadlines(0.02), clock, [0.001, 0.019, 0.0, 0.01]) == [0.0, 0.02, 0.04, 0.06]
+
+
+def test_missed_deadlines_are_counted_and_skipped_not_made_up_for(clock):
+    deadlines = Deadlines(0.02)
+    assert beats(deadlines, clock, [0.05, 0.0, 0.0]) == [0.0, 0.05, 0.06]
+    assert deadlines.overruns == 1
+
+
+def test_the_period_error_is_the_distance_from_the_nominal_period(clock):
+    deadlines = Deadlines(0.02)
+    beats(deadlines, clock, [0.03, 0.0])
+    assert float(deadlines.period_error_ms.percentiles("e")["e_max"]) == pytest.approx(10.0)
+
+
+def test_aligned_deadlines_beat_at_the_anchor_and_whole_periods_after_it(clock):
+    deadlines = Deadlines(0.02)
+    first = clock.now_ns
+    assert deadlines.wait(threading.Event())
+    deadlines.align(first + 7_000_000)
+    times = []
+    for _ in range(4):
+        assert deadlines.wait(threading.Event())
+        times.append((clock.now_ns - first) / 1e9)
+    assert times == pytest.approx([0.02, 0.027, 0.047, 0.067])
+    assert float(deadlines.period_error_ms.percentiles("e")["e_max"]) == pytest.approx(0.0)
+
+
+def test_a_set_stop_ends_the_beat(clock):
+    stop = threading.Event()
+    stop.set()
+    assert not Deadlines(0.02).wait(stop)
+
+
+def test_a_spread_without_samples_says_nothing():
+    assert Spread().percentiles("x") == {"x_p50": "", "x_p99": "", "x_max": ""}
