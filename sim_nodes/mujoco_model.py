@@ -27,6 +27,8 @@ def build_model(robot: Robot) -> mujoco.MjModel:
     spec.modelname = robot.name
     spec.option.timestep = robot.timing.physics_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    # A state that blew up has to stay so that the backend sees it; MuJoCo would quietly begin anew at the origin.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     spec.option.gravity = [0.0, 0.0, -GRAVITY if robot.body.planar else 0.0]
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960
     _add_surroundings(spec)
@@ -61,6 +63,7 @@ def _add_body(spec: mujoco.MjSpec, robot: Robot) -> mujoco.MjsBody:
     else:
         body.add_freejoint(name="free")
     body.explicitinertial = True
+    body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]  # else MuJoCo takes the body's own place for it
     body.mass = robot.body.mass
     body.inertia = list(robot.body.inertia)
     # No contacts: the joints hold a planar body on its plane.
