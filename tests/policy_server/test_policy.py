@@ -1,0 +1,247 @@
+"""A bundle as a controller: the shipped one is taken, every broken one is refused with its own words."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.errors import BundleError
+from fulmar_core.policy_bundle import (
+    GOLDEN,
+    NETWORK,
+    PASSPORT,
+    Golden,
+    read_golden,
+    read_passport,
+    write_bundle,
+)
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from policy_server.policy import Policy
+from policy_server.shipped import policies_directory, shipped_policies, shipped_policy
+
+ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
+SHIPPED = policies_directory() / "floating_platform_go_to_pose"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return shutil.copytree(SHIPPED, tmp_path / "bundle")
+
+
+def load(folder, **kwargs):
+    return Policy(folder, ROBOT, TASK, **kwargs)
+
+
+def refusal(folder, **kwargs) -> str:
+    with pytest.raises(BundleError) as caught:
+        load(folder, **kwargs)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def reseal(folder, *, network=None, golden=None, **passport):
+    """What an exporter with a mistake would leave: other content, every hash in order."""
+    write_bundle(
+        folder,
+        network or (folder / NETWORK).read_bytes(),
+        golden or read_golden(folder),
+        replace(read_passport(folder), **passport),
+    )
+
+
+def linear_network(
+    *, inputs=10, outputs=8, batch="worlds", names=("observation", "command", "logits"), extra=False
+):
+    """A small valid ONNX model of the bundle's kind, with one thing different."""
+    onnx = pytest.importorskip("onnx")
+    helper, numpy_helper = onnx.helper, onnx.numpy_helper
+    kind = onnx.TensorProto.FLOAT
+    weights = np.random.default_rng(1).normal(size=(inputs, outputs)).astype(np.float32)
+    nodes = [
+        helper.make_node("MatMul", [names[0], "w"], [names[2]]),
+        helper.make_node("Greater", [names[2], "zero"], ["open"]),
+        helper.make_node("Cast", ["open"], [names[1]], to=kind),
+    ]
+    takes = [helper.make_tensor_value_info(names[0], kind, [batch, inputs])]
+    if extra:
+        takes.append(helper.make_tensor_value_info("zero", kind, [1]))
+    constants = [numpy_helper.from_array(weights, "w")]
+    if not extra:
+        constants.append(numpy_helper.from_array(np.zeros(1, np.float32), "zero"))
+    gives = [helper.make_tensor_value_info(name, kind, [batch, outputs]) for name in names[1:]]
+    graph = helper.make_graph(nodes, "g", takes, gives, constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
+    observations = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
+    logits = observations @ weights
+    return model.SerializeToString(), Golden(observations, (logits > 0).astype(np.float32), logits)
+
+
+def test_the_shipped_bundle_is_accepted():
+    policy = load(SHIPPED)
+    assert policy.control_hz == ROBOT.timing.control_hz
+    assert policy.observation_names == TASK.observation_names
+
+
+def test_the_shipped_bundle_is_found_by_robot_and_task_and_no_other_is():
+    assert shipped_policy("floating_platform", "go_to_pose") == SHIPPED
+    assert SHIPPED in shipped_policies()
+    assert shipped_policy("floating_platform", "no_such_task") is None
+
+
+def test_no_shipped_bundle_names_a_folder_of_the_machine_it_was_made_on():
+    for bundle in shipped_policies():
+        text = (bundle / NETWORK).read_bytes() + (bundle / PASSPORT).read_bytes()
+        assert not any(place in text for place in (b"/home/", b"/root/", b"/work/", b"site-packages"))
+
+
+def test_commands_are_zeros_and_ones_for_one_observation_and_for_many():
+    policy, seen = load(SHIPPED), read_golden(SHIPPED).observations
+    many = policy.act(seen)
+    assert many.shape == (len(seen), 8)
+    assert set(np.unique(many)) <= {0.0, 1.0}
+    assert policy.act(seen[0]).shape == (8,)
+    np.testing.assert_array_equal([policy.act(row) for row in seen], many)
+
+
+def test_float64_observations_are_taken_too():
+    seen = read_golden(SHIPPED).observations
+    np.testing.assert_array_equal(load(SHIPPED).act(seen.astype(float)), load(SHIPPED).act(seen))
+
+
+def test_the_metadata_is_the_passport():
+    metadata = load(SHIPPED).metadata()
+    assert metadata == {"controller": "policy", **asdict(read_passport(SHIPPED))}
+    json.dumps(metadata, allow_nan=False)
+
+
+def test_a_network_made_by_hand_is_as_good_as_an_exported_one(folder):
+    network, golden = linear_network()
+    reseal(folder, network=network, golden=golden)
+    np.testing.assert_array_equal(load(folder).act(golden.observations), golden.commands)
+
+
+@pytest.mark.parametrize("name", [NETWORK, GOLDEN, PASSPORT])
+def test_a_missing_file_is_refused(folder, name):
+    (folder / name).unlink()
+    assert f"has no {name}" in refusal(folder)
+
+
+@pytest.mark.parametrize("name", [NETWORK, GOLDEN])
+def test_corrupted_bytes_are_refused(folder, name):
+    content = bytearray((folder / name).read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    (folder / name).write_bytes(content)
+    assert "SHA-256" in refusal(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"robot": "boat"}, "was trained for robot 'boat'"),
+        ({"task": "go_to_position"}, "was trained for task 'go_to_position'"),
+        ({"control_hz": 10.0}, "was trained at 10 Hz, but would run at 5 Hz"),
+        ({"observation_names": TASK.observation_names[::-1]}, "observation 1 is"),
+        ({"actuator_names": ROBOT.actuators.names[::-1]}, "actuator 1 is"),
+        ({"format": 0}, "has format 0"),
+    ],
+)
+def test_a_policy_for_something_else_is_refused(folder, change, words):
+    reseal(folder, **change)
+    assert words in refusal(folder)
+
+
+def test_the_rate_it_shall_run_at_counts_and_not_only_the_robots_own(folder):
+    assert "would run at 50 Hz" in refusal(folder, control_hz=50.0)
+
+
+def test_a_file_that_is_no_network_is_refused(folder):
+    reseal(folder, network=b"no network at all")
+    assert "onnxruntime refuses it" in refusal(folder)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"inputs": 9}, "'observation' has shape ['worlds', 9]"),
+        ({"outputs": 7}, "'command' has shape ['worlds', 7]"),
+        ({"batch": 1}, "'observation' has shape [1, 10]"),
+        ({"names": ("obs", "command", "logits")}, "has no tensor 'observation', only obs"),
+        ({"names": ("observation", "action", "logits")}, "has no tensor 'command', only action, logits"),
+        ({"names": ("observation", "command", "scores")}, "has no tensor 'logits', only command, scores"),
+        ({"extra": True}, "takes observation, zero; it must take 'observation' alone"),
+    ],
+)
+def test_a_network_of_another_shape_is_refused(folder, wrong, words):
+    network, _ = linear_network(**wrong)
+    reseal(folder, network=network)
+    assert words in refusal(folder)
+
+
+def test_a_network_of_another_number_type_is_refused(folder):
+    onnx = pytest.importorskip("onnx")
+    model = onnx.load_from_string(linear_network()[0])
+    model.graph.node[2].attribute[0].i = onnx.TensorProto.DOUBLE
+    model.graph.output[0].type.tensor_type.elem_type = onnx.TensorProto.DOUBLE
+    reseal(folder, network=model.SerializeToString())
+    assert "'command' is a tensor(double), it must be a tensor(float)" in refusal(folder)
+
+
+def test_a_network_that_breaks_while_running_is_refused(folder):
+    onnx = pytest.importorskip("onnx")
+    model = onnx.load_from_string(linear_network()[0])
+    # The reshape asks for three worlds of eight, whatever comes in; only running it shows that.
+    model.graph.node[0].output[0] = "raw"
+    shape = onnx.numpy_helper.from_array(np.array([3, 8]), "three")
+    model.graph.initializer.append(shape)
+    model.graph.node.insert(1, onnx.helper.make_node("Reshape", ["raw", "three"], ["flat"]))
+    model.graph.node.insert(2, onnx.helper.make_node("Identity", ["flat"], ["logits"]))
+    reseal(folder, network=model.SerializeToString())
+    assert "cannot be run" in refusal(folder) or "has shape [3, 8]" in refusal(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda g: replace(g, logits=g.logits + np.float32(2e-4)),
+            "differs from its golden vectors by 0.0002",
+        ),
+        (
+            lambda g: replace(g, logits=np.full_like(g.logits, np.nan)),
+            "differs from its golden vectors by nan",
+        ),
+        (lambda g: replace(g, commands=1.0 - g.commands), "gives other commands than its golden vectors"),
+        (lambda g: replace(g, observations=g.observations.astype(float)), "'observations' is float64"),
+        (
+            lambda g: replace(g, observations=g.observations[:, :9]),
+            "'observations' is float32 of shape (64, 9)",
+        ),
+        (lambda g: replace(g, logits=g.logits[:1]), "'logits' is float32 of shape (1, 8)"),
+        (lambda g: replace(g, commands=g.commands[:, :7]), "'commands' is float32 of shape (64, 7)"),
+        (
+            lambda g: Golden(g.observations[:0], g.commands[:0], g.logits[:0]),
+            "must be float32 of shape (at least 1, 10)",
+        ),
+        (lambda g: replace(g, observations=np.float32(1.0)), "'observations' is float32 of shape ()"),
+    ],
+)
+def test_golden_vectors_that_do_not_fit_the_network_are_refused(folder, change, words):
+    reseal(folder, golden=change(read_golden(folder)))
+    assert words in refusal(folder)
+
+
+def test_another_network_with_the_old_golden_vectors_is_refused(folder):
+    network, _ = linear_network()
+    reseal(folder, network=network)
+    assert "differs from its golden vectors" in refusal(folder)
+
+
+def test_rounding_of_another_processor_is_no_reason_to_refuse(folder):
+    golden = read_golden(folder)
+    reseal(folder, golden=replace(golden, logits=golden.logits + np.float32(5e-5)))
+    load(folder)
