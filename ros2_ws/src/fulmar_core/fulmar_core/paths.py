@@ -30,7 +30,7 @@ def config_directory() -> Path:
         candidates += [parent / "configs" for parent in here.parents]
     for candidate in candidates:
         if (candidate / "robots").is_dir():
-            return candidate
+            return candidate.resolve()
     raise ConfigError(
         f"no configuration folder with 'robots/' in {candidates[0]}. Set FULMAR_CONFIGS to a folder that has one."
     )

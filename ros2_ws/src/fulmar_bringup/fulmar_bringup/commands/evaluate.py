@@ -55,8 +55,9 @@ def evaluate(
     Episode i of a seed is the same in every way of running it. Success means staying inside the task's tolerance
     for its whole closing window.
 
-    Example:
-        fulmar evaluate floating_platform go_to_pose --controller lqr --through ros --episodes 256
+    Try:
+
+    fulmar evaluate floating_platform go_to_pose --controller lqr --through ros
     """
     from fulmar_bringup.planning import checked_policy, checked_rate
     from fulmar_bringup.system import check_names

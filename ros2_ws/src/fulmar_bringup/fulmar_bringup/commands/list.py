@@ -33,12 +33,13 @@ def list_names(
         output.print(f"{name}", style="bold")
         width = max((len(entry) for entry in entries), default=0)
         for entry, title in entries.items():
-            output.print(f"  {entry:<{width}}  {title}".rstrip(), markup=False)
+            output.print(f"  {entry:<{width}}  {title}".rstrip(), markup=False, soft_wrap=True)
 
 
 def _entries(family: str) -> dict[str, str]:
     """Names and titles of one family."""
     from fulmar_bringup.system import CONTROLLERS, load_system
+    from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from policy_server.shipped import shipped_policies
@@ -50,7 +51,7 @@ def _entries(family: str) -> dict[str, str]:
     if family == "systems":
         return {name: load_system(name).title for name in config_names("systems")}
     if family == "policies":
-        return {path.name: "" for path in shipped_policies()}
+        return {path.name: f"{read_passport(path).control_hz:g} Hz" for path in shipped_policies()}
     return {name: CONTROLLER_TITLES[name] for name in CONTROLLERS}
 
 

@@ -60,10 +60,11 @@ def run(
     Starts a plant, a controller and a recorder as processes of their own, gives the goal, and stops them in order
     when the time is up. The exit code is 0 if the goal was met, 1 if not or if anything failed.
 
-    Examples:
-        fulmar run floating_platform --controller lqr --goal 0,0,0 --start 3,1,90
+    Try:
 
-        fulmar run floating_platform --task go_to_pose --controller policy --lockstep --seed 7
+    fulmar run floating_platform --controller lqr --start 3,1,90 --goal 0,0,0
+
+    fulmar run floating_platform --controller policy --lockstep --seed 7
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")

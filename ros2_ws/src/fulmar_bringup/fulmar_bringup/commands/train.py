@@ -34,8 +34,9 @@ def train(
     Settings come from configs/training/<robot>_<task>.yaml. The run folder holds the best weights, the learning
     curve and TensorBoard logs; `fulmar export` makes a policy bundle of it.
 
-    Example:
-        fulmar train floating_platform go_to_pose --seed 3 --out runs/train/mine
+    Try:
+
+    fulmar train floating_platform go_to_pose --seed 3 --out runs/train/mine
     """
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
