@@ -63,7 +63,10 @@ def _add_body(spec: mujoco.MjSpec, robot: Robot) -> mujoco.MjsBody:
     else:
         body.add_freejoint(name="free")
     body.explicitinertial = True
-    body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]  # else MuJoCo takes the body's own place for it
+    body.ipos, body.iquat = (
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+    )  # else MuJoCo takes the body's own place for it
     body.mass = robot.body.mass
     body.inertia = list(robot.body.inertia)
     # No contacts: the joints hold a planar body on its plane.

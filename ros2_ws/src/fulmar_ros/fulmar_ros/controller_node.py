@@ -32,7 +32,9 @@ from fulmar_ros.runtime import RequestExit
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 WARM_UP = 20  # the first inferences are slow; they happen before anything moves
 SAFE_REPEATS = 5
-AFTER_ODOMETRY_NS = 2_000_000  # the beat comes this long after the odometry, which may be a little late itself
+AFTER_ODOMETRY_NS = (
+    2_000_000  # the beat comes this long after the odometry, which may be a little late itself
+)
 STATUS_PERIOD_S = 0.4  # at least 2 Hz
 
 

@@ -36,10 +36,11 @@ def write_report(records: Sequence[RunRecord], out: Path, title: str | None = No
     runs = views(records)
     title = title or _title(runs)
     with house_style():
-        if out.suffix == ".png":
-            data = as_png(overview(runs, title))
-        else:
-            data = page(runs, pictures(runs), title).encode()
+        data = (
+            as_png(overview(runs, title))
+            if out.suffix == ".png"
+            else page(runs, pictures(runs), title).encode()
+        )
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_bytes(data)
