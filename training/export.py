@@ -77,6 +77,23 @@ def read_run_record(run: Path) -> dict[str, Any]:
         record = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise ConfigError(f"{path}: not valid JSON: {error}. Train again.") from error
+    needed = (
+        "robot",
+        "task",
+        "control_hz",
+        "command",
+        "seed",
+        "steps",
+        "wall_s",
+        "settings",
+        "best",
+        "versions",
+    )
+    missing = [key for key in needed if not isinstance(record, dict) or key not in record]
+    if missing:
+        raise ConfigError(
+            f"{path}: lacks '{missing[0]}', so it is not what `fulmar train` left. Train again."
+        )
     return dict(record)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import pickle
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
+from fulmar_core.errors import ConfigError
 from fulmar_core.rotation import Array
 
 
@@ -95,12 +97,31 @@ def save_network(network: DeployedNetwork, path: Path) -> None:
 
 
 def load_network(path: Path) -> DeployedNetwork:
-    """Read what `save_network` wrote; tensors only, no pickled code."""
-    content = torch.load(path, weights_only=True)
-    state = content["state"]
-    weights = [value for name, value in state.items() if name.endswith("weight")]
-    network = DeployedNetwork([weights[0].shape[1], *(w.shape[0] for w in weights)], limit=content["limit"])
-    network.load_state_dict(state)
+    """Read what `save_network` wrote; tensors only, no pickled code.
+
+    Raises:
+        ConfigError: If the file holds anything else.
+    """
+    try:
+        content = torch.load(path, weights_only=True)
+        state = content["state"]
+        weights = [value for name, value in state.items() if name.endswith("weight")]
+        network = DeployedNetwork(
+            [weights[0].shape[1], *(w.shape[0] for w in weights)], limit=content["limit"]
+        )
+        network.load_state_dict(state)
+    except (
+        OSError,
+        EOFError,
+        RuntimeError,
+        pickle.UnpicklingError,
+        LookupError,
+        TypeError,
+        AttributeError,
+    ) as error:
+        raise ConfigError(
+            f"{path}: holds no weights that `fulmar train` wrote ({type(error).__name__})."
+        ) from error
     return network
 
 

@@ -19,6 +19,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
+from fulmar_core.errors import ConfigError
 from fulmar_core.metrics import summary
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -119,7 +120,7 @@ def train(
         robot: The robot.
         task: The task.
         settings: How to learn.
-        seed: Seed of everything random, in [0, 1,000,000].
+        seed: Seed of everything random, in [0, 1,000,002].
         out: Run folder; made if need be.
         time_limit_s: Wall-clock of learning; the settings' by default [s].
         command: Command line that started this, for the record.
@@ -127,7 +128,14 @@ def train(
 
     Returns:
         What `run.json` says.
+
+    Raises:
+        ConfigError: If the seed is one of those kept for judging.
     """
+    if not 0 <= seed < HELD_OUT_SEED:
+        raise ConfigError(
+            f"seed {seed} must be in [0, {HELD_OUT_SEED - 1}]; the ones beyond are kept for judging."
+        )
     limit = time_limit_s or settings.time_limit_s
     torch.set_num_threads(1)  # a second thread gains little here and loses much when the machine is shared
     scenario = load_scenario(settings.scenario)

@@ -1,0 +1,73 @@
+"""One small training run and one small learner, shared by every test here."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+
+import pytest
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+
+pytest.importorskip("stable_baselines3")
+
+
+@pytest.fixture(scope="session")
+def robot():
+    return load_robot("floating_platform")
+
+
+@pytest.fixture(scope="session")
+def task():
+    return load_task("go_to_pose")
+
+
+@pytest.fixture(scope="session")
+def small_settings():
+    """The shipped settings, cut to what takes a second."""
+    from training.settings import load_training_settings
+
+    settings = load_training_settings("floating_platform", "go_to_pose")
+    ppo = replace(settings.ppo, worlds=32, steps=16, minibatch=128, epochs=2, hidden=(16, 16))
+    return replace(settings, time_limit_s=2.0, evaluate_every_s=1.0, ppo=ppo)
+
+
+@pytest.fixture(scope="session")
+def run(robot, task, small_settings, tmp_path_factory):
+    """Run folder of a training that was stopped by its time limit, and the record that `train` returned."""
+    from training.train import train
+
+    folder = tmp_path_factory.mktemp("run")
+    record = train(
+        robot, task, small_settings, seed=3, out=folder, command="fulmar train", git_revision="abc"
+    )
+    return folder, record
+
+
+@pytest.fixture(scope="session")
+def learner(robot, task, small_settings):
+    """A PPO after a few updates, with its normaliser."""
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from training.ppo import build_ppo
+    from training.vec_env import BatchVecEnv
+
+    worlds = BatchVecEnv(robot, task, load_scenario("uncertain"), worlds=32, seed=3)
+    env = VecNormalize(worlds, norm_reward=False)
+    ppo, feedback = build_ppo(small_settings.ppo, env, seed=3)
+    ppo.learn(32 * 16 * 4, callback=feedback)
+    return ppo, env
+
+
+@pytest.fixture(scope="session")
+def bundle(run, learner, tmp_path_factory):
+    """Bundle of the learner's network, exported from a run folder."""
+    from training.export import export
+    from training.network import deployed_network, save_network
+
+    folder = shutil.copytree(run[0], tmp_path_factory.mktemp("exported") / "run")
+    save_network(deployed_network(*learner), folder / "network.pt")
+    out = tmp_path_factory.mktemp("bundle")
+    return out, export(folder, out)

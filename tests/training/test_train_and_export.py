@@ -1,0 +1,153 @@
+"""From a learner to a bundle: the same commands at every station."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.policy_bundle import read_golden, read_passport
+from policy_server.policy import Policy
+from training.export import export, read_run_record
+from training.judge import judge_in_mujoco
+from training.network import NetworkController, deployed_network, load_network
+from training.train import HELD_OUT_SEED, NETWORK_FILE, RUN_FILE, train
+
+
+@pytest.fixture
+def run_copy(run, tmp_path):
+    return shutil.copytree(run[0], tmp_path / "run")
+
+
+def test_a_run_leaves_weights_a_record_and_curves(run):
+    folder, record = run
+    assert json.loads((folder / RUN_FILE).read_text()) == json.loads(json.dumps(record))
+    assert (folder / NETWORK_FILE).is_file()
+    assert list((folder / "tensorboard").rglob("events*"))
+
+
+def test_the_record_says_what_was_done(run, small_settings):
+    _, record = run
+    assert (record["robot"], record["task"], record["seed"]) == ("floating_platform", "go_to_pose", 3)
+    assert (record["command"], record["git_revision"]) == ("fulmar train", "abc")
+    assert record["settings"]["ppo"]["worlds"] == small_settings.ppo.worlds
+    assert record["steps"] % (32 * 16) == 0
+    assert record["steps"] > 0
+
+
+def test_the_time_limit_ends_a_run(run):
+    _, record = run
+    assert (
+        2.0 <= record["curve"][-1]["wall_s"] < 12.0
+    )  # the limit is 2 s; a check takes a while when others compute
+
+
+def test_the_best_check_is_kept_and_not_the_last(run):
+    _, record = run
+    assert record["best"]["score"] == max(check["score"] for check in record["curve"])
+
+
+def test_the_network_of_a_run_can_be_loaded_and_used(run, task):
+    network = load_network(run[0] / NETWORK_FILE)
+    controller = NetworkController(network, task.observation_names, 5.0)
+    assert network.observation_count == len(task.observation_names)
+    assert controller.act(np.zeros(10)).shape == (8,)
+    assert controller.act(np.zeros((3, 10))).shape == (3, 8)
+
+
+def test_judging_writes_the_figures_into_the_record(run_copy):
+    figures = judge_in_mujoco(run_copy, episodes=2)
+    judged = json.loads((run_copy / RUN_FILE).read_text())["mujoco"]
+    assert judged["success_rate"] == figures["success_rate"]
+    assert judged["episodes"] == 2
+
+
+def test_the_bundle_of_a_run_is_accepted_by_the_policy_server(bundle, robot, task):
+    folder, passport = bundle
+    assert read_passport(folder) == passport
+    assert Policy(folder, robot, task).control_hz == passport.control_hz == robot.timing.control_hz
+
+
+def test_the_passport_tells_how_the_policy_was_made(bundle, run):
+    training = bundle[1].training
+    assert (training["command"], training["seed"], training["git_revision"]) == ("fulmar train", 3, "abc")
+    assert training["steps"] == run[1]["steps"]
+
+
+def test_no_path_of_this_machine_is_in_the_network(bundle):
+    content = (bundle[0] / "policy.onnx").read_bytes()
+    assert not any(place in content for place in (b".py", b"site-packages", b"/home/", b"/work/"))
+
+
+def test_golden_vectors_are_the_network_s_own_answers_to_many_situations(bundle, learner):
+    golden = read_golden(bundle[0])
+    commands, logits = deployed_network(*learner).infer(golden.observations)
+    np.testing.assert_array_equal(golden.commands, commands)
+    np.testing.assert_array_equal(golden.logits, logits)
+    assert golden.observations.shape == (64, 10)
+    assert len(np.unique(golden.observations, axis=0)) == 64
+
+
+def test_the_onnx_command_is_stable_baselines_deterministic_prediction(bundle, learner, robot, task):
+    ppo, env = learner
+    rng = np.random.default_rng(9)
+    seen = np.concatenate((read_golden(bundle[0]).observations, rng.normal(size=(500, 10)))).astype(
+        np.float32
+    )
+    predicted, _ = ppo.predict(env.normalize_obs(seen), deterministic=True)
+    served = Policy(bundle[0], robot, task).act(seen)
+    # A logit within rounding of zero may fall either way; everywhere else not one valve may differ.
+    _, logits = deployed_network(ppo, env).infer(seen)
+    clear = np.abs(logits) > 1e-4
+    assert clear.mean() > 0.98
+    np.testing.assert_array_equal(served[clear], predicted[clear])
+    assert 0.0 < served.mean() < 1.0
+
+
+def test_far_observations_are_clipped_as_in_training(bundle, learner, robot, task):
+    ppo, env = learner
+    far = np.full((1, 10), 1e6, np.float32)
+    predicted, _ = ppo.predict(env.normalize_obs(far), deterministic=True)
+    np.testing.assert_array_equal(Policy(bundle[0], robot, task).act(far), predicted)
+
+
+def test_a_deployed_network_does_not_follow_the_learner_s_later_steps(learner):
+    ppo, env = learner
+    network = deployed_network(ppo, env)
+    linear = network.layers[0].weight
+    assert linear.data_ptr() != ppo.policy.mlp_extractor.policy_net[0].weight.data_ptr()
+
+
+@pytest.mark.parametrize("name", [RUN_FILE, NETWORK_FILE])
+def test_a_folder_that_is_no_finished_run_is_refused(run_copy, tmp_path, name):
+    (run_copy / name).unlink()
+    with pytest.raises(ConfigError, match="no finished training run"):
+        export(run_copy, tmp_path / "out")
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", "3"])
+def test_a_record_that_is_none_is_refused(run_copy, text):
+    (run_copy / RUN_FILE).write_text(text)
+    with pytest.raises(ConfigError, match=r"run\.json"):
+        read_run_record(run_copy)
+
+
+def test_weights_that_are_none_are_refused(run_copy, tmp_path):
+    (run_copy / NETWORK_FILE).write_bytes(b"no weights")
+    with pytest.raises(ConfigError, match=r"network\.pt"):
+        export(run_copy, tmp_path / "out")
+
+
+def test_a_network_for_another_number_of_terms_is_refused(run_copy, tmp_path):
+    record = json.loads((run_copy / RUN_FILE).read_text())
+    (run_copy / RUN_FILE).write_text(json.dumps(record | {"task": "go_to_position"}))
+    with pytest.raises(ConfigError, match="the network takes 10 terms, task 'go_to_position' now has 8"):
+        export(run_copy, tmp_path / "out")
+
+
+def test_a_seed_of_the_held_out_episodes_is_refused(robot, task, small_settings, tmp_path):
+    with pytest.raises(ConfigError, match=r"seed 1000003 must be in \[0, 1000002\]"):
+        train(robot, task, small_settings, seed=HELD_OUT_SEED, out=tmp_path)
