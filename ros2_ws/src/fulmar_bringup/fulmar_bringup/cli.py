@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import typer
@@ -42,7 +43,7 @@ app.command()(doctor)
 def main() -> None:
     """Run the command line; mistakes end with one line and exit code 2, failures with 1."""
     try:
-        code = app(standalone_mode=False)
+        code = app(prog_name="fulmar", standalone_mode=False)
     except (ConfigError, BundleError, BagError) as error:
         sys.exit(_complain(str(error), BAD_USAGE))
     except FulmarError as error:
@@ -53,7 +54,15 @@ def main() -> None:
         sys.exit(_complain("stopped by the user", FAILED))
     except KeyboardInterrupt:
         sys.exit(_complain("stopped by the user", FAILED))
+    except BrokenPipeError:  # whoever read our output has had enough, as in `fulmar list | head -1`
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - Python flushes it once more at its own end
+        sys.exit(FAILED)
+    except OSError as error:  # a folder that cannot be written, a full disk
+        sys.exit(_complain(f"{error.filename or 'the system'}: {error.strerror or error}.", FAILED))
     except Exception as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # its message is the whole help
+            console.print(error.format_message(), markup=False)  # type: ignore[attr-defined]
+            sys.exit(BAD_USAGE)
         if hasattr(error, "format_message"):  # what typer raises for bad usage, whichever click is behind it
             sys.exit(_complain(f"{error.format_message()}{_hint(error)}", BAD_USAGE))
         raise

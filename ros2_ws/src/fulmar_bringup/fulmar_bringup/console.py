@@ -8,8 +8,9 @@ from typing import Any
 
 from rich.console import Console
 
-console = Console(stderr=True, highlight=False)
-output = Console(highlight=False)
+# Without emoji: `robot.yaml:100: ...` would come out with a picture in the place of its line.
+console = Console(stderr=True, highlight=False, emoji=False)
+output = Console(highlight=False, emoji=False)
 
 
 def print_json(value: dict[str, Any]) -> None:

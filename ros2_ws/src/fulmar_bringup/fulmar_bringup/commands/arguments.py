@@ -19,7 +19,9 @@ ControllerOption = Annotated[
 PolicyOption = Annotated[
     Path | None, typer.Option("--policy", metavar="DIR", help="A policy bundle; the shipped one by default.")
 ]
-SeedOption = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of everything random.")]
+SeedOption = Annotated[
+    int, typer.Option("--seed", metavar="N", min=0, max=2**63 - 1, help="Seed of everything random.")
+]
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", metavar="NAME", help="Disturbances: a name from configs/scenarios.")
 ]

@@ -61,6 +61,7 @@ def evaluate(
     """
     from fulmar_bringup.planning import checked_policy, checked_rate
     from fulmar_bringup.system import check_names
+    from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.metrics import summary
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
@@ -69,6 +70,7 @@ def evaluate(
         raise UnknownNameError("way", through, WAYS)
     check_names(robot, task, controller, "mujoco")
     the_robot, the_task = load_robot(robot), load_task(task)
+    load_scenario(scenario)  # so that a wrong name is told before anything is started
     hz = checked_rate(the_robot, control_hz or the_robot.timing.control_hz)
     if controller == "policy":
         policy = checked_policy(policy, the_robot, the_task, hz)

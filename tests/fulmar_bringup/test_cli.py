@@ -1,0 +1,266 @@
+"""The command line: exit codes, one line for each mistake, JSON and nothing else."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fulmar_bringup import cli
+from fulmar_core.paths import config_directory
+from policy_server.shipped import shipped_policy
+
+SHIPPED = str(shipped_policy("floating_platform", "go_to_pose"))
+EVALUATE = ["evaluate", "floating_platform", "go_to_pose", "--controller", "lqr", "--through", "batch"]
+
+
+@pytest.fixture
+def fulmar(monkeypatch, capsys):
+    """Run a command line in this process: exit code, standard output, standard error."""
+
+    def call(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fulmar", *words])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        captured = capsys.readouterr()
+        return int(ended.value.code or 0), captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def broken_configs(tmp_path, monkeypatch):
+    """A copy of the configuration, to be broken."""
+    folder = shutil.copytree(config_directory(), tmp_path / "configs")
+    monkeypatch.setenv("FULMAR_CONFIGS", str(folder))
+    return folder
+
+
+def complaint(result: tuple[int, str, str]) -> str:
+    """The one line that a mistake gets; exit code 2, no result, no traceback."""
+    code, out, err = result
+    assert code == 2
+    assert out == ""
+    lines = err.splitlines()
+    assert len(lines) == 1, err
+    assert lines[0].startswith("fulmar: ")
+    return lines[0]
+
+
+RUN = ["run", "floating_platform"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["lst"], "No such command 'lst'. Did you mean 'list'?"),
+        (["bundle", "shwo", "x"], "No such command 'shwo'. Did you mean 'show'?"),
+        (["list", "--jsno"], "--jsno"),
+        (["run"], "Missing argument 'ROBOT'"),
+        (["list", "robot"], "unknown family 'robot'. Did you mean 'robots'?"),
+        (["run", "floating_platfrom"], "unknown robot 'floating_platfrom'. Did you mean 'floating_platform'?"),
+        ([*RUN, "--task", "go_to"], "unknown task 'go_to'"),
+        ([*RUN, "--controller", "pid"], "unknown controller 'pid'. Known: lqr, policy."),
+        ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
+        ([*RUN, "--backend", "hardware"], "there is no hardware driver for 'floating_platform'"),
+        ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),
+        ([*RUN, "--goal", "1,2"], "--goal = '1,2' must be three finite numbers"),
+        ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),
+        ([*RUN, "--duration", "nan"], "duration"),
+        ([*RUN, "--rate", "nan"], "rate"),
+        ([*RUN, "--seed", "-1"], "--seed"),
+        ([*RUN, "--lockstep", "--rate", "2"], "--lockstep runs as fast as it goes; it takes no --rate"),
+        ([*RUN, "--goal", "0,0,0", "--start", "99,0,0"], "99.0 m apart, the geofence"),
+        ([*RUN, "--policy", "/nowhere"], "policy '/nowhere' has no passport.json"),
+        ([*RUN, "--control-hz", "7"], "control_hz = 7 must divide"),
+        ([*RUN, "--record", "/tmp"], "/tmp exists already; nothing recorded is overwritten"),
+        ([*EVALUATE, "--through", "gazebo"], "unknown way 'gazebo'. Known: batch, mujoco, ros."),
+        ([*EVALUATE, "--scenario", "storm"], "unknown scenario 'storm'"),
+        ([*EVALUATE, "--episodes", "0"], "--episodes"),
+        ([*EVALUATE, "--episodes", "many"], "--episodes"),
+        ([*EVALUATE, "--seed", "99999999999999999999999"], "--seed"),
+        ([*EVALUATE, "--control-hz", "nan"], "control"),
+        (["evaluate", "floating_platform", "go_to_pose", "--control-hz", "50"], "would run at 50 Hz"),
+        (["bundle", "show", "/nowhere"], "policy '/nowhere' has no passport.json"),
+        (["bundle", "check", "/nowhere"], "policy '/nowhere' has no passport.json"),
+        (["report", "/nowhere"], "/nowhere"),
+        (["report", __file__], "test_cli.py"),
+        (["export", "/nowhere", "--out", "x"], "/nowhere: no finished training run"),
+        (["train", "floating_platform", "go_to"], "unknown task 'go_to'"),
+        (["train", "floating_platform", "go_to_pose", "--seed", "1000003"], "seed 1000003 must be in"),
+    ],
+    ids=lambda value: " ".join(value)[-45:] if isinstance(value, list) else "",
+)  # fmt: skip
+def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if words[0] in ("train", "export"):
+        pytest.importorskip("stable_baselines3")
+    assert told in complaint(fulmar(*words))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "told"),
+    [
+        ("robots/floating_platform.yaml", "name: [", "robots/floating_platform.yaml:1: not valid YAML"),
+        ("robots/floating_platform.yaml", "", "robots/floating_platform.yaml:1: the file is empty"),
+        (
+            "robots/floating_platform.yaml",
+            "\n" * 99 + "nmae: x\n",
+            "floating_platform.yaml:100: unknown key 'nmae'",
+        ),
+        (
+            "tasks/go_to_pose.yaml",
+            "kind: go_to_pos\n",
+            "go_to_pose.yaml:1: 'kind' = 'go_to_pos' is not known",
+        ),
+        (
+            "controllers/floating_platform_lqr.yaml",
+            "position: .nan\n",
+            "'position' = nan must be a finite number",
+        ),
+        ("scenarios/nominal.yaml", "title: 3\n", "scenarios/nominal.yaml:1: 'title' = 3 must be text"),
+    ],
+)
+def test_a_broken_file_is_told_with_its_line(fulmar, broken_configs, file, text, told):
+    (broken_configs / file).write_text(text)
+    assert told in complaint(fulmar(*EVALUATE, "--episodes", "1"))
+
+
+def test_a_configuration_folder_that_is_none_is_told(fulmar, tmp_path, monkeypatch):
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    assert "Set FULMAR_CONFIGS" in complaint(fulmar("list"))
+
+
+@pytest.mark.parametrize("name", ["policy.onnx", "golden.npz", "passport.json"])
+def test_a_damaged_bundle_is_told(fulmar, tmp_path, name):
+    folder = shutil.copytree(SHIPPED, tmp_path / "bundle")
+    (folder / name).write_bytes(b"broken")
+    line = complaint(fulmar("evaluate", "floating_platform", "go_to_pose", "--policy", str(folder)))
+    assert name in line
+    assert name in complaint(fulmar("bundle", "check", str(folder)))
+
+
+def test_without_a_command_the_help_is_shown_as_bad_usage(fulmar):
+    code, out, err = fulmar()
+    assert (code, out) == (2, "")
+    assert err.lstrip().startswith("Usage: fulmar")
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["bundle", "show", "--help"]])
+def test_help_is_no_mistake(fulmar, words):
+    code, out, err = fulmar(*words)
+    assert (code, err) == (0, "")
+    assert "Usage: fulmar" in out
+
+
+def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(fulmar, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    code, out, err = fulmar("train", "floating_platform", "go_to_pose", "--out", str(blocked))
+    assert (code, out) == (1, "")
+    assert err == f"fulmar: {blocked}: File exists.\n"
+
+
+def test_the_list_shows_every_family_for_people(fulmar):
+    code, out, err = fulmar("list")
+    assert (code, err) == (0, "")
+    for word in (
+        "robots",
+        "floating_platform",
+        "go_to_position",
+        "lqr",
+        "mujoco_policy",
+        "floating_platform_go_to_pose",
+    ):
+        assert word in out
+
+
+def test_the_list_is_one_json_object(fulmar):
+    code, out, err = fulmar("list", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert list(found) == ["robots", "tasks", "controllers", "systems", "policies"]
+    assert found["controllers"] == ["policy", "lqr"]
+    assert json.loads(fulmar("list", "tasks", "--json")[1]) == {"tasks": ["go_to_pose", "go_to_position"]}
+
+
+@pytest.mark.parametrize("controller", ["lqr", "policy"])
+def test_an_evaluation_is_one_json_object_with_every_figure(fulmar, controller):
+    words = ["evaluate", "floating_platform", "go_to_pose", "--controller", controller, "--through", "batch"]
+    code, out, _ = fulmar(*words, "--episodes", "4", "--seed", "5", "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert (found["episodes"], found["seed"], found["control_hz"]) == (4, 5, 5.0)
+    assert 0.0 <= found["success_rate"] <= 1.0
+    for name in ("PT5_percent", "OT5_percent", "ALV_m_s", "AAV_rad_s", "AAS", "final_position_error_m"):
+        assert set(found[name]) == {"mean", "median", "p95"}
+    assert found["wall_s"] > 0.0
+    assert found["steps_per_s"] > 0.0
+
+
+def test_the_same_evaluation_twice_gives_the_same_figures(fulmar):
+    first, second = (json.loads(fulmar(*EVALUATE, "--episodes", "2", "--json")[1]) for _ in range(2))
+    timing = {"wall_s", "steps_per_s"}
+    assert {k: v for k, v in first.items() if k not in timing} == {
+        k: v for k, v in second.items() if k not in timing
+    }
+
+
+def test_an_evaluation_for_people_is_a_table_with_a_verdict(fulmar):
+    code, out, _ = fulmar(*EVALUATE, "--episodes", "2")
+    assert code == 0
+    assert "success 1.000 of 2 episodes" in out
+    assert "PT5_percent" in out
+
+
+def test_a_passport_is_shown_as_it_is(fulmar):
+    code, out, err = fulmar("bundle", "show", SHIPPED, "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == json.loads((Path(SHIPPED) / "passport.json").read_text())
+    assert "control_hz" in fulmar("bundle", "show", SHIPPED)[1]
+
+
+def test_the_shipped_bundle_is_accepted(fulmar):
+    code, out, err = fulmar("bundle", "check", SHIPPED, "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["accepted"] is True
+
+
+def test_the_installed_command_does_the_same_in_a_process_of_its_own():
+    command = [sys.executable, "-m", "fulmar_bringup.cli"]
+    done = subprocess.run(
+        [*command, "list", "--json"], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["robots"] == ["floating_platform"]
+    done = subprocess.run([*command, "run", "boat"], capture_output=True, text=True, timeout=30, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_reader_that_has_had_enough_gets_no_traceback():
+    piped = f"{sys.executable} -m fulmar_bringup.cli bundle show {SHIPPED} --json | true"
+    done = subprocess.run(["bash", "-c", piped], capture_output=True, text=True, timeout=30, check=False)
+    assert "Traceback" not in done.stderr
+    assert "BrokenPipe" not in done.stderr
+
+
+def test_looking_around_loads_neither_ros_nor_torch_nor_a_simulator():
+    program = (
+        "import sys; sys.argv = ['fulmar', 'list', '--json']\n"
+        "from fulmar_bringup import cli\n"
+        "try: cli.main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'rclpy', 'torch', 'mujoco', 'onnxruntime', 'matplotlib'} & set(sys.modules)\n"
+        "sys.exit(f'loaded {heavy}' if heavy else 0)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert done.returncode == 0, done.stderr
