@@ -76,6 +76,7 @@ def plan_run(
         BundleError: The policy is damaged or made for something else.
     """
     check_names(robot, task, controller, backend)
+    _check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
     the_robot, the_task = load_robot(robot), load_task(task)
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
     if controller == "policy":
@@ -115,6 +116,12 @@ def plan_run(
         rate=rate,
     )
     return RunRequest(plan, goal, record, command)
+
+
+def _check_finite(**values: PoseTuple | float | None) -> None:
+    for name, value in values.items():
+        if value is not None and not np.isfinite(value).all():
+            raise ConfigError(f"{name} = {value} must be finite.")
 
 
 def checked_rate(robot: Robot, control_hz: float) -> float:

@@ -1,0 +1,152 @@
+"""From a request to a checked plan, with nothing started."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fulmar_bringup.planning import plan_run
+from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from policy_server.shipped import shipped_policy
+
+NAN = float("nan")
+
+
+@pytest.fixture
+def plan(tmp_path):
+    def make(**changes):
+        request = {
+            "robot": "floating_platform",
+            "task": "go_to_pose",
+            "controller": "lqr",
+            "backend": "mujoco",
+            "policy": None,
+            "goal": None,
+            "start": None,
+            "duration_s": None,
+            "lockstep": False,
+            "rate": 1.0,
+            "control_hz": None,
+            "scenario": "nominal",
+            "seed": 0,
+            "record": tmp_path / "bag",
+            "command": "fulmar run",
+        }
+        return plan_run(**request | changes)
+
+    return make
+
+
+def test_what_was_not_said_comes_from_files_and_the_seed(plan):
+    request = plan()
+    assert request.plan.control_hz == 50.0  # configs/systems/mujoco_lqr.yaml
+    assert request.plan.duration_s == 50.0  # configs/tasks/go_to_pose.yaml
+    distance = math.dist(request.goal[:2], request.plan.start[:2])
+    assert 3.0 <= distance <= 4.0
+    assert request.plan.policy == ""
+
+
+def test_one_seed_gives_one_plan_and_another_seed_another(plan):
+    assert plan(seed=7) == plan(seed=7)
+    assert plan(seed=7).goal != plan(seed=8).goal
+
+
+def test_what_was_said_is_kept(plan, tmp_path):
+    request = plan(
+        goal=(1.0, 2.0, 90.0), start=(0.0, 0.0, -30.0), duration_s=3.0, lockstep=True, control_hz=10.0
+    )
+    assert (request.goal, request.plan.start) == ((1.0, 2.0, 90.0), (0.0, 0.0, -30.0))
+    assert (request.plan.duration_s, request.plan.lockstep, request.plan.control_hz) == (3.0, True, 10.0)
+    assert request.record == tmp_path / "bag"
+
+
+def test_a_goal_alone_moves_the_start_along(plan):
+    drawn, moved = plan(seed=3), plan(seed=3, goal=(10.0, -10.0, 0.0))
+    drawn_offset = [s - g for s, g in zip(drawn.plan.start, drawn.goal, strict=True)][:2]
+    moved_offset = [s - g for s, g in zip(moved.plan.start, moved.goal, strict=True)][:2]
+    assert moved_offset == pytest.approx(drawn_offset)
+
+
+def test_the_policy_s_folder_is_written_in_full(plan):
+    request = plan(controller="policy")
+    assert Path(request.plan.policy) == shipped_policy("floating_platform", "go_to_pose")
+    assert Path(request.plan.policy).is_absolute()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            {"robot": "floting_platform"},
+            "unknown robot 'floting_platform'. Did you mean 'floating_platform'?",
+        ),
+        ({"task": "go_to_poes"}, "unknown task 'go_to_poes'. Did you mean 'go_to_pose'?"),
+        ({"controller": "lqg"}, "unknown controller 'lqg'. Did you mean 'lqr'?"),
+        ({"backend": "mujoko"}, "unknown backend 'mujoko'. Did you mean 'mujoco'?"),
+        ({"scenario": "nomnal"}, "unknown scenario 'nomnal'. Did you mean 'nominal'?"),
+    ],
+)
+def test_an_unknown_name_gets_the_nearest_one(plan, change, words):
+    with pytest.raises(UnknownNameError) as caught:
+        plan(**change)
+    assert str(caught.value) == words
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"backend": "hardware"}, "there is no hardware driver for 'floating_platform'"),
+        ({"goal": (NAN, 0.0, 0.0)}, "goal = (nan, 0.0, 0.0) must be finite"),
+        ({"start": (0.0, 0.0, NAN)}, "start = (0.0, 0.0, nan) must be finite"),
+        ({"duration_s": NAN}, "duration = nan must be finite"),
+        ({"duration_s": math.inf}, "duration = inf must be finite"),
+        ({"rate": NAN}, "rate = nan must be finite"),
+        (
+            {"goal": (0.0, 0.0, 0.0), "start": (9.0, 0.0, 0.0)},
+            "9.0 m apart, the geofence of 'floating_platform' is 8 m",
+        ),
+        ({"control_hz": 7.0}, "robot 'floating_platform': control_hz = 7 must divide the physics rate"),
+        ({"control_hz": NAN}, "robot 'floating_platform': control_hz = nan must be greater than 0"),
+    ],
+)
+def test_what_cannot_work_is_refused(plan, change, words):
+    with pytest.raises(ConfigError) as caught:
+        plan(**change)
+    assert words in str(caught.value)
+
+
+def test_a_folder_that_exists_is_never_recorded_into(plan, tmp_path):
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(ConfigError, match="exists already; nothing recorded is overwritten"):
+        plan()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            {"task": "go_to_position", "policy": shipped_policy("floating_platform", "go_to_pose")},
+            "was trained for task",
+        ),
+        ({"control_hz": 50.0}, "was trained at 5 Hz, but would run at 50 Hz"),
+        ({"policy": Path("/nowhere")}, "policy '/nowhere' has no passport.json"),
+    ],
+)
+def test_a_policy_that_does_not_fit_is_refused_before_anything_starts(plan, change, words):
+    with pytest.raises(BundleError) as caught:
+        plan(controller="policy", **change)
+    assert words in str(caught.value)
+
+
+def test_a_damaged_policy_is_refused_before_anything_starts(plan, tmp_path):
+    folder = shutil.copytree(shipped_policy("floating_platform", "go_to_pose"), tmp_path / "copy")
+    (folder / "policy.onnx").write_bytes(b"other")
+    with pytest.raises(BundleError, match="SHA-256"):
+        plan(controller="policy", policy=folder)
+
+
+def test_the_lqr_takes_no_notice_of_a_policy(plan):
+    assert plan(policy=Path("/nowhere")).plan.controller == "lqr"

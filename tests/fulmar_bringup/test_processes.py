@@ -1,0 +1,125 @@
+"""Command lines of nodes, and children that never outlive their parent's wish."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import psutil
+import pytest
+import yaml
+
+from fulmar_bringup.node_table import NodeSpec
+from fulmar_bringup.processes import Ended, ProcessGroup, child_environment, command_line
+
+
+def spec(**parameters) -> NodeSpec:
+    return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", "/boat", parameters)
+
+
+def test_a_node_is_started_as_a_module_of_this_very_interpreter():
+    assert command_line(spec())[:4] == [sys.executable, "-m", "sim_nodes.sim_node", "--ros-args"]
+
+
+def test_namespace_and_name_are_remapped():
+    assert command_line(spec())[4:] == ["-r", "__ns:=/boat", "-r", "__node:=plant"]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        True, False, 0, -3, 5.0, 0.02, 1e-05, 1e30, [1.0, -2.5, 90.0], "mujoco", "", "true", "5", "5.0", "null", "~",
+        "it's", "a: b # c", '{"json": [1, "two"]}', "/a path/with spaces", "tilde ~ & * ! % @ `", "back\\slash", "ünï",
+    ],
+)  # fmt: skip
+def test_every_value_comes_through_yaml_as_itself_and_as_its_own_type(value):
+    argument = command_line(spec(key=value))[-1]
+    name, _, text = argument.partition(":=")
+    # ROS reads YAML 1.2 numbers as C does; PyYAML needs a dot before the exponent.
+    read = float(text) if isinstance(value, float) else yaml.safe_load(text)
+    assert name == "key"
+    assert read == value
+    assert type(read) is type(value)
+
+
+def test_children_stay_on_this_machine_and_know_their_parent(monkeypatch):
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+    environment = child_environment()
+    assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    assert int(environment["FULMAR_PARENT_PID"]) == psutil.Process().pid
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    assert child_environment()["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [
+        (0, "plant ended with exit code 0"),
+        (3, "plant ended with exit code 3"),
+        (-9, "plant was killed by SIGKILL"),
+    ],
+)
+def test_how_a_child_ended_is_said_in_words(code, text):
+    assert Ended("plant", code).text == text
+
+
+@pytest.fixture
+def start(tmp_path, monkeypatch):
+    """Start small programs as if they were nodes."""
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    group = ProcessGroup()
+
+    def start(name, program):
+        (tmp_path / f"{name}_program.py").write_text(program)
+        group.start(NodeSpec(name, "x", "x", f"{name}_program", "/x"))
+        return group
+
+    yield start
+    group.stop_all()
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_output_of_a_child_is_prefixed_with_its_name(start, capfd):
+    group = start("talker", "print('hello')")
+    wait_for(group.ended)
+    wait_for(lambda: "[talker] hello" in capfd.readouterr().err)
+
+
+def test_a_child_that_ended_is_found_with_its_code(start):
+    group = start("quitter", "raise SystemExit(3)")
+    wait_for(group.ended)
+    assert group.ended() == Ended("quitter", 3)
+
+
+def test_a_child_that_sleeps_is_asked_to_stop_and_does(start, tmp_path):
+    ready = tmp_path / "ready"
+    group = start(
+        "sleeper",
+        "import time, pathlib\n"
+        "try:\n"
+        f"    pathlib.Path({str(ready)!r}).touch()\n"
+        "    time.sleep(60)\n"
+        "except KeyboardInterrupt:\n"
+        "    raise SystemExit(5)\n",
+    )
+    wait_for(ready.exists)
+    assert group.stop("sleeper") == [Ended("sleeper", 5)]
+    assert group.ended() is None
+
+
+def test_a_child_that_was_stopped_in_its_tracks_is_killed_without_delay(start, tmp_path):
+    ready = tmp_path / "ready"
+    group = start("frozen", f"import time, pathlib\npathlib.Path({str(ready)!r}).touch()\ntime.sleep(60)\n")
+    wait_for(ready.exists)
+    child = psutil.Process(group.pid("frozen"))
+    child.suspend()
+    wait_for(lambda: child.status() == psutil.STATUS_STOPPED)
+    began = time.monotonic()
+    assert group.stop("frozen") == [Ended("frozen", -9)]
+    assert time.monotonic() - began < 3.0
