@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.state import Pose, RigidBodyState
+from fulmar_core.state import Pose, RigidBodyState, stack_poses, stack_states
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.planar import planar_error
 
@@ -31,42 +31,52 @@ COLUMNS = ("position_error", "heading_error", "speed", "yaw_rate", "actuators_in
 
 
 class TrajectoryLog:
-    """Collects steps of a batch of episodes."""
+    """Collects steps of one episode or of a batch; the figures are computed when asked for."""
 
     def __init__(self, control_dt: float) -> None:
         """Begin empty; `control_dt` in seconds."""
         self._control_dt = control_dt
-        self._steps: list[tuple[np.ndarray, ...]] = []
+        self._truths: list[RigidBodyState] = []
+        self._goals: list[Pose] = []
+        self._commands: list[np.ndarray] = []
 
     def add(self, truth: RigidBodyState, goal: Pose, command: np.ndarray) -> None:
         """Note one control step.
 
         Args:
-            truth: True state after the step, leading shape (episodes,).
-            goal: Goals, leading shape (episodes,).
-            command: What was applied, shape (episodes, n).
+            truth: True state after the step, leading shape () or (episodes,); must not change later.
+            goal: Goals, same leading shape; must not change later.
+            command: What was applied, shape (n,) or (episodes, n); must not change later.
         """
-        error = planar_error(truth, goal)
-        self._steps.append(
-            (
-                error.position,
-                error.heading,
-                np.linalg.norm(truth.velocity_in_world, axis=-1),
-                truth.angular_velocity_in_body[..., 2],
-                np.mean(np.asarray(command) != 0.0, axis=-1),
-            )
-        )
+        self._truths.append(truth)
+        self._goals.append(goal)
+        self._commands.append(command)
 
     def trajectories(self) -> Trajectories:
         """Everything noted so far."""
-        columns = (np.stack(column, axis=-1) for column in zip(*self._steps, strict=True))
-        return Trajectories(**dict(zip(COLUMNS, columns, strict=True)), control_dt=self._control_dt)
+        truth, goal = stack_states(self._truths), stack_poses(self._goals)
+        error = planar_error(truth, goal)
+        columns = (
+            error.position,
+            error.heading,
+            np.linalg.norm(truth.velocity_in_world, axis=-1),
+            truth.angular_velocity_in_body[..., 2],
+            np.mean(np.stack(self._commands) != 0.0, axis=-1),
+        )
+        by_name = {name: np.atleast_2d(column.T) for name, column in zip(COLUMNS, columns, strict=True)}
+        return Trajectories(**by_name, control_dt=self._control_dt)
 
 
 def join(runs: list[Trajectories]) -> Trajectories:
     """One set of trajectories out of several of equal length and rate."""
-    arrays = {name: np.concatenate([np.atleast_2d(getattr(run, name)) for run in runs]) for name in COLUMNS}
+    arrays = {name: np.concatenate([getattr(run, name) for run in runs]) for name in COLUMNS}
     return Trajectories(**arrays, control_dt=runs[0].control_dt)
+
+
+def select(run: Trajectories, episodes: np.ndarray) -> Trajectories:
+    """Some episodes of a set, in the order of their indices."""
+    arrays = {name: getattr(run, name)[episodes] for name in COLUMNS}
+    return Trajectories(**arrays, control_dt=run.control_dt)
 
 
 def successes(run: Trajectories, task: Task) -> np.ndarray:

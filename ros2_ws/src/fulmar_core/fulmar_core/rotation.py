@@ -22,19 +22,26 @@ def rotate(quat_xyzw: Array, vector: Array) -> Array:
     Returns:
         The same vectors in the world frame, shape (..., 3).
     """
-    xp = array_namespace(quat_xyzw)
-    return _sandwich(xp, quat_xyzw[..., 0:3], quat_xyzw[..., 3:4], vector)
+    return _turn(quat_xyzw, vector, quat_xyzw[..., 3])
 
 
 def rotate_inverse(quat_xyzw: Array, vector: Array) -> Array:
     """Express world-frame vectors in the body frame; shapes as in `rotate`."""
-    xp = array_namespace(quat_xyzw)
-    return _sandwich(xp, -quat_xyzw[..., 0:3], quat_xyzw[..., 3:4], vector)
+    return _turn(quat_xyzw, vector, -quat_xyzw[..., 3])
 
 
-def _sandwich(xp: Any, u: Array, w: Array, v: Array) -> Array:
-    t = 2.0 * cross(u, v)
-    return v + w * t + cross(u, t)
+def _turn(quat_xyzw: Array, vector: Array, w: Array) -> Array:
+    """V + w t + u × t with t = 2 u × v, written out: it is on every control path, and arrays here are short.
+
+    The inverse rotation is the same with -w, since q and -q are one rotation.
+    """
+    xp = array_namespace(quat_xyzw, vector)
+    x, y, z = quat_xyzw[..., 0], quat_xyzw[..., 1], quat_xyzw[..., 2]
+    a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return xp.stack(
+        (a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx), axis=-1
+    )
 
 
 def cross(a: Array, b: Array) -> Array:

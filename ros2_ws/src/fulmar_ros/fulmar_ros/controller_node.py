@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -21,7 +22,6 @@ from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.state import Pose, RigidBodyState
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.tasks.planar import planar_error
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
@@ -182,7 +182,8 @@ class ControllerNode(LifecycleNode):
                 self._newest = measurement
                 changes["last_input_ns"] = time.monotonic_ns()
                 if self._goal is not None:
-                    changes["goal_distance"] = float(planar_error(measurement.state, self._goal).position)
+                    here, there = measurement.state.position_in_world, self._goal.position_in_world
+                    changes["goal_distance"] = math.dist(here[:2], there[:2])
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
         if self.settings.lockstep and self.wires.subscribers() >= self.settings.wait_for_subscribers:
             self._control(measurement.stamp_ns)

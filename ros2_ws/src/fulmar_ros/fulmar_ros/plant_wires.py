@@ -75,7 +75,7 @@ class PlantWires:
         self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
         if resend:
             return
-        if sample.imu is not None:
+        if sample.imu is not None and self._imu.get_subscription_count():
             self._imu.publish(self._write_imu.write(sample.imu, time_ns))
         self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -48,6 +49,10 @@ def evaluate(
     control_hz: Annotated[
         float | None, typer.Option(metavar="HZ", min=0.01, help="Command rate; the robot's own by default.")
     ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Pairs of processes through ros; one for each core."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Judge a controller over many episodes and print every figure.
@@ -87,7 +92,7 @@ def evaluate(
     )
     began = time.monotonic()
     with step_bar("judging", episodes * round(the_task.episode_s * hz)) as progress:
-        run = _roll_out(plan, through, episodes, progress)
+        run = _roll_out(plan, through, episodes, jobs or _cores(), progress)
     wall_s = time.monotonic() - began
     figures = {
         "robot": robot,
@@ -107,7 +112,7 @@ def evaluate(
         _print(figures)
 
 
-def _roll_out(plan: RunPlan, through: str, episodes: int, progress: Progress) -> Trajectories:
+def _roll_out(plan: RunPlan, through: str, episodes: int, jobs: int, progress: Progress) -> Trajectories:
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
@@ -116,7 +121,7 @@ def _roll_out(plan: RunPlan, through: str, episodes: int, progress: Progress) ->
     if through == "ros":
         from fulmar_bringup.ros_evaluation import roll_out_through_ros
 
-        return roll_out_through_ros(plan, episodes=episodes, progress=progress)
+        return roll_out_through_ros(plan, episodes=episodes, jobs=jobs, progress=progress)
     robot, task, scenario = load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario)
     controller = _controller(plan)
     if through == "batch":
@@ -134,6 +139,11 @@ def _roll_out(plan: RunPlan, through: str, episodes: int, progress: Progress) ->
         seed=plan.seed,
         progress=progress,
     )
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
 
 
 def _controller(plan: RunPlan) -> Controller:

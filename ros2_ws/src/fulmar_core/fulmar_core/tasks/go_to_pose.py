@@ -17,9 +17,8 @@ from fulmar_core.tasks.planar import (
     Start,
     Tolerance,
     fine_terms,
-    goal_in_body,
+    goal_and_motion_in_body,
     heading_terms,
-    motion_terms,
     planar_error,
 )
 
@@ -70,9 +69,9 @@ class GoToPose:
             Terms in the order of `observation_names`, shape (..., 10).
         """
         xp = array_namespace(state.position_in_world)
-        offset = goal_in_body(state, goal)
+        offset, motion = goal_and_motion_in_body(state, goal)
         fine = fine_terms(offset, saturation=self.fine_distance)
-        return xp.concat((offset, heading_terms(state, goal), motion_terms(state), fine), axis=-1)
+        return xp.concat((offset, heading_terms(state, goal), motion, fine), axis=-1)
 
     def reward(self, before: RigidBodyState, after: RigidBodyState, goal: Pose, command: Array) -> Array:
         """Reward of one control step.

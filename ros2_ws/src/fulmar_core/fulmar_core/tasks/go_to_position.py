@@ -16,8 +16,7 @@ from fulmar_core.tasks.planar import (
     Start,
     Tolerance,
     fine_terms,
-    goal_in_body,
-    motion_terms,
+    goal_and_motion_in_body,
     planar_error,
 )
 
@@ -61,10 +60,8 @@ class GoToPosition:
             Terms in the order of `observation_names`, shape (..., 8).
         """
         xp = array_namespace(state.position_in_world)
-        offset = goal_in_body(state, goal)
-        return xp.concat(
-            (offset, motion_terms(state), fine_terms(offset, saturation=self.fine_distance)), axis=-1
-        )
+        offset, motion = goal_and_motion_in_body(state, goal)
+        return xp.concat((offset, motion, fine_terms(offset, saturation=self.fine_distance)), axis=-1)
 
     def reward(self, before: RigidBodyState, after: RigidBodyState, goal: Pose, command: Array) -> Array:
         """Reward of one control step; arguments and shape as in `GoToPose.reward`."""

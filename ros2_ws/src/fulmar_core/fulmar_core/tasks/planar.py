@@ -88,9 +88,21 @@ def planar_error(state: RigidBodyState, goal: Pose) -> PlanarError:
     )
 
 
-def goal_in_body(state: RigidBodyState, goal: Pose) -> Array:
-    """Vector to the goal in the body frame, shape (..., 2) [m]."""
-    return rotate_inverse(state.quat_xyzw, goal.position_in_world - state.position_in_world)[..., 0:2]
+def goal_and_motion_in_body(state: RigidBodyState, goal: Pose) -> tuple[Array, Array]:
+    """What a task in the plane sees of position and motion; one rotation for both, as this runs at every step.
+
+    Args:
+        state: Measured state.
+        goal: Goal pose.
+
+    Returns:
+        Vector to the goal, shape (..., 2) [m]; velocity and turn rate, shape (..., 3) [m/s, m/s, rad/s].
+    """
+    xp = array_namespace(state.position_in_world)
+    in_world = xp.stack((goal.position_in_world - state.position_in_world, state.velocity_in_world), axis=-2)
+    in_body = rotate_inverse(state.quat_xyzw[..., None, :], in_world)
+    motion = xp.concat((in_body[..., 1, 0:2], state.angular_velocity_in_body[..., 2:3]), axis=-1)
+    return in_body[..., 0, 0:2], motion
 
 
 def heading_terms(state: RigidBodyState, goal: Pose) -> Array:
@@ -98,13 +110,6 @@ def heading_terms(state: RigidBodyState, goal: Pose) -> Array:
     xp = array_namespace(state.quat_xyzw)
     error = yaw_of(goal.quat_xyzw) - state.yaw
     return xp.stack((xp.cos(error), xp.sin(error)), axis=-1)
-
-
-def motion_terms(state: RigidBodyState) -> Array:
-    """Velocity in the body frame and turn rate, shape (..., 3) [m/s, m/s, rad/s]."""
-    xp = array_namespace(state.quat_xyzw)
-    velocity = rotate_inverse(state.quat_xyzw, state.velocity_in_world)[..., 0:2]
-    return xp.concat((velocity, state.angular_velocity_in_body[..., 2:3]), axis=-1)
 
 
 def fine_terms(offset: Array, *, saturation: float) -> Array:
