@@ -58,7 +58,7 @@ RUN = ["run", "floating_platform"]
     ("words", "told"),
     [
         (["lst"], "No such command 'lst'. Did you mean 'list'?"),
-        (["bundle", "shwo", "x"], "No such command 'shwo'. Did you mean 'show'?"),
+        (["bundle", "shov", "x"], "No such command 'shov'. Did you mean 'show'?"),
         (["list", "--jsno"], "--jsno"),
         (["run"], "Missing argument 'ROBOT'"),
         (["list", "robot"], "unknown family 'robot'. Did you mean 'robots'?"),
@@ -110,8 +110,8 @@ def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, 
         ("robots/floating_platform.yaml", "", "robots/floating_platform.yaml:1: the file is empty"),
         (
             "robots/floating_platform.yaml",
-            "\n" * 99 + "nmae: x\n",
-            "floating_platform.yaml:100: unknown key 'nmae'",
+            "\n" * 99 + "nam: x\n",
+            "floating_platform.yaml:100: unknown key 'nam'",
         ),
         (
             "tasks/go_to_pose.yaml",
