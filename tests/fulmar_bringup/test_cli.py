@@ -110,8 +110,8 @@ def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, 
         ("robots/floating_platform.yaml", "", "robots/floating_platform.yaml:1: the file is empty"),
         (
             "robots/floating_platform.yaml",
-            "\n" * 99 + "nam: x\n",
-            "floating_platform.yaml:100: unknown key 'nam'",
+            "\n" * 99 + "bodyy: x\n",
+            "floating_platform.yaml:100: unknown key 'bodyy'",
         ),
         (
             "tasks/go_to_pose.yaml",
