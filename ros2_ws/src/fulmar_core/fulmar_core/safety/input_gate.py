@@ -9,7 +9,7 @@ import numpy as np
 from fulmar_core.robot import Limits
 from fulmar_core.state import RigidBodyState
 
-FROZEN_AFTER = 10  # equal measurements in a row that no noisy sensor gives
+FROZEN_AFTER = 10  # repeats of one measurement that no noisy sensor gives
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class InputGate:
 
         Args:
             limits: What the robot can possibly do.
-            frozen_after: Equal measurements in a row that count as a stuck sensor; 0 never does, as for
+            frozen_after: Repeats of one measurement that count as a stuck sensor; 0 never does, as for
                 simulated sensors without noise.
         """
         self._limits, self._frozen_after = limits, frozen_after
