@@ -9,11 +9,11 @@ from typing import Any
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.metrics import summary
 from fulmar_core.robot import load_robot
+from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import load_task
 from sim_nodes.mujoco_backend import MujocoBackend
 from training.export import read_run_record
 from training.network import NetworkController, load_network
-from training.rollout import roll_out_in_backends
 from training.train import NETWORK_FILE, RUN_FILE
 
 JUDGE_SEED = 2026  # no training seed, and not the seed of the checks while learning

@@ -22,11 +22,11 @@ from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.metrics import summary
 from fulmar_core.robot import Robot
+from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import Task
 from training.network import DeployedNetwork, NetworkController, deployed_network, save_network
 from training.ppo import build_ppo
 from training.progress import LearningBar
-from training.rollout import roll_out_in_batch
 from training.settings import TrainingSettings
 from training.vec_env import BatchVecEnv
 

@@ -10,6 +10,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
 from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.episode import episode_steps
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
@@ -51,7 +52,7 @@ class BatchVecEnv(VecEnv):
         )
         self.simulation = self._new_simulation(seed)
         self._seed = seed
-        self._horizon = round(task.episode_s / self.simulation.control_dt)
+        self._horizon = episode_steps(task, self.simulation.control_dt)
         observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(task.observation_names),), np.float32)
         action_space = gymnasium.spaces.MultiBinary(len(robot.actuators.names))
         super().__init__(worlds, observation_space, action_space)

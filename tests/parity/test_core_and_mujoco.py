@@ -11,6 +11,7 @@ from fulmar_core.controllers.lqr import load_lqr
 from fulmar_core.disturbances.scenario import World, load_scenario
 from fulmar_core.metrics import episode_metrics, successes
 from fulmar_core.robot import load_robot
+from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.state import RigidBodyState, planar_state
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
@@ -18,7 +19,6 @@ from sim_nodes.mock_backend import MockBackend
 pytest.importorskip("mujoco")
 
 from sim_nodes.mujoco_backend import MujocoBackend
-from training.rollout import roll_out_in_backends, roll_out_in_batch
 
 PLANAR = load_robot("floating_platform")
 FREE = replace(PLANAR, body=replace(PLANAR.body, planar=False, inertia=(0.1, 0.2, 0.3)))
@@ -88,7 +88,7 @@ def test_without_noise_both_fly_the_same_path():
 
 
 def test_more_episodes_than_simulators_are_run_in_turns(monkeypatch):
-    from training import rollout
+    from fulmar_core import rollout
 
     task, scenario = replace(load_task("go_to_pose"), episode_s=2.0), load_scenario("nominal")
     lqr = load_lqr(PLANAR, task)

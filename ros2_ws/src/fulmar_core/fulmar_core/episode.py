@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.disturbances.scenario import Scenario, World, draw_world
+from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_core.state import Pose, RigidBodyState
 from fulmar_core.tasks import Task
@@ -25,6 +26,28 @@ class Episode:
 
 
 START, NOISE, WORLD = 0, 1, 2  # streams of random numbers that do not disturb one another
+
+
+def episode_steps(task: Task, control_dt: float) -> int:
+    """Control steps of one episode.
+
+    Args:
+        task: Says how long an episode lasts.
+        control_dt: Time of one control step [s].
+
+    Returns:
+        Number of steps, >= 1.
+
+    Raises:
+        ConfigError: The episode is shorter than one control step.
+    """
+    steps = round(task.episode_s / control_dt)
+    if steps < 1:
+        raise ConfigError(
+            f"an episode of task '{task.name}' lasts {task.episode_s:g} s, less than one control step of "
+            f"{control_dt:g} s. Use a higher rate or a longer episode."
+        )
+    return steps
 
 
 def episode_rng(seed: int, number: int, *, repeat: int = 0, stream: int = START) -> np.random.Generator:

@@ -115,8 +115,8 @@ def evaluate(
 def _roll_out(plan: RunPlan, through: str, episodes: int, jobs: int, progress: Progress) -> Trajectories:
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.robot import load_robot
+    from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
     from fulmar_core.tasks import load_task
-    from training.rollout import roll_out_in_backends, roll_out_in_batch
 
     if through == "ros":
         from fulmar_bringup.ros_evaluation import roll_out_through_ros

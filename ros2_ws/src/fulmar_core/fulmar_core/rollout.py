@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from fulmar_core.backend import Backend
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import draw_episode
+from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.metrics import Trajectories, TrajectoryLog, join
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
@@ -42,13 +43,16 @@ def roll_out_in_batch(
 
     Returns:
         What happened, from the true states.
+
+    Raises:
+        ConfigError: An episode is shorter than one control step.
     """
     simulation = BatchSimulation(
         robot, task, scenario, worlds=episodes, seed=seed, control_hz=controller.control_hz
     )
     controller.reset()
     log = TrajectoryLog(simulation.control_dt)
-    for step in range(round(task.episode_s / simulation.control_dt)):
+    for step in range(episode_steps(task, simulation.control_dt)):
         command = robot.actuators.limited(controller.act(task.observe(simulation.measured, simulation.goal)))
         simulation.step(command)
         log.add(simulation.truth, simulation.goal, command)
@@ -79,19 +83,24 @@ def roll_out_in_backends(
 
     Returns:
         What happened, from the true states.
+
+    Raises:
+        ConfigError: An episode is shorter than one control step.
     """
-    backends = [make_backend() for _ in range(min(episodes, SIDE_BY_SIDE))]
-    runs = []
-    for first in range(0, episodes, SIDE_BY_SIDE):
-        numbers = range(first, min(first + SIDE_BY_SIDE, episodes))
-        done = sum(run.position_error.size for run in runs)
-        runs.append(
-            _side_by_side(
-                controller, backends, task, scenario, numbers, seed, lambda n, d=done: progress(d + n)
+    runs: list[Trajectories] = []
+    with ExitStack() as stack:
+        backends = []
+        for _ in range(min(episodes, SIDE_BY_SIDE)):
+            backends.append(make_backend())
+            stack.callback(backends[-1].close)
+        for first in range(0, episodes, SIDE_BY_SIDE):
+            numbers = range(first, min(first + SIDE_BY_SIDE, episodes))
+            done = sum(run.position_error.size for run in runs)
+            runs.append(
+                _side_by_side(
+                    controller, backends, task, scenario, numbers, seed, lambda n, d=done: progress(d + n)
+                )
             )
-        )
-    for backend in backends:
-        backend.close()
     return join(runs)
 
 
@@ -116,7 +125,7 @@ def _side_by_side(
     goal = stack_poses([episode.goal for episode in episodes])
     controller.reset()
     log = TrajectoryLog(control_dt)
-    for step in range(round(task.episode_s / control_dt)):
+    for step in range(episode_steps(task, control_dt)):
         measured = stack_states([sample.odometry for sample in samples])
         commands = robot.actuators.limited(controller.act(task.observe(measured, goal)))
         samples = [
