@@ -43,5 +43,8 @@ class MockBackend:
         )
         return Sample(self._state, None, self._state)
 
+    def make_safe(self) -> None:
+        """Nothing to do: a command acts only during a step."""
+
     def close(self) -> None:
         """Nothing to release."""

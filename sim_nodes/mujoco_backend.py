@@ -76,9 +76,13 @@ class MujocoBackend:
             )
         return self._sample()
 
+    def make_safe(self) -> None:
+        """Close the valves."""
+        self.data.ctrl[:] = 0.0
+
     def close(self) -> None:
         """Close the valves; MuJoCo itself needs no closing."""
-        self.data.ctrl[:] = 0.0
+        self.make_safe()
 
     def _sample(self) -> Sample:
         # mj_step leaves the sensors as they were before its last integration step.

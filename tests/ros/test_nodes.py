@@ -13,8 +13,17 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+
+from fulmar_core.backend import Sample
+from fulmar_core.controllers.lqr import Lqr
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.state import planar_pose, planar_state
+from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     COMMAND,
@@ -26,18 +35,14 @@ from fulmar_core.topics import (
     TRUTH,
 )
 from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.convert import OdometryWriter, VectorWriter, goal_message
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
-from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import Odometry
 from policy_server.lqr_node import make_lqr
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from sensor_msgs.msg import JointState
+from sim_nodes.mock_backend import MockBackend
 from sim_nodes.sim_node import make_backend
-
 from tests.conftest import RosDomain
 
 NAMESPACE = "/floating_platform"
@@ -52,13 +57,25 @@ class Neighbour:
         self.applied: list[np.ndarray] = []
         self.commands: list[np.ndarray] = []
         self.said: dict[str, tuple[str, dict[str, str]]] = {}
-        listen = self.node.create_subscription
-        listen(JointState, ACTUATORS_STATE.name, self._applied, subscriber_qos(ACTUATORS_STATE, reliable=True, depth=50))
-        listen(JointState, COMMAND.name, self._commanded, subscriber_qos(COMMAND, reliable=True, depth=50))
-        listen(DiagnosticArray, DIAGNOSTICS.name, self._hear, subscriber_qos(DIAGNOSTICS, reliable=True, depth=50))
+        listen, many = self.node.create_subscription, {"reliable": True, "depth": 50}
+        listen(
+            JointState,
+            ACTUATORS_STATE.name,
+            self._applied,
+            subscriber_qos(ACTUATORS_STATE, **many),
+        )
+        listen(JointState, COMMAND.name, self._commanded, subscriber_qos(COMMAND, **many))
+        listen(
+            DiagnosticArray,
+            DIAGNOSTICS.name,
+            self._hear,
+            subscriber_qos(DIAGNOSTICS, **many),
+        )
         self._command = self.node.create_publisher(JointState, COMMAND.name, publisher_qos(COMMAND))
         self._odometry = self.node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
-        self._goal = self.node.create_publisher(PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE))
+        self.goal_publisher = self.node.create_publisher(
+            PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE)
+        )
 
     def _applied(self, message: JointState) -> None:
         self.applied.append(np.array(message.effort))
@@ -68,7 +85,10 @@ class Neighbour:
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            self.said[status.name.split(": ")[1]] = (status.message, {pair.key: pair.value for pair in status.values})
+            self.said[status.name.split(": ")[1]] = (
+                status.message,
+                {pair.key: pair.value for pair in status.values},
+            )
 
     def command(self, values: list[float], names: list[str] | None = None) -> None:
         """Send one command."""
@@ -76,9 +96,11 @@ class Neighbour:
 
     def give_goal(self) -> None:
         """Ask for a pose far away, so that valves open."""
-        self._goal.publish(goal_message(planar_pose(4.0, 0.0, 0.0), "goal_pose", 1))
+        self.goal_publisher.publish(goal_message(planar_pose(4.0, 0.0, 0.0), "goal_pose", 1))
 
-    def odometry(self, stamp_ns: int, spoil: Callable[[Odometry], None] = lambda _message: None, x: float = 0.0) -> None:
+    def odometry(
+        self, stamp_ns: int, spoil: Callable[[Odometry], None] = lambda _message: None, x: float = 0.0
+    ) -> None:
         """Send one measurement, spoilt if asked."""
         message = OdometryWriter(self.robot.sensors.odometry).write(planar_state(x, 0.0, 0.0), stamp_ns)
         spoil(message)
@@ -161,7 +183,12 @@ class Stream:
     """Odometry at 50 Hz from a thread, until told otherwise."""
 
     def __init__(self, neighbour: Neighbour) -> None:
-        self.neighbour, self.spoil, self.step_ns, self.moving = neighbour, lambda _message: None, 20_000_000, True
+        self.neighbour, self.spoil, self.step_ns, self.moving = (
+            neighbour,
+            lambda _message: None,
+            20_000_000,
+            True,
+        )
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -261,7 +288,7 @@ def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
         ("sim_nodes.sim_node", "backend:='mujocco'", "Did you mean 'mujoco'?"),
         ("policy_server.policy_node", "policy:='nowhere'", "policy 'nowhere' has no passport.json"),
         ("policy_server.policy_node", "control_hz:=10.0", "was trained at 5 Hz, but would run at 10 Hz"),
-        ("policy_server.lqr_node", "rate:=-1.0", "must be greater than 0"),
+        ("policy_server.lqr_node", "rate:=-1.0", "must be a finite number, at least 0"),
     ],
 )
 def test_a_wrong_parameter_ends_a_node_with_one_line_and_exit_code_two(
@@ -280,3 +307,109 @@ def test_a_wrong_parameter_ends_a_node_with_one_line_and_exit_code_two(
     assert done.returncode == 2, done.stderr
     assert words in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_stale_command_does_not_survive_a_deactivation(neighbour: Neighbour, plant: PlantNode) -> None:
+    """Deactivate with an open valve, activate again at once: the plant begins with closed valves."""
+    until(lambda: neighbour.command(open_valves(neighbour.robot)) or neighbour.applied[-1].any())
+    assert plant.trigger_deactivate() == plant.trigger_activate()
+    until(lambda: not neighbour.applied[-1].any())
+    before = len(neighbour.applied)
+    until(lambda: len(neighbour.applied) > before + 10)
+    assert not any(applied.any() for applied in neighbour.applied[before:])
+    assert plant.guard.watchdog.trips == 0
+
+
+def test_shutdown_from_active_stops_the_loop_and_closes_the_valves(
+    neighbour: Neighbour, plant: PlantNode
+) -> None:
+    """A finalized plant moves nothing any more."""
+    until(lambda: neighbour.command(open_valves(neighbour.robot)) or neighbour.applied[-1].any())
+    plant.trigger_shutdown()
+    until(lambda: not neighbour.applied[-1].any())
+    time.sleep(0.2)
+    count = len(neighbour.applied)
+    time.sleep(0.2)
+    assert len(neighbour.applied) == count
+
+
+def test_a_backend_that_raises_ends_the_process_with_closed_valves(neighbour: Neighbour) -> None:
+    """Even if it raises again when it shall be made safe."""
+
+    class Broken(MockBackend):
+        def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+            raise OSError("the bus is gone")
+
+        def make_safe(self) -> None:
+            raise OSError("still gone")
+
+    codes: list[int] = []
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    node = PlantNode(lambda robot, _settings: Broken(robot), codes.append, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: codes == [1])
+        until(lambda: "the bus is gone" in neighbour.said.get("plant", ("",))[0])
+
+
+def test_a_backend_that_hangs_is_reported_and_its_watchdog_counts(neighbour: Neighbour) -> None:
+    """A step that does not come back cannot hide behind an old status."""
+    release = threading.Event()
+
+    class Hanging(MockBackend):
+        def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+            release.wait()
+            return super().step(command, ticks)
+
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    node = PlantNode(lambda robot, _settings: Hanging(robot), lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: "it hangs" in neighbour.said.get("plant", ("",))[0])
+        release.set()
+        node.stop()
+
+
+def test_a_controller_that_raises_commands_what_is_safe_and_ends(
+    neighbour: Neighbour, ros_domain: RosDomain
+) -> None:
+    """The robot does not wait for the watchdog."""
+
+    class Raising(Lqr):
+        def act(self, observation: np.ndarray) -> np.ndarray:
+            if np.any(observation):
+                raise ZeroDivisionError("no gain today")
+            return super().act(observation)
+
+    def make(robot: Robot, task: GoToPose, settings: ControllerSettings) -> Lqr:
+        good = make_lqr(robot, task, settings)
+        good.__class__ = Raising
+        return good
+
+    codes: list[int] = []
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=50.0"]
+    node = ControllerNode(make, codes.append, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        neighbour.give_goal()
+        odometry = Stream(neighbour)
+        until(lambda: codes != [])
+        odometry.stop()
+        assert set(codes) == {1}
+        until(lambda: "no gain today" in neighbour.said["controller"][1]["reason"])
+        assert not any(command.any() for command in neighbour.commands)
+        node.stop()
+
+
+def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
+    """Judged at once, not at the next measurement."""
+    neighbour = stream.neighbour
+    neighbour.goal_publisher.publish(goal_message(planar_pose(300.0, 0.0, 0.0), "goal_pose", 2))
+    until(lambda: "geofence" in neighbour.said["controller"][1]["reason"])
+    until(lambda: not neighbour.commands[-1].any())
+
+
+def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: ControllerNode) -> None:
+    """Then silence."""
+    controller.trigger_deactivate()
+    until(lambda: not stream.neighbour.commands[-1].any())
+    count = len(stream.neighbour.commands)
+    time.sleep(0.2)
+    assert len(stream.neighbour.commands) == count

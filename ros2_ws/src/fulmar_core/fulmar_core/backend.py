@@ -56,6 +56,10 @@ class Backend(Protocol):
         """
         ...
 
+    def make_safe(self) -> None:
+        """Bring the actuators to their safe state at once; time does not move on."""
+        ...
+
     def close(self) -> None:
         """Bring the actuators to their safe state and let go."""
         ...

@@ -12,6 +12,9 @@ from typing import Literal
 Source = Literal["plant", "controller", "operator", "every node"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
+# Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
+SIMULATION_START_NS = 1_000_000_000
+
 
 @dataclass(frozen=True)
 class Wire:

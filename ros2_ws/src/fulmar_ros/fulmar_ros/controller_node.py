@@ -20,16 +20,18 @@ from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.command_gate import Rejections, command_problem
 from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
 from fulmar_core.safety.watchdog import default_timeout
-from fulmar_core.state import Pose, RigidBodyState
+from fulmar_core.state import Pose
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.parameters import read_parameters
-from fulmar_ros.runtime import RequestExit
+from fulmar_ros.runtime import FAILED, RequestExit
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
+DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
 WARM_UP = 20  # the first inferences are slow; they happen before anything moves
 SAFE_REPEATS = 5
 AFTER_ODOMETRY_NS = (
@@ -72,23 +74,24 @@ class ControllerNode(LifecycleNode):
         self._goal: Pose | None = None
         self._goal_stamp_ns = 0
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
-        self._deadlines = Deadlines(1.0 / (hz * self.settings.rate))
+        self._deadlines = self._new_deadlines()
         self._inference_ms = Spread()
         self._steps = 0
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
-                if transition() != TransitionCallbackReturn.SUCCESS:
+                if transition() != DONE:
                     raise FulmarError(self._refusal)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load, validate and warm up the controller; refuse it if anything is wrong."""
         try:
             self.controller = self._make_controller(self.robot, self.task, self.settings)
-        except FulmarError as error:
+        except (FulmarError, ImportError) as error:
             self._refusal = str(error)
-            return TransitionCallbackReturn.FAILURE
+            self.get_logger().error(f"not configured: {error}")
+            return REFUSED
         for _ in range(WARM_UP):
             self.controller.act(np.zeros(len(self.controller.observation_names)))
         self.controller.reset()
@@ -104,48 +107,72 @@ class ControllerNode(LifecycleNode):
         metadata = self.controller.metadata()
         self._sha256 = str(metadata.get("sha256", ""))
         self.wires.publish_metadata(metadata)
-        self._set(configured=True)
-        return TransitionCallbackReturn.SUCCESS
+        # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
+        self._status_timer = self.create_timer(STATUS_PERIOD_S / 4, self._tell_idle_status)
+        self._set(configured=True, latched_fault="")
+        return DONE
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to answer."""
-        self._set(activated=True)
+        """Begin to answer, from fresh measurements on."""
+        with self._lock:
+            self._newest = None
+            self._input_gate.forget()
+            self._flags = dataclasses.replace(
+                self._flags, activated=True, last_input_ns=None, input_problem=""
+            )
+        self._deadlines = self._new_deadlines()
         if not self.settings.lockstep:
             self._stop.clear()
             self._thread = threading.Thread(target=self._run, name="control", daemon=True)
             self._thread.start()
-        else:
-            # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
-            self._status_timer = self.create_timer(
-                STATUS_PERIOD_S / 4, lambda: self._tell_status(self._decide())
-            )
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more; the last word is the safe command."""
-        self._halt()
-        self._set(activated=False)
+        self._fall_silent()
         return super().on_deactivate(state)
 
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let go of the controller and every endpoint."""
+        self._dismantle()
+        return DONE
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop and let go, from whatever state."""
+        self._dismantle()
+        return DONE
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """As on shutdown: an error never leaves a command standing."""
+        self._dismantle()
+        return DONE
+
     def stop(self) -> None:
-        """Last words before the process ends: the safe command, several times."""
-        self._halt()
-        if hasattr(self, "wires"):
-            for _ in range(SAFE_REPEATS):
-                self._publish_safe()
-            self.wires.flush()
-            self._said_at = 0.0  # the last status has the figures of the whole run
+        """Last words before the process ends: the safe command, several times, and the figures of the run."""
+        if self._flags.configured:
+            self._fall_silent()
+            self._said_at = 0.0
             self._tell_status(self._decide())
 
-    def _halt(self) -> None:
+    def _fall_silent(self) -> None:
         self._stop.set()
+        self._set(activated=False)
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(PATIENCE_S)
             self._thread = None
+        for _ in range(SAFE_REPEATS):
+            self.wires.publish_safe(self._newest.stamp_ns if self._newest else 0)
+        self.wires.flush()
 
-    def _publish_safe(self) -> None:
-        stamp = self._newest.stamp_ns if self._newest else 0
-        self.wires.publish_command(self.robot.actuators.safe_command, stamp)
+    def _dismantle(self) -> None:
+        if self._flags.configured:
+            self._fall_silent()
+            self._set(configured=False)
+            self.destroy_timer(self._status_timer)
+            self.wires.destroy(self)
+
+    def _new_deadlines(self) -> Deadlines:
+        return Deadlines(1.0 / (self.settings.control_rate(self.robot) * self.settings.rate))
 
     def _set(self, **changes: object) -> None:
         with self._lock:
@@ -162,13 +189,17 @@ class ControllerNode(LifecycleNode):
             return
         with self._lock:
             self._goal, self._goal_stamp_ns = goal, stamp_ns(message.header.stamp)
-            self._flags = dataclasses.replace(self._flags, has_goal=True)
+            self._flags = dataclasses.replace(
+                self._flags, has_goal=True, goal_distance=_distance(self._newest, goal)
+            )
             self.controller.reset()
             if self.settings.lockstep:
                 self._input_gate.forget()
         self._tell_status(self._decide())
 
     def _on_odometry(self, message: Odometry) -> None:
+        if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
+            return  # the plant asks again
         measurement = measurement_of(message)
         if self.settings.lockstep and measurement.stamp_ns == self._answered_ns:
             self.wires.publish_command(self._answer, self._answered_ns)  # the answer got lost
@@ -182,44 +213,62 @@ class ControllerNode(LifecycleNode):
                 self._newest = measurement
                 changes["last_input_ns"] = time.monotonic_ns()
                 if self._goal is not None:
-                    here, there = measurement.state.position_in_world, self._goal.position_in_world
-                    changes["goal_distance"] = math.dist(here[:2], there[:2])
+                    changes["goal_distance"] = _distance(measurement, self._goal)
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
-        if self.settings.lockstep and self.wires.subscribers() >= self.settings.wait_for_subscribers:
-            self._control(measurement.stamp_ns)
+        if self.settings.lockstep:
+            self._control(measurement)
 
     def _run(self) -> None:
-        while self._deadlines.wait(self._stop):
-            newest = self._newest
-            self._control(newest.stamp_ns if newest else 0)
+        deadlines = self._deadlines
+        while deadlines.wait(self._stop):
+            self._control(self._newest)
 
-    def _control(self, stamp: int) -> None:
-        """One control step: decide, act, publish."""
-        decision = self._decide()
-        newest, goal = self._newest, self._goal
-        if decision.may_act and newest is not None and goal is not None:
-            command = self._act(newest.state, goal, stamp)
-        else:
-            command = self.robot.actuators.safe_command
-            if decision.mode is not Mode.IDLE:
-                self.wires.publish_command(command, stamp)
+    def _control(self, measurement: Measurement | None) -> None:
+        """One control step on one measurement: decide, act, publish."""
+        with self._lock:
+            decision = arbitrate(self._flags, time.monotonic_ns())
+            goal = self._goal
+        stamp = measurement.stamp_ns if measurement else 0
+        command = self.robot.actuators.safe_command
+        if decision.may_act and measurement is not None and goal is not None:
+            command = self._act(measurement, goal)
+        elif decision.mode is not Mode.IDLE:
+            self.wires.publish_command(command, stamp)
         self._answered_ns, self._answer = stamp, command
         self._steps += 1
         self._tell_status(decision)
 
-    def _act(self, state: RigidBodyState, goal: Pose, stamp: int) -> np.ndarray:
+    def _act(self, measurement: Measurement, goal: Pose) -> np.ndarray:
         began = time.perf_counter_ns()
-        observation = np.asarray(self.task.observe(state, goal))
-        action = np.asarray(self.controller.act(observation), dtype=float)
+        observation = np.asarray(self.task.observe(measurement.state, goal))
+        try:
+            action = np.asarray(self.controller.act(observation), dtype=float)
+        except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
+            return self._give_up(
+                f"the controller raised {type(error).__name__}: {error}", measurement.stamp_ns
+            )
         problem = command_problem(action, len(self.robot.actuators.names))
         command = self.robot.actuators.safe_command if problem else self.robot.actuators.limited(action)
-        self.wires.publish_command(command, stamp)
         self._inference_ms.add((time.perf_counter_ns() - began) / 1e6)
-        self.wires.publish_reasoning(observation, action, stamp)
+        self.wires.publish_command(command, measurement.stamp_ns)
+        self.wires.publish_reasoning(observation, action, measurement.stamp_ns)
         fault = self._rejections.note(problem)
         if fault:
             self._set(latched_fault=fault)
         return command
+
+    def _give_up(self, reason: str, stamp: int) -> np.ndarray:
+        """Latch a fault, command what is safe, and end the process."""
+        self._set(latched_fault=reason)
+        self.get_logger().error(reason)
+        safe = self.robot.actuators.safe_command
+        self.wires.publish_command(safe, stamp)
+        self._request_exit(FAILED)
+        return safe
+
+    def _tell_idle_status(self) -> None:
+        if self.settings.lockstep or not self._flags.activated:
+            self._tell_status(self._decide())
 
     def _tell_status(self, decision: Decision) -> None:
         """Publish the status when it changed, and at least twice a second."""
@@ -249,3 +298,10 @@ class ControllerNode(LifecycleNode):
             **self._deadlines.period_error_ms.percentiles("period_error_ms"),
         }
         self.wires.health.publish(level, decision.reason or decision.mode.value, values)
+
+
+def _distance(measurement: Measurement | None, goal: Pose) -> float:
+    """From a measurement to a goal in the plane, infinite before the first measurement [m]."""
+    if measurement is None:
+        return math.inf
+    return math.dist(measurement.state.position_in_world[:2], goal.position_in_world[:2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
@@ -23,7 +24,10 @@ class ControllerSettings:
 
     def __post_init__(self) -> None:
         """Refuse values without meaning."""
-        if not self.rate > 0.0:
+        for name in ("control_hz", "rate", "input_timeout_s"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} = {getattr(self, name)} must be a finite number, at least 0.")
+        if self.rate == 0.0:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
 
     def control_rate(self, robot: Robot) -> float:

@@ -67,14 +67,25 @@ class ControllerWires:
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
         diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self.health = Health(f"{robot.name}: controller", [status, diagnostics])
+        self._actuators = robot.actuators
+        self._publishers = (
+            self._command,
+            self._observation,
+            self._action,
+            self._metadata,
+            status,
+            diagnostics,
+        )
         self._write_command = VectorWriter(robot.actuators.names)
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(controller.observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
-        node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos)
         goal = GOAL_WIRES[task.goal_topic]
         goal_type = PoseStamped if goal.type.endswith("PoseStamped") else PointStamped
-        node.create_subscription(goal_type, goal.name, on_goal, subscriber_qos(goal))
+        self._subscriptions = (
+            node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
+            node.create_subscription(goal_type, goal.name, on_goal, subscriber_qos(goal)),
+        )
 
     def subscribers(self) -> int:
         """Matched subscriptions of the command."""
@@ -83,6 +94,17 @@ class ControllerWires:
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""
         self._command.publish(self._write_command.write(command, stamp))
+
+    def publish_safe(self, stamp: int) -> None:
+        """Publish the safe command; with a message of its own, so that any thread may."""
+        self._command.publish(VectorWriter(self._actuators.names).write(self._actuators.safe_command, stamp))
+
+    def destroy(self, node: LifecycleNode) -> None:
+        """Give every endpoint back."""
+        for subscription in self._subscriptions:
+            node.destroy_subscription(subscription)
+        for publisher in self._publishers:
+            node.destroy_publisher(publisher)
 
     def flush(self) -> None:
         """Wait, not for ever, until every subscriber has the last commands."""

@@ -11,6 +11,7 @@ import numpy as np
 KEPT = 20_000  # newest samples that percentiles are taken over
 
 NS = 1_000_000_000
+LONG_NS = NS // 2
 
 
 class Spread:
@@ -75,8 +76,11 @@ class Deadlines:
         if self._next_ns is None:
             self._next_ns = time.monotonic_ns()
         ahead = self._next_ns - time.monotonic_ns()
-        if ahead > 0:
-            time.sleep(ahead / NS)
+        if ahead > LONG_NS:  # slow enough to be told to stop meanwhile
+            stop.wait((ahead - LONG_NS) / NS)
+            ahead = self._next_ns - time.monotonic_ns()
+        if ahead > 0 and not stop.is_set():
+            time.sleep(ahead / NS)  # wakes more punctually than waiting for an event
         if stop.is_set():
             return False
         now = time.monotonic_ns()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,22 +13,12 @@ from fulmar_core.errors import LockstepError
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_ros.plant_wires import PlantWires
+from fulmar_ros.simulated_time import SimulatedTime
 
 RESEND_S = 0.5
 OnStep = Callable[
     [Sample, np.ndarray], None
 ]  # called with the sample after a step and the command of the step
-
-
-@dataclass
-class SimulatedTime:
-    """Time of a simulated plant; never runs backwards, also across episodes."""
-
-    now_ns: int = 1_000_000_000  # ROS takes 0 for "not set"
-
-    def advance(self, seconds: float) -> None:
-        """Move on [s]."""
-        self.now_ns += round(seconds * 1e9)
 
 
 class LockstepLoop:
@@ -107,6 +96,7 @@ class LockstepLoop:
                     )
                 # The first messages can get lost while endpoints still find each other.
                 self._wires.publish_sample(sample, stamp, resend=True)
-            command = self._guard.output(time.monotonic_ns())
+            # The very command that answered: how long its answer or this thread took does not matter here.
+            command = self._guard.command
         self._wires.publish_applied(command, stamp)
         return command

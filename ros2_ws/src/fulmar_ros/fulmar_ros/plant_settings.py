@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
-from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.safety.watchdog import checked_timeout, default_timeout
 
 BY_RATE = -1.0  # stands for a value that follows from the control rate
 
@@ -35,7 +35,10 @@ class PlantSettings:
             raise ValueError(
                 f"start = {list(self.start)} must be three finite numbers: x [m], y [m], heading [deg]."
             )
-        if not self.rate > 0.0:
+        for name in ("control_hz", "rate", "duration_s", "command_timeout_s", "answer_timeout_s"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"{name} = {getattr(self, name)} must be a finite number.")
+        if self.rate <= 0.0:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
         if self.seed < 0:
             raise ValueError(f"seed = {self.seed} must not be negative.")
@@ -47,6 +50,6 @@ class PlantSettings:
     def timeout_s(self, robot: Robot) -> float:
         """Silence after which actuators go to their safe state, in wall-clock time [s]."""
         if self.command_timeout_s != BY_RATE:
-            return self.command_timeout_s
+            return checked_timeout(self.command_timeout_s)
         # Simulated slower than life, commands come later than any clock on a real robot would allow.
         return default_timeout(1.0 / self.control_rate(robot)) / min(self.rate, 1.0)

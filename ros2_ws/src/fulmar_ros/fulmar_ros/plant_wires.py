@@ -53,9 +53,16 @@ class PlantWires:
         self._write_truth = OdometryWriter(None, frame="map")
         self._write_imu = ImuWriter(robot)
         self._write_state = VectorWriter(robot.actuators.names)
-        node.create_subscription(
+        self._commands = node.create_subscription(
             JointState, COMMAND.name, self._on_command, subscriber_qos(COMMAND, reliable=True)
         )
+
+    def destroy(self, node: LifecycleNode) -> None:
+        """Give every endpoint back."""
+        node.destroy_subscription(self._commands)
+        for publisher in (self._odometry, self._imu, self._state, self._truth, self._clock):
+            if publisher is not None:
+                node.destroy_publisher(publisher)
 
     def subscribers(self) -> int:
         """Matched subscriptions of the odometry."""
@@ -69,7 +76,7 @@ class PlantWires:
             time_ns: Time of measurement [ns].
             resend: Only the odometry, once more.
         """
-        self._sent_ns[time_ns] = time.monotonic_ns()
+        self._sent_ns.setdefault(time_ns, time.monotonic_ns())  # of a resent one, the first sending counts
         while len(self._sent_ns) > REMEMBERED:
             self._sent_ns.popitem(last=False)
         self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
@@ -104,7 +111,7 @@ class PlantWires:
         now = time.monotonic_ns()
         stamp = stamp_ns(message.header.stamp)
         with self.lock:
-            taken = self._guard.offer(message.name, message.effort, now)
+            taken = self._guard.offer(message.name, message.effort, now, stamp_ns=stamp)
             sent = self._sent_ns.pop(stamp, None)
             if taken and sent is not None:
                 self.latency_ms.add((now - sent) / 1e6)

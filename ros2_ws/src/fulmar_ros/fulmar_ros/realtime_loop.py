@@ -10,8 +10,8 @@ import numpy as np
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_ros.deadline import Deadlines
-from fulmar_ros.lockstep_loop import SimulatedTime
 from fulmar_ros.plant_wires import PlantWires
+from fulmar_ros.simulated_time import SimulatedTime
 
 
 class RealtimeLoop:
@@ -31,8 +31,10 @@ class RealtimeLoop:
         """
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
         self._dt = backend.robot.timing.physics_dt
-        self.deadlines = Deadlines(self._dt / rate)
+        self.period_s = self._dt / rate
+        self.deadlines = Deadlines(self.period_s)
         self.ticks = 0
+        self._ticked_ns: int | None = None
 
     def run(self, sample: Sample, ticks: int | None, stop: threading.Event) -> None:
         """Tick until the number of ticks is done or somebody stops it.
@@ -42,6 +44,7 @@ class RealtimeLoop:
             ticks: How many; None for no end.
             stop: Set by another thread.
         """
+        self._ticked_ns = time.monotonic_ns()
         self._wires.publish_sample(sample, self._clock.now_ns)
         while (ticks is None or self.ticks < ticks) and self.deadlines.wait(stop):
             command = self._command()
@@ -49,7 +52,16 @@ class RealtimeLoop:
             sample = self._backend.step(command)
             self._clock.advance(self._dt)
             self.ticks += 1
+            self._ticked_ns = time.monotonic_ns()
             self._wires.publish_sample(sample, self._clock.now_ns)
+
+    def since_tick_s(self, now_ns: int) -> float:
+        """Time since the last finished step, 0 before the first [s].
+
+        Args:
+            now_ns: Monotonic clock [ns].
+        """
+        return 0.0 if self._ticked_ns is None else (now_ns - self._ticked_ns) / 1e9
 
     def _command(self) -> np.ndarray:
         with self._wires.lock:

@@ -20,11 +20,20 @@ class ActuatorGuard:
     def __init__(self, actuators: Thrusters, watchdog: Watchdog) -> None:
         """Begin with the safe command."""
         self._actuators, self.watchdog = actuators, watchdog
-        self._command = actuators.safe_command
+        self.command = actuators.safe_command  # the newest that was taken, whatever the watchdog says
         self.rejected = 0
         self.last_rejection = ""
+        self._stamp_ns = 0
 
-    def offer(self, names: Sequence[str], values: Sequence[float], now_ns: int) -> bool:
+    def reset(self) -> None:
+        """Forget the command: a plant that starts again begins with the safe one."""
+        self.command = self._actuators.safe_command
+        self._stamp_ns = 0
+        self.watchdog.reset()
+
+    def offer(
+        self, names: Sequence[str], values: Sequence[float], now_ns: int, *, stamp_ns: int | None = None
+    ) -> bool:
         """Take a command if it can be carried out.
 
         A refused command does not feed the watchdog: a controller that sends nothing but nonsense counts as silent.
@@ -33,22 +42,31 @@ class ActuatorGuard:
             names: Actuator names as sent.
             values: Values as sent.
             now_ns: Steady clock [ns].
+            stamp_ns: Stamp of the observation that it answers; None or 0 where the sender sets none [ns].
 
         Returns:
             Whether it was taken.
         """
         command = np.asarray(values, dtype=float)
-        problem = name_problem(names, self._actuators.names) or command_problem(
-            command, len(self._actuators.names)
+        problem = (
+            name_problem(names, self._actuators.names)
+            or command_problem(command, len(self._actuators.names))
+            or self._stamp_problem(stamp_ns or 0)
         )
         if problem:
             self.rejected += 1
             self.last_rejection = problem
             return False
-        self._command = self._actuators.limited(command)
+        self.command = self._actuators.limited(command)
+        self._stamp_ns = stamp_ns or self._stamp_ns
         self.watchdog.feed(now_ns)
         return True
 
     def output(self, now_ns: int) -> np.ndarray:
         """What to apply at this time of the steady clock [ns]."""
-        return self._actuators.safe_command if self.watchdog.expired(now_ns) else self._command
+        return self._actuators.safe_command if self.watchdog.expired(now_ns) else self.command
+
+    def _stamp_problem(self, stamp_ns: int) -> str | None:
+        if stamp_ns and stamp_ns < self._stamp_ns:
+            return f"command answers an observation {(self._stamp_ns - stamp_ns) / 1e6:.0f} ms older than the last"
+        return None

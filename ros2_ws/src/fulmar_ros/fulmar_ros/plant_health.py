@@ -1,0 +1,113 @@
+"""What a plant says about itself on the diagnostics."""
+
+from __future__ import annotations
+
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.lifecycle import LifecycleNode
+
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.topics import DIAGNOSTICS
+from fulmar_ros.health import Health
+from fulmar_ros.lockstep_loop import LockstepLoop
+from fulmar_ros.plant_wires import PlantWires
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.realtime_loop import RealtimeLoop
+from fulmar_ros.simulated_time import SimulatedTime
+
+LOOK_S = 0.1  # how soon a change is noticed
+AT_LEAST_S = 1.0  # how often it is said without a change
+HANGS_S = 0.5  # a step that takes longer than this, and than ten ticks, will not come back
+
+
+class PlantHealth:
+    """Looks at a plant's loop from outside its thread, and publishes what it finds.
+
+    Attributes:
+        mode: inactive, waiting, running, finished or fault.
+        reason: Why it is in fault, or could not be configured.
+    """
+
+    def __init__(self, robot: str) -> None:
+        """Begin inactive."""
+        self.mode, self.reason = "inactive", ""
+        self._robot = robot
+        self._said: tuple[object, ...] = ()
+        self._said_at = 0.0
+
+    def open(self, node: LifecycleNode) -> None:
+        """Begin to publish."""
+        self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
+        self._health = Health(f"{self._robot}: plant", [self._publisher])
+        self._timer = node.create_timer(LOOK_S, self.tell)
+
+    def close(self, node: LifecycleNode) -> None:
+        """Publish no more."""
+        node.destroy_timer(self._timer)
+        node.destroy_publisher(self._publisher)
+
+    def watch(
+        self,
+        guard: ActuatorGuard,
+        wires: PlantWires,
+        clock: SimulatedTime,
+        lockstep: LockstepLoop,
+        realtime: RealtimeLoop | None,
+    ) -> None:
+        """Look at these from now on; `realtime` is None where the plant runs in lock step."""
+        self._guard, self._wires, self._clock = guard, wires, clock
+        self._lockstep, self._realtime = lockstep, realtime
+
+    def tell(self) -> None:
+        """Publish when something changed, and now and then."""
+        level, message, key = self._verdict()
+        changed = (self.mode, self.reason, key, self._guard.watchdog.trips, self._guard.rejected)
+        now = time.monotonic()
+        if changed == self._said and now - self._said_at < AT_LEAST_S:
+            return
+        self._said, self._said_at = changed, now
+        self._health.publish(level, message, self._values())
+
+    def _verdict(self) -> tuple[str, str, str]:
+        """Level, message, and what of the message counts as a change."""
+        if self.mode == "fault":
+            return "error", self.reason, "fault"
+        if self.mode == "running" and self._realtime is not None:
+            now = time.monotonic_ns()
+            late_s = self._realtime.since_tick_s(now)
+            if late_s > max(HANGS_S, 10.0 * self._realtime.period_s):
+                return "error", f"the backend has not finished a step for {late_s:.1f} s: it hangs", "hangs"
+            with self._wires.lock:
+                # Asked here too, so that a loop that hangs cannot hide a trip.
+                self._guard.watchdog.expired(now)
+                tripped, silent_ns = self._guard.watchdog.tripped, self._guard.watchdog.silent_ns(now)
+            if tripped:
+                limit_ms = self._guard.watchdog.timeout_ns / 1e6
+                return (
+                    "error",
+                    f"no command for {silent_ns / 1e6:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state",
+                    "tripped",
+                )
+        if self._guard.last_rejection:
+            count = self._guard.rejected
+            return "warn", f"{count} commands refused, the last: {self._guard.last_rejection}", "refused"
+        return "ok", self.mode, ""
+
+    def _values(self) -> dict[str, str]:
+        values = {
+            "mode": self.mode,
+            "reason": self.reason,
+            "steps": str(self._lockstep.steps),
+            "sim_time_s": f"{self._clock.now_ns / 1e9:.3f}",
+            "watchdog_trips": str(self._guard.watchdog.trips),
+            "rejected_commands": str(self._guard.rejected),
+            **self._wires.latency_ms.percentiles("latency_ms"),
+        }
+        if self._realtime is not None:
+            values |= {
+                "ticks": str(self._realtime.ticks),
+                "overruns": str(self._realtime.deadlines.overruns),
+                **self._realtime.deadlines.period_error_ms.percentiles("period_error_ms"),
+            }
+        return values
