@@ -15,6 +15,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
@@ -413,3 +414,22 @@ def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: Con
     count = len(stream.neighbour.commands)
     time.sleep(0.2)
     assert len(stream.neighbour.commands) == count
+
+
+@pytest.mark.parametrize("part", ["plant", "controller"])
+def test_a_node_survives_its_whole_lifecycle_twice(
+    part: str, request: pytest.FixtureRequest, neighbour: Neighbour
+) -> None:
+    """Clean up leaves nothing behind, and a second configuration works like the first."""
+    node = request.getfixturevalue(part)
+    for transition in ("deactivate", "cleanup"):
+        assert getattr(node, f"trigger_{transition}")() == TransitionCallbackReturn.SUCCESS
+    topics = {COMMAND.name, ODOMETRY.name}
+    ours = [
+        publisher.topic_name for publisher in node.publishers if publisher.topic_name.endswith(tuple(topics))
+    ]
+    assert not ours
+    for transition in ("configure", "activate"):
+        assert getattr(node, f"trigger_{transition}")() == TransitionCallbackReturn.SUCCESS
+    heard = len(neighbour.applied) if part == "plant" else len(neighbour.commands)
+    until(lambda: (len(neighbour.applied) if part == "plant" else len(neighbour.commands)) > heard)

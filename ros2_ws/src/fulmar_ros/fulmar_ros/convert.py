@@ -166,7 +166,7 @@ def goal_of(message: PoseStamped | PointStamped) -> tuple[Pose | None, str]:
     Returns:
         The pose and an empty text, or None and what is wrong with the message.
     """
-    if message.header.frame_id not in ("odom", "map", "world"):
+    if message.header.frame_id != "odom":
         return None, f"goal frame is '{message.header.frame_id}', must be 'odom'"
     if isinstance(message, PointStamped):
         p, quat = message.point, from_yaw(np.asarray(0.0))
