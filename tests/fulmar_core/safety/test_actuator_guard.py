@@ -76,3 +76,38 @@ def test_what_the_caller_does_with_his_list_later_does_not_matter(guard):
     guard.offer(NAMES, values, 0)
     values[:] = 1.0
     assert guard.output(1).tolist() == GOOD
+
+
+def test_a_command_older_than_the_last_is_refused_and_does_not_feed_the_watchdog(guard):
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS)
+    assert not guard.offer(NAMES, GOOD[::-1], 150 * MS, stamp_ns=4980 * MS)
+    assert "20 ms" in guard.last_rejection
+    assert guard.output(150 * MS).tolist() == GOOD
+    assert not guard.output(201 * MS).any()
+
+
+def test_a_command_as_old_as_the_last_is_taken(guard):
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS)
+    assert guard.offer(NAMES, GOOD[::-1], 1, stamp_ns=5000 * MS)
+
+
+@pytest.mark.parametrize("unset", [0, None])
+def test_a_command_that_nobody_stamped_is_taken_and_opens_no_way_back(guard, unset):
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS)
+    assert guard.offer(NAMES, GOOD, 1, stamp_ns=unset)
+    assert not guard.offer(NAMES, GOOD, 2, stamp_ns=4000 * MS)
+
+
+def test_the_stamp_of_a_refused_command_does_not_count(guard):
+    guard.offer(NAMES, GOOD[:-1], 0, stamp_ns=9000 * MS)
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS)
+
+
+def test_after_a_reset_actuators_are_safe_without_a_trip_and_stamps_may_start_anew(guard):
+    guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS)
+    guard.reset()
+    assert not guard.output(1).any()
+    assert not guard.output(900 * MS).any()
+    assert guard.watchdog.trips == 0
+    assert guard.offer(NAMES, GOOD, 901 * MS, stamp_ns=1000 * MS)
+    assert guard.output(902 * MS).tolist() == GOOD

@@ -92,3 +92,55 @@ def test_after_forgetting_time_may_start_anew():
     gate.problem(measurement(10**9))
     gate.forget()
     assert gate.problem(measurement(1, x=1.0)) is None
+
+
+SECOND = 1_000_000_000
+
+
+@pytest.mark.parametrize(("jump_s", "words"), [(-1.1, "jumped by -1.1 s"), (10.1, "jumped by +10.1 s")])
+def test_a_jump_of_time_is_told_once_and_begins_a_new_epoch(jump_s, words):
+    gate = InputGate(LIMITS)
+    assert gate.problem(measurement(100 * SECOND)) is None
+    there = 100 * SECOND + round(jump_s * SECOND)
+    assert f"odom time {words}: a new epoch begins" in (gate.problem(measurement(there, x=0.1)) or "")
+    assert gate.problem(measurement(there + 1, x=0.2)) is None
+    assert gate.epoch == 1
+
+
+@pytest.mark.parametrize("back_s", [1.0, 0.2])
+def test_reordering_begins_no_epoch_however_often_it_comes(back_s):
+    gate = InputGate(LIMITS)
+    gate.problem(measurement(100 * SECOND))
+    reasons = [gate.problem(measurement(round((100 - back_s) * SECOND), x=0.1)) for _ in range(3)]
+    assert reasons == [f"odom stamp went back by {1e3 * back_s:.0f} ms"] * 3
+    assert gate.epoch == 0
+
+
+def test_a_gap_is_no_jump():
+    gate = InputGate(LIMITS)
+    gate.problem(measurement(100 * SECOND))
+    assert gate.problem(measurement(110 * SECOND, x=0.1)) is None
+    assert gate.epoch == 0
+
+
+def test_one_stamp_far_in_the_future_does_not_shut_the_gate_for_ever():
+    gate = InputGate(LIMITS)
+    stamps = [1, 2, 3600, 3, 4, 5]
+    reasons = [gate.problem(measurement(stamp * SECOND, x=0.1 * i)) for i, stamp in enumerate(stamps)]
+    assert [reason is None for reason in reasons] == [True, True, False, False, True, True]
+    assert gate.epoch == 2
+
+
+def test_repetition_counts_anew_in_a_new_epoch():
+    gate = InputGate(LIMITS, frozen_after=2)
+    reasons = [gate.problem(measurement(stamp * SECOND)) or "" for stamp in (100, 101, 102, 1, 2)]
+    assert "stuck" in reasons[2]
+    assert "epoch" in reasons[3]
+    assert reasons[4] == ""
+
+
+def test_an_unbelievable_measurement_begins_no_epoch():
+    gate = InputGate(LIMITS)
+    gate.problem(measurement(1))
+    assert "map" in (gate.problem(measurement(3600 * SECOND, frame="map")) or "")
+    assert gate.epoch == 0

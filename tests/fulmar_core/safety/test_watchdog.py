@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fulmar_core.errors import SafetyError
-from fulmar_core.safety.watchdog import Watchdog, default_timeout
+from fulmar_core.safety.watchdog import LONGEST_S, Watchdog, checked_timeout, default_timeout
 
 MS = 1_000_000
 
@@ -52,3 +52,24 @@ def test_a_new_command_ends_the_silence():
     assert not dog.expired(500 * MS)
     assert not dog.tripped
     assert dog.silent_ns(500 * MS) == 100 * MS
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.01, 0.2, LONGEST_S])
+def test_a_timeout_that_protects_or_is_off_may_be_set(seconds):
+    assert checked_timeout(seconds) == seconds
+
+
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), float("-inf"), -0.001, -1.0, 0.501, 3600.0])
+def test_a_timeout_that_lets_a_dead_controller_fly_on_is_refused(seconds):
+    with pytest.raises(
+        SafetyError, match=r"the command timeout is .* s; it must be from 0 \(off\) to 0\.5 s\."
+    ):
+        checked_timeout(seconds)
+
+
+def test_after_a_reset_it_waits_for_a_first_command_without_a_trip():
+    dog = Watchdog(200 * MS)
+    dog.feed(0)
+    dog.reset()
+    assert dog.expired(500 * MS)
+    assert (dog.trips, dog.tripped, dog.silent_ns(500 * MS)) == (0, False, 0)

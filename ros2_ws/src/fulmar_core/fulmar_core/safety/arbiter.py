@@ -13,7 +13,7 @@ class Mode(Enum):
     IDLE = "idle"  # loaded, validated, warm
     ARMED = "armed"  # running, safe command only
     ACTIVE = "active"  # the controller's own command
-    FAULT = "fault"  # safe command until a person resets it
+    FAULT = "fault"  # safe command until the node is configured anew
 
 
 @dataclass(frozen=True, slots=True)

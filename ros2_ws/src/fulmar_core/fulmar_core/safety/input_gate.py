@@ -10,6 +10,8 @@ from fulmar_core.robot import Limits
 from fulmar_core.state import RigidBodyState
 
 FROZEN_AFTER = 10  # repeats of one measurement that no noisy sensor gives
+BACK_NS = 1_000_000_000  # further back than this is no reordering: whoever measures has begun again
+FORWARD_NS = 10_000_000_000  # further ahead than this is no gap: it is another clock, or one wrong stamp
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +25,11 @@ class Measurement:
 
 
 class InputGate:
-    """Checks measurements one after the other."""
+    """Checks measurements one after the other.
+
+    A jump of time is told once and begins a new epoch, so that neither a restarted plant nor one wrong stamp shuts
+    the gate for ever. `epoch` counts these jumps.
+    """
 
     def __init__(self, limits: Limits, *, frozen_after: int = FROZEN_AFTER) -> None:
         """Check against a robot's limits.
@@ -36,6 +42,7 @@ class InputGate:
         self._limits, self._frozen_after = limits, frozen_after
         self._last: Measurement | None = None
         self._equal = 0
+        self.epoch = 0
 
     def problem(self, measurement: Measurement) -> str | None:
         """What is wrong with a measurement.
@@ -47,9 +54,8 @@ class InputGate:
             A reason for people, or None if it may be used.
         """
         reason = self._frame_problem(measurement) or self._value_problem(measurement.state)
-        if reason is None and self._last is not None and measurement.stamp_ns <= self._last.stamp_ns:
-            back = (self._last.stamp_ns - measurement.stamp_ns) / 1e6
-            reason = f"odom stamp went back by {back:.0f} ms" if back else "odom stamp did not advance"
+        if reason is None and self._last is not None:
+            reason = self._stamp_problem(measurement, measurement.stamp_ns - self._last.stamp_ns)
         if reason is None:
             reason = self._frozen_problem(measurement)
             self._last = measurement
@@ -87,6 +93,15 @@ class InputGate:
                 f"odom yaw rate {yaw_rate:.2f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
             )
         return None
+
+    def _stamp_problem(self, measurement: Measurement, ahead_ns: int) -> str | None:
+        if not -BACK_NS <= ahead_ns <= FORWARD_NS:
+            self.epoch += 1
+            self._last, self._equal = measurement, 0
+            return f"odom time jumped by {ahead_ns / 1e9:+.1f} s: a new epoch begins"
+        if ahead_ns < 0:
+            return f"odom stamp went back by {-ahead_ns / 1e6:.0f} ms"
+        return None if ahead_ns else "odom stamp did not advance"
 
     def _frozen_problem(self, measurement: Measurement) -> str | None:
         if self._last is not None and _same(self._last.state, measurement.state):

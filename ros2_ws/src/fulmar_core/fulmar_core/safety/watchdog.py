@@ -39,27 +39,6 @@ def checked_timeout(seconds: float) -> float:
     return seconds
 
 
-def checked_timeout(seconds: float, control_dt: float | None = None) -> float:
-    """A timeout that a person has set, if it protects.
-
-    Args:
-        seconds: Longest silence [s]; 0 switches the watchdog off, which is the caller's to handle.
-        control_dt: Time between commands, for advice in the message, > 0 [s].
-
-    Returns:
-        The same.
-
-    Raises:
-        SafetyError: It is no number, negative, or longer than `LONGEST_S`.
-    """
-    if 0.0 <= seconds <= LONGEST_S:  # false for what is not a number, too
-        return seconds
-    advice = "" if control_dt is None else f" The default here is {default_timeout(control_dt):g} s."
-    raise SafetyError(
-        f"the command timeout is {seconds:g} s; it must be in [0, {LONGEST_S:g}] s, where 0 is off.{advice}"
-    )
-
-
 class Watchdog:
     """Says whether commands have stopped; knows no clock of its own."""
 
@@ -88,10 +67,6 @@ class Watchdog:
         """A command has come at this time of a steady clock [ns]."""
         self._last_ns = now_ns
         self._tripped = False
-
-    def reset(self) -> None:
-        """Wait for a first command again; no silence is counted, and `trips` stays."""
-        self._last_ns, self._tripped = None, False
 
     def expired(self, now_ns: int) -> bool:
         """Whether actuators must be in their safe state at this time [ns].
