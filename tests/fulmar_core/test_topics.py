@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fulmar_core.tasks import GoToPose, GoToPosition
-from fulmar_core.topics import GOAL_WIRES, STATUS, TRUTH, WIRES
+from fulmar_core.topics import GOAL_WIRES, SIMULATION_START_NS, STATUS, WIRES
 
 
 def test_no_topic_is_listed_twice():
@@ -36,5 +36,5 @@ def test_what_a_latecomer_needs_is_latched():
     assert STATUS.delivery == "latched"
 
 
-def test_the_truth_is_marked_as_simulation_only():
-    assert TRUTH.simulation_only
+def test_simulated_time_begins_at_a_stamp_that_ros_takes_for_one():
+    assert SIMULATION_START_NS > 0

@@ -68,12 +68,6 @@ def multiply(p_xyzw: Array, q_xyzw: Array) -> Array:
     )
 
 
-def inverse(quat_xyzw: Array) -> Array:
-    """Conjugate of unit quaternions, shape (..., 4)."""
-    xp = array_namespace(quat_xyzw)
-    return xp.concat((-quat_xyzw[..., 0:3], quat_xyzw[..., 3:4]), axis=-1)
-
-
 def from_rotation_vector(phi: Array) -> Array:
     """Exponential map: rotation vector to quaternion.
 

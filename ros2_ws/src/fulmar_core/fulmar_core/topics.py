@@ -31,7 +31,6 @@ class Wire:
     rate: str  # for people
     content: str  # for people
     recorded: bool = True
-    simulation_only: bool = False
 
 
 ODOMETRY = Wire(
@@ -39,7 +38,7 @@ ODOMETRY = Wire(
     "nav_msgs/msg/Odometry",
     "plant",
     "stream",
-    "odometry rate",
+    "every plant tick",
     "measured pose in `odom` and twist in `base_link`, stamped at measurement",
 )
 IMU = Wire(
@@ -47,7 +46,7 @@ IMU = Wire(
     "sensor_msgs/msg/Imu",
     "plant",
     "stream",
-    "odometry rate",
+    "every plant tick",
     "specific force (+g at rest) and turn rate; no orientation",
 )
 TRUTH = Wire(
@@ -55,9 +54,8 @@ TRUTH = Wire(
     "nav_msgs/msg/Odometry",
     "plant",
     "stream",
-    "odometry rate",
+    "every plant tick",
     "the simulator's own state; never read by a deployed controller",
-    simulation_only=True,
 )
 ACTUATORS_STATE = Wire(
     "actuators/state",
@@ -74,7 +72,6 @@ CLOCK = Wire(
     "best_effort",
     "every plant tick, at most 200 Hz",
     "simulated time",
-    simulation_only=True,
 )
 COMMAND = Wire(
     "actuators/command",

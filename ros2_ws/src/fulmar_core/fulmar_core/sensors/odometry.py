@@ -14,18 +14,15 @@ Vector3 = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class OdometrySpec:
-    """Rate and white noise of the odometry; standard deviations by axis, >= 0."""
+    """White noise of the odometry, which comes at every plant tick; standard deviations by axis, >= 0."""
 
-    rate_hz: float  # [Hz]
     position_std: Vector3  # world axes [m]
     rotation_std: Vector3  # body axes [rad]
     velocity_std: Vector3  # world axes [m/s]
     angular_velocity_std: Vector3  # body axes [rad/s]
 
     def __post_init__(self) -> None:
-        """Refuse rates and noises without meaning."""
-        if self.rate_hz <= 0.0:
-            raise ValueError("'rate_hz' must be greater than 0.")
+        """Refuse noises without meaning."""
         stds = (*self.position_std, *self.rotation_std, *self.velocity_std, *self.angular_velocity_std)
         if min(stds) < 0.0:
             raise ValueError("standard deviations must not be negative.")
