@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -118,12 +118,22 @@ def test_a_batch_is_answered_like_its_members():
     np.testing.assert_array_equal(lqr.act(seen), [lqr.act(row) for row in seen])
 
 
-def test_the_metadata_hash_changes_with_weights_and_rate_and_with_nothing_else():
-    def sha(weights=WEIGHTS, hz=5.0):
-        return Lqr(ROBOT, POSE, weights, control_hz=hz).metadata()["sha256"]
+def sha(robot=ROBOT, task=POSE, weights=WEIGHTS, hz=5.0):
+    return Lqr(robot, task, weights, control_hz=hz).metadata()["sha256"]
 
-    assert sha() == sha()
-    assert len({sha(), sha(replace(WEIGHTS, velocity=5.0)), sha(hz=50.0)}) == 3
+
+@pytest.mark.parametrize("name", [field.name for field in fields(LqrWeights)])
+def test_the_metadata_hash_changes_with_every_weight_and_limit(name):
+    assert sha(weights=replace(WEIGHTS, **{name: 1.5 * getattr(WEIGHTS, name)})) != sha()
+
+
+def test_the_metadata_hash_changes_with_robot_task_and_rate_and_with_nothing_else():
+    heavier = replace(ROBOT, body=replace(ROBOT.body, mass=6.0))
+    other_thrust = replace(ROBOT, actuators=replace(ROBOT.actuators, thrust=0.9))
+    robots = [ROBOT, replace(ROBOT, name="other"), heavier, other_thrust]
+    hashes = [*(sha(robot) for robot in robots), sha(task=POSITION), sha(hz=50.0)]
+    assert len(set(hashes)) == len(hashes)
+    assert sha(replace(ROBOT, title="the same by another title")) == sha()
 
 
 def test_the_rate_is_the_robots_own_by_default():

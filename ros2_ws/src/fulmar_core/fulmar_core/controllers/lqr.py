@@ -117,7 +117,7 @@ class Lqr:
         )  # a heading without a goal is not a state
         a, b = a[np.ix_(used, used)], b[used]
         p = solve_discrete_are(a, b, dt * np.diag(np.array(q)[used]), r)
-        hessian = r + b.T @ p @ b
+        self._hessian = hessian = r + b.T @ p @ b
         self._gain = np.linalg.solve(hessian, b.T @ p @ a)
         self._allocation = ValveAllocation(
             robot.actuators, weight=hessian, valve_cost=dt * weights.open_valve
@@ -149,15 +149,22 @@ class Lqr:
         return np.concatenate(parts, axis=-1)
 
     def metadata(self) -> dict[str, Any]:
-        """Robot, task, rate and weights, with the SHA-256 of the gain."""
-        return {
+        """Robot, task, rate and weights, with the SHA-256 of everything that the commands depend on."""
+        told = {
             "controller": self.name,
             "robot": self._robot.name,
             "task": self._task.name,
             "control_hz": self.control_hz,
             "weights": asdict(self._weights),
-            "sha256": hashlib.sha256(json.dumps(np.round(self._gain, 9).tolist()).encode()).hexdigest(),
         }
+        derived = {
+            "observation_names": self.observation_names,
+            "actuators": asdict(self._robot.actuators),
+            "gain": np.round(self._gain, 9).tolist(),
+            "hessian": np.round(self._hessian, 9).tolist(),
+        }
+        text = json.dumps(told | derived, sort_keys=True)
+        return told | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
 
 
 def load_lqr(robot: Robot, task: Task, *, control_hz: float | None = None) -> Lqr:
