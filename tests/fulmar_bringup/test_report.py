@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from html.parser import HTMLParser
 
@@ -81,6 +82,14 @@ def test_a_page_shows_every_picture_with_words(compared):
         assert label in page.words
 
 
+def test_a_page_tells_the_robot_s_rate_apart_from_the_wall_clock_s(reached, tmp_path):
+    record = read_run(reached)
+    fast = dataclasses.replace(record, info={**record.info, "rate": 4.0})
+    words = " ".join(Page(write_report([fast], tmp_path / "r.html").read_text()).words)
+    assert "Control rate in the robot's own time 1.25 Hz" in words
+    assert "Command rate wall-clock 5.00 Hz" in words
+
+
 def test_two_reports_of_one_run_are_the_same_bytes(reached, tmp_path):
     first, second = (write_report([read_run(reached)], tmp_path / name) for name in ("a.html", "b.html"))
     assert first.read_bytes() == second.read_bytes()
@@ -128,8 +137,6 @@ def test_an_empty_run_still_gets_a_page_and_a_picture(tmp_path):
 
 
 def test_text_of_a_run_cannot_become_markup(reached, tmp_path):
-    import dataclasses
-
     record = read_run(reached)
     evil = dataclasses.replace(record, info={**record.info, "command": "<script>alert(1)</script>"})
     assert "<script>" not in write_report([evil], tmp_path / "r.html").read_text()

@@ -37,9 +37,63 @@ def test_a_run_that_reached_its_goal_says_so(reached):
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
+def test_times_count_from_the_first_state_as_they_do_for_steps_in_metrics(reached):
+    record = read_run(reached)
+    position = np.hypot(*record.truth.position[:, :2].T)
+    heading = np.abs(np.rad2deg(yaw_of(record.truth.quat_xyzw)))
+    outside = np.flatnonzero((position >= 0.05) | (heading > 5.0))
+    judgement = judge(record)
+    assert judgement.time_to_target_s == pytest.approx(0.02 * (outside[-1] + 1), abs=1e-6)
+    assert judgement.time_s[[0, -1]] == pytest.approx([0.02, 40.0])
+    assert judgement.duration_s == pytest.approx(40.0)
+    np.testing.assert_allclose(judgement.run.position_error[0], position[1:])
+    np.testing.assert_allclose(judgement.run.actuators_in_use[0], record.applied.effort[:-1].mean(axis=1))
+
+
+def test_a_run_of_exactly_the_window_is_long_enough_whatever_its_stamps_round_to(reached):
+    record = read_run(reached)
+    stamps = record.truth.stamp_s
+    at_goal = range(1000, 1800)
+    firsts = [first for first in at_goal if stamps[first + 200] - stamps[first] < 4.0]
+    assert firsts, "some differences of stamps round to less than 4 s"
+    window = slice(firsts[0], firsts[0] + 201)
+    assert judge(dataclasses.replace(record, truth=pick(record.truth, window))).success
+    shorter = slice(firsts[0], firsts[0] + 200)
+    assert not judge(dataclasses.replace(record, truth=pick(record.truth, shorter))).success
+
+
+def before_the_start(record, count):
+    """The record with commands that answer nothing, as a controller sends them before the plant starts."""
+    first = record.commanded
+    early = {
+        "stamp_s": np.concatenate((np.zeros(count), first.stamp_s)),
+        "log_s": np.concatenate((first.log_s[0] - 10.0 * np.arange(count, 0, -1), first.log_s)),
+        "effort": np.concatenate((np.zeros((count, 8)), first.effort)),
+    }
+    return dataclasses.replace(record, commanded=dataclasses.replace(first, **early))
+
+
+def test_commands_from_before_the_start_are_no_steps_and_no_rate(reached):
+    record = dataclasses.replace(before_the_start(read_run(reached), 4), health=())
+    summary = summarise(record)
+    assert summary["steps"] == 201
+    assert summary["wall_control_rate_hz"] == pytest.approx(5.0, rel=1e-3)
+
+
+def test_the_control_rate_is_that_of_the_robot_s_own_time(reached):
+    record = read_run(reached)
+
+    def rates(**info):
+        summary = summarise(dataclasses.replace(record, info={**record.info, **info}))
+        return summary["control_rate_hz"], summary["wall_control_rate_hz"]
+
+    assert rates(rate=4.0) == (pytest.approx(5.0002 / 4.0), 5.0002)
+    assert rates(lockstep=True, control_hz=10.0) == (10.0, 5.0002)
+
+
 def test_figures_of_the_nodes_are_taken_over(reached):
     summary = summarise(read_run(reached))
-    assert summary["control_rate_hz"] == 5.0002
+    assert summary["control_rate_hz"] == summary["wall_control_rate_hz"] == 5.0002
     assert summary["inference_ms"] == {"p50": 0.1, "p99": 0.3, "max": 0.9}
     assert summary["period_error_ms"] == {"p50": 0.05, "p99": 0.4, "max": 1.2}
     assert summary["overruns"] == 3

@@ -20,16 +20,28 @@ from fulmar_core.tasks.planar import planar_error
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the task says about a run; times count from its first state."""
+    """What the task says about a run; times count from its first state.
+
+    As in `fulmar_core.metrics`, a step is the state at its end: the first state itself is none.
+    """
 
     task: Task
     goal: Pose  # the last one that was given
-    time_s: np.ndarray  # (n,) evenly spaced, simulated time [s]
+    time_s: np.ndarray  # (n,) ends of the steps: evenly spaced, simulated time [s]
     samples: np.ndarray  # (n,) index into `record.motion` of each time
     run: Trajectories  # one episode of n steps
-    success: bool
     time_to_target_s: float | None  # from when on it stayed inside the tolerance; None: it did not
     duration_s: float  # [s]
+
+    @property
+    def success(self) -> bool:
+        """Whether the whole closing window was recorded and spent inside the tolerance."""
+        return self.long_enough and bool(successes(self.run, self.task)[0])
+
+    @property
+    def long_enough(self) -> bool:
+        """Whether the run lasted for the whole closing window; half a step is left to rounding."""
+        return bool(self.time_s[-1] > self.task.tolerance.hold_s - 0.5 * self.run.control_dt)
 
     @property
     def window_start_s(self) -> float:
@@ -69,20 +81,18 @@ def judge(record: RunRecord) -> Judgement | None:
         heading_error=error.heading[None],
         speed=np.linalg.norm(states.velocity_in_world, axis=-1)[None],
         yaw_rate=states.angular_velocity_in_body[None, :, 2],
-        actuators_in_use=_in_use(record.applied, motion.stamp_s[0] + time_s)[None],
-        control_dt=float(time_s[1]),
+        actuators_in_use=_in_use(record.applied, motion.stamp_s[0] + time_s - time_s[0])[None],
+        control_dt=float(time_s[0]),
     )
     reached_s = float(episode_metrics(run, task)["time_to_target_s"][0])
-    duration_s = float(motion.stamp_s[-1] - motion.stamp_s[0])
     return Judgement(
         task=task,
         goal=goals[-1][1],
         time_s=time_s,
         samples=samples,
         run=run,
-        success=bool(successes(run, task)[0]) and duration_s >= task.tolerance.hold_s,
         time_to_target_s=reached_s if np.isfinite(reached_s) else None,
-        duration_s=duration_s,
+        duration_s=float(motion.stamp_s[-1] - motion.stamp_s[0]),
     )
 
 
@@ -108,17 +118,17 @@ def _goals(record: RunRecord) -> list[tuple[float, Pose]]:
 
 
 def _even(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Evenly spaced times from 0, and the newest sample at each; a lost sample leaves the one before."""
+    """Ends of evenly long steps, and the newest sample at each; a lost sample leaves the one before."""
     since = motion.stamp_s - motion.stamp_s[0]
     steps = np.diff(since)
     dt = float(np.median(steps[steps > 0.0]))
-    time_s = dt * np.arange(round(since[-1] / dt) + 1)
+    time_s = dt * np.arange(1, round(since[-1] / dt) + 1)
     samples = np.searchsorted(since, time_s + 1e-3 * dt, side="right") - 1
     return time_s, samples
 
 
 def _in_use(applied: Actuation, stamp_s: np.ndarray) -> np.ndarray:
-    """Share of actuators in use at some times, shape of `stamp_s`."""
+    """Share of actuators in use from some times on, shape of `stamp_s`."""
     if not len(applied):
         return np.full(len(stamp_s), np.nan)
     newest = np.clip(np.searchsorted(applied.stamp_s, stamp_s + 1e-6, side="right") - 1, 0, None)

@@ -30,14 +30,16 @@ def summarise(record: RunRecord) -> dict[str, Any]:
     judgement = judge(record)
     plant, controller = record.last_health("plant"), record.last_health("controller")
     period_error = _spread(controller, "period_error_ms")
+    wall_hz = _number(controller, "control_rate_hz") or _wall_rate_hz(record)
     return {
         **{key: record.info.get(key) for key in ASKED},
-        "steps": len(np.unique(record.commanded.stamp_s)),
+        "steps": len(latencies_ms(record)),
         "duration_s": judgement.duration_s if judgement else 0.0,
         **_errors(judgement),
         "success": judgement is not None and judgement.success,
         "time_to_target_s": judgement.time_to_target_s if judgement else None,
-        "control_rate_hz": _number(controller, "control_rate_hz") or _rate_hz(record),
+        "control_rate_hz": _own_rate_hz(record, wall_hz),
+        "wall_control_rate_hz": wall_hz,
         "latency_ms": _known(_spread(plant, "latency_ms")) or percentiles(latencies_ms(record)),
         "period_error_ms": _known(period_error) or _spread(plant, "period_error_ms"),
         "inference_ms": _spread(controller, "inference_ms"),
@@ -81,9 +83,18 @@ def _errors(judgement: Judgement | None) -> Spread:
     }
 
 
-def _rate_hz(record: RunRecord) -> float | None:
-    """Commands a second of wall-clock time, from when they were recorded."""
-    times = np.unique(record.commanded.log_s)
+def _own_rate_hz(record: RunRecord, wall_hz: float | None) -> float | None:
+    """Commands a second of the robot's own time, which in lock step goes by commands."""
+    if record.info.get("lockstep"):
+        asked = record.info.get("control_hz")
+        return float(asked) if asked else None
+    return wall_hz / float(record.info.get("rate") or 1.0) if wall_hz else None
+
+
+def _wall_rate_hz(record: RunRecord) -> float | None:
+    """Answers a second of wall-clock time, from when they were recorded."""
+    commanded = record.commanded
+    times = np.unique(commanded.log_s[np.isin(commanded.stamp_s, record.odom.stamp_s)])
     return float((len(times) - 1) / (times[-1] - times[0])) if len(times) > 1 else None
 
 

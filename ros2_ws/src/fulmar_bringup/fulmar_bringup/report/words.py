@@ -25,7 +25,7 @@ def verdict(run: View) -> tuple[str, str]:
             f"The goal was reached after {reached:.1f} s and held to the end. "
             f"At the end of {judgement.duration_s:.0f} s the platform was {error} away."
         )
-    if judgement.duration_s < tolerance.hold_s:
+    if not judgement.long_enough:
         return "Missed", f"The run ended after {judgement.duration_s:.1f} s, too early to judge."
     return "Missed", (
         f"The platform was not within the tolerance for all of the last {tolerance.hold_s:g} s. "
@@ -62,7 +62,8 @@ def table(runs: Sequence[View]) -> list[Row]:
         row("Length of the run", "simulated time", lambda s: _value(s["duration_s"], " s", 1)),
         row("Valves in use", "average share of open valves", lambda s: _percent(s["actuator_use"])),
         row("Commands", "answered measurements", lambda s: f"{s['steps']}"),
-        row("Control rate", "wall-clock", lambda s: _value(s["control_rate_hz"], " Hz", 2)),
+        row("Control rate", "in the robot's own time", lambda s: _value(s["control_rate_hz"], " Hz", 2)),
+        row("Command rate", "wall-clock", lambda s: _value(s["wall_control_rate_hz"], " Hz", 2)),
         row("Latency [ms]", "median / p99 / longest", spread("latency_ms")),
         row("Period error [ms]", "median / p99 / largest", spread("period_error_ms")),
         row("Inference [ms]", "median / p99 / longest", spread("inference_ms")),
