@@ -12,13 +12,14 @@ import onnx
 import torch
 
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.policy_bundle import FORMAT, Golden, Passport, write_bundle
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from training.network import DeployedNetwork, load_network
-from training.train import HELD_OUT_SEED, NETWORK_FILE, RUN_FILE
+from training.train import NETWORK_FILE, RUN_FILE
 
 GOLDEN_VECTORS = 64
 OPSET = 18
@@ -57,7 +58,8 @@ def export(run: Path, out: Path) -> Passport:
         training={
             key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
         }
-        | {"git_revision": record.get("git_revision", "")},
+        | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
+        | _verdict(record),
     )
     return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
 
@@ -95,6 +97,16 @@ def read_run_record(run: Path) -> dict[str, Any]:
             f"{path}: lacks '{missing[0]}', so it is not what `fulmar train` left. Train again."
         )
     return dict(record)
+
+
+def _verdict(record: dict[str, Any]) -> dict[str, Any]:
+    """What judging in MuJoCo gave, in its main figures; empty if the run was not judged."""
+    judged = record.get("mujoco")
+    if not judged:
+        return {}
+    told = {key: judged[key] for key in ("scenario", "seed", "episodes", "success_rate")}
+    means = {key: judged[key]["mean"] for key in judged if key.startswith(("PT", "OT")) or key == "AAS"}
+    return {"mujoco": told | means}
 
 
 def _to_onnx(network: DeployedNetwork) -> bytes:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import JUDGE_SEED
 from fulmar_core.metrics import summary
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends
@@ -15,8 +16,6 @@ from sim_nodes.mujoco_backend import MujocoBackend
 from training.export import read_run_record
 from training.network import NetworkController, load_network
 from training.train import NETWORK_FILE, RUN_FILE
-
-JUDGE_SEED = 2026  # no training seed, and not the seed of the checks while learning
 
 
 def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> dict[str, Any]:

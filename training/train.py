@@ -1,6 +1,7 @@
 """Learn a controller in the core's batch and leave a run folder that `export` understands.
 
-A run folder holds `run.json` (what was done), `network.pt` (the best weights) and `tensorboard/`.
+A run folder holds `run.json` (what was done), `network.pt` (the best weights) and `tensorboard/`, also when a person
+ended the run early.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
+from fulmar_core.episode import HELD_OUT_SEED, JUDGING_SEEDS
 from fulmar_core.errors import ConfigError
 from fulmar_core.metrics import summary
 from fulmar_core.robot import Robot
@@ -32,7 +34,6 @@ from training.vec_env import BatchVecEnv
 
 NETWORK_FILE = "network.pt"
 RUN_FILE = "run.json"
-HELD_OUT_SEED = 1_000_003  # training seeds stay below, so checks see episodes that no run has learned from
 
 
 Judge = Callable[[DeployedNetwork], tuple[float, float]]  # success rate and score
@@ -63,7 +64,7 @@ class _TimedLearning(BaseCallback):
         self._next_check = settings.evaluate_every_s
         self._bar = LearningBar(limit)
         self.checks: list[Check] = []
-        self.best: DeployedNetwork | None = None
+        self.best: tuple[Check, DeployedNetwork] | None = None
 
     def _on_training_start(self) -> None:
         self._bar.__enter__()
@@ -74,12 +75,17 @@ class _TimedLearning(BaseCallback):
     def _on_step(self) -> bool:
         return True
 
+    @property
+    def elapsed_s(self) -> float:
+        """Wall-clock since the beginning [s]."""
+        return time.monotonic() - self._began
+
     def _on_rollout_end(self) -> None:
-        elapsed = time.monotonic() - self._began
+        elapsed = self.elapsed_s
         self._bar.advance(min(elapsed, self._limit), self.num_timesteps)
 
     def _on_rollout_start(self) -> None:
-        elapsed = time.monotonic() - self._began
+        elapsed = self.elapsed_s
         if elapsed >= min(self._next_check, self._limit):
             self._check(elapsed)
             self._next_check = elapsed + self._settings.evaluate_every_s
@@ -89,9 +95,10 @@ class _TimedLearning(BaseCallback):
         assert normaliser is not None
         network = deployed_network(self.model, normaliser)  # type: ignore[arg-type]
         success, score = self._judge(network)
-        if self.best is None or score > max(check.score for check in self.checks):
-            self.best = network
-        self.checks.append(Check(elapsed, self.num_timesteps, success, score))
+        check = Check(elapsed, self.num_timesteps, success, score)
+        if self.best is None or score > self.best[0].score:
+            self.best = check, network  # at once, since a person may interrupt anywhere
+        self.checks.append(check)
         self._bar.verdict(elapsed, f"success {success:.3f}")
         self.logger.record("held_out/success_rate", success)
         self.logger.record("held_out/score", score)
@@ -120,7 +127,7 @@ def train(
         robot: The robot.
         task: The task.
         settings: How to learn.
-        seed: Seed of everything random, in [0, 1,000,002].
+        seed: Seed of everything random, >= 0, and none of `JUDGING_SEEDS`.
         out: Run folder; made if need be.
         time_limit_s: Wall-clock of learning; the settings' by default [s].
         command: Command line that started this, for the record.
@@ -131,11 +138,12 @@ def train(
 
     Raises:
         ConfigError: If the seed is one of those kept for judging.
+        KeyboardInterrupt: A person ended it; the run folder is finished with the best network so far, if there
+            is one yet.
     """
-    if not 0 <= seed < HELD_OUT_SEED:
-        raise ConfigError(
-            f"seed {seed} must be in [0, {HELD_OUT_SEED - 1}]; the ones beyond are kept for judging."
-        )
+    if seed < 0 or seed in JUDGING_SEEDS:
+        kept = " and ".join(str(kept) for kept in JUDGING_SEEDS)
+        raise ConfigError(f"seed {seed} must not be negative, nor {kept}, which are kept for judging.")
     limit = time_limit_s or settings.time_limit_s
     torch.set_num_threads(1)  # a second thread gains little here and loses much when the machine is shared
     scenario = load_scenario(settings.scenario)
@@ -145,12 +153,20 @@ def train(
     env = VecNormalize(worlds, norm_reward=False, gamma=ppo.gamma)
     learner, feedback = build_ppo(ppo, env, seed=seed, tensorboard=str(out / "tensorboard"))
     learning = _TimedLearning(_judge_of(robot, task, scenario), settings, limit)
+    interrupted: KeyboardInterrupt | None = None
     try:
         learner.learn(total_timesteps=10**12, callback=CallbackList([feedback, learning]))
     except _TimeIsUp:
+        pass
+    except KeyboardInterrupt as error:
+        if learning.best is None:
+            raise
+        interrupted = error
+    finally:
         learning.on_training_end()
     assert learning.best is not None
-    save_network(learning.best, out / NETWORK_FILE)
+    best, network = learning.best
+    save_network(network, out / NETWORK_FILE)
     record = {
         "robot": robot.name,
         "task": task.name,
@@ -160,13 +176,16 @@ def train(
         "control_hz": robot.timing.control_hz,
         "settings": asdict(settings),
         "steps": learner.num_timesteps,
-        "wall_s": round(learning.checks[-1].wall_s, 1),
-        "best": asdict(max(learning.checks, key=lambda check: check.score)),
+        "wall_s": round(learning.elapsed_s, 1),
+        "interrupted": interrupted is not None,
+        "best": asdict(best),
         "curve": [asdict(check) for check in learning.checks],
         "versions": {name: version(name) for name in ("torch", "stable-baselines3", "numpy")}
         | {"python": platform.python_version()},
     }
     (out / RUN_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    if interrupted is not None:
+        raise interrupted
     return record
 
 

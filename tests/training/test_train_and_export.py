@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from fulmar_core.episode import HELD_OUT_SEED, JUDGE_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.policy_bundle import read_golden, read_passport
 from policy_server.policy import Policy
 from training.export import export, read_run_record
 from training.judge import judge_in_mujoco
 from training.network import NetworkController, deployed_network, load_network
-from training.train import HELD_OUT_SEED, NETWORK_FILE, RUN_FILE, train
+from training.train import NETWORK_FILE, RUN_FILE, train
 
 
 @pytest.fixture
@@ -148,6 +151,67 @@ def test_a_network_for_another_number_of_terms_is_refused(run_copy, tmp_path):
         export(run_copy, tmp_path / "out")
 
 
-def test_a_seed_of_the_held_out_episodes_is_refused(robot, task, small_settings, tmp_path):
-    with pytest.raises(ConfigError, match=r"seed 1000003 must be in \[0, 1000002\]"):
-        train(robot, task, small_settings, seed=HELD_OUT_SEED, out=tmp_path)
+@pytest.mark.parametrize("seed", [HELD_OUT_SEED, JUDGE_SEED, -1])
+def test_a_seed_of_the_episodes_that_judge_is_refused(robot, task, small_settings, tmp_path, seed):
+    words = f"seed {seed} must not be negative, nor 2026 and 1000003, which are kept for judging"
+    with pytest.raises(ConfigError, match=words):
+        train(robot, task, small_settings, seed=seed, out=tmp_path)
+
+
+def test_evaluate_judges_with_a_seed_that_no_run_has_learned_from():
+    from fulmar_bringup.commands.evaluate import evaluate
+
+    assert inspect.signature(evaluate).parameters["seed"].default == JUDGE_SEED
+
+
+def interrupted_after(checks, monkeypatch):
+    """Let a person press Ctrl-C when this many checks have been done; they get worse."""
+    scores = iter(range(checks, 0, -1))
+
+    def judge_of(*_):
+        def judge(network):
+            score = next(scores, None)
+            if score is None:
+                raise KeyboardInterrupt
+            return 0.5, float(score)
+
+        return judge
+
+    monkeypatch.setattr("training.train._judge_of", judge_of)
+
+
+def test_an_interrupted_run_keeps_its_best_network_and_says_so(
+    robot, task, small_settings, tmp_path, monkeypatch
+):
+    interrupted_after(2, monkeypatch)
+    often = replace(small_settings, evaluate_every_s=0.01, time_limit_s=30.0)
+    with pytest.raises(KeyboardInterrupt):
+        train(robot, task, often, seed=3, out=tmp_path / "run", command="fulmar train")
+    record = read_run_record(tmp_path / "run")
+    assert record["interrupted"] is True
+    assert record["best"] == record["curve"][0]
+    assert len(record["curve"]) == 2
+    passport = export(tmp_path / "run", tmp_path / "bundle")
+    assert passport.training["interrupted"] is True
+
+
+def test_a_run_interrupted_before_its_first_check_leaves_nothing_that_looks_finished(
+    robot, task, small_settings, tmp_path, monkeypatch
+):
+    interrupted_after(0, monkeypatch)
+    with pytest.raises(KeyboardInterrupt):
+        train(robot, task, replace(small_settings, evaluate_every_s=0.01), seed=3, out=tmp_path / "run")
+    with pytest.raises(ConfigError, match="no finished training run"):
+        read_run_record(tmp_path / "run")
+
+
+def test_the_passport_carries_the_verdict_of_mujoco(run_copy, tmp_path):
+    assert "mujoco" not in export(run_copy, tmp_path / "before").training
+    figures = judge_in_mujoco(run_copy, episodes=2)
+    verdict = export(run_copy, tmp_path / "after").training["mujoco"]
+    assert (verdict["seed"], verdict["scenario"], verdict["episodes"]) == (JUDGE_SEED, "nominal", 2)
+    assert verdict["success_rate"] == figures["success_rate"]
+    shares = [f"{kind}{limit}_percent" for kind in ("PT", "OT") for limit in (5, 2, 1)]
+    assert {name: verdict[name] for name in [*shares, "AAS"]} == {
+        name: figures[name]["mean"] for name in [*shares, "AAS"]
+    }
