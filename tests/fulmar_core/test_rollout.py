@@ -64,7 +64,10 @@ def test_every_backend_is_closed_whatever_happens(monkeypatch, way_to_fail):
 
 def test_an_episode_shorter_than_a_control_step_is_refused_by_name():
     task = replace(TASK, episode_s=0.05)
-    lqr, words = load_lqr(ROBOT, task), r"an episode of task 'go_to_pose' lasts 0\.05 s, less than one control"
+    lqr, words = (
+        load_lqr(ROBOT, task),
+        r"an episode of task 'go_to_pose' lasts 0\.05 s, less than one control",
+    )
     with pytest.raises(ConfigError, match=words):
         roll_out_in_batch(lqr, ROBOT, task, NOMINAL, episodes=2, seed=1)
     with pytest.raises(ConfigError, match=words):

@@ -96,11 +96,11 @@ def roll_out_in_backends(
         for first in range(0, episodes, SIDE_BY_SIDE):
             numbers = range(first, min(first + SIDE_BY_SIDE, episodes))
             done = sum(run.position_error.size for run in runs)
-            runs.append(
-                _side_by_side(
-                    controller, backends, task, scenario, numbers, seed, lambda n, d=done: progress(d + n)
-                )
-            )
+
+            def further(steps: int, done: int = done) -> None:
+                progress(done + steps)
+
+            runs.append(_side_by_side(controller, backends, task, scenario, numbers, seed, further))
     return join(runs)
 
 
