@@ -17,10 +17,7 @@ from fulmar_core.tasks import Task
 
 JUDGE_SEED = 2026  # of episodes that finished controllers are judged on
 HELD_OUT_SEED = 1_000_003  # of episodes that learners are checked on
-JUDGING_SEEDS = (
-    JUDGE_SEED,
-    HELD_OUT_SEED,
-)  # no training seeds: judges shall see what no run has learned from
+JUDGING_SEEDS = (JUDGE_SEED, HELD_OUT_SEED)  # no training seeds: no run shall have learned from them
 
 
 @dataclass(frozen=True, slots=True)
