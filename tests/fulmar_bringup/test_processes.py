@@ -57,6 +57,7 @@ def test_children_stay_on_this_machine_and_know_their_parent(monkeypatch):
         (0, "plant ended with exit code 0"),
         (3, "plant ended with exit code 3"),
         (-9, "plant was killed by SIGKILL"),
+        (None, "plant could not be ended"),
     ],
 )
 def test_how_a_child_ended_is_said_in_words(code, text):
@@ -91,6 +92,36 @@ def test_output_of_a_child_is_prefixed_with_its_name(start, capfd):
     wait_for(lambda: "[talker] hello" in capfd.readouterr().err)
 
 
+def test_the_last_words_of_a_child_are_printed_before_stop_returns(start, capfd):
+    group = start("talker", "print('x\\n' * 20000 + '[ERROR] [12.3] [boat.plant]: too deep')")
+    wait_for(group.ended)
+    group.stop("talker")
+    assert "[boat.plant]: too deep" in capfd.readouterr().err
+    assert group.last_words("talker") == "too deep"
+
+
+def test_a_child_is_not_held_up_by_an_output_that_nobody_takes(start, monkeypatch, tmp_path):
+    closed = (tmp_path / "closed").open("w")
+    closed.close()
+    monkeypatch.setattr(sys, "stderr", closed)
+    group = start("talker", "print('a long line of output\\n' * 20000); raise SystemExit(4)")
+    wait_for(group.ended)
+    assert group.ended() == Ended("talker", 4)
+
+
+def test_a_stop_that_is_interrupted_forgets_no_child(start, monkeypatch, tmp_path):
+    group = start("sleeper", "import time\ntime.sleep(60)\n")
+    with monkeypatch.context() as context:
+        context.setattr(psutil, "wait_procs", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            group.stop("sleeper")
+    assert [end.name for end in group.stop_all()] == ["sleeper"]
+
+
+def interrupt(*_args, **_kwargs):
+    raise KeyboardInterrupt
+
+
 def test_a_child_that_ended_is_found_with_its_code(start):
     group = start("quitter", "raise SystemExit(3)")
     wait_for(group.ended)
@@ -117,9 +148,9 @@ def test_a_child_that_was_stopped_in_its_tracks_is_killed_without_delay(start, t
     ready = tmp_path / "ready"
     group = start("frozen", f"import time, pathlib\npathlib.Path({str(ready)!r}).touch()\ntime.sleep(60)\n")
     wait_for(ready.exists)
-    child = psutil.Process(group.pid("frozen"))
+    (child,) = psutil.Process().children()
     child.suspend()
     wait_for(lambda: child.status() == psutil.STATUS_STOPPED)
     began = time.monotonic()
-    assert group.stop("frozen") == [Ended("frozen", -9)]
+    assert group.stop("frozen") == [Ended("frozen", -9, forced=True)]
     assert time.monotonic() - began < 3.0

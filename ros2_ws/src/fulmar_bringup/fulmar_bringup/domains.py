@@ -9,9 +9,11 @@ import random
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 from fulmar_core.errors import ConfigError
 
+LARGEST = 232  # of DDS
 DOMAINS = range(1, 102)  # up to 101 the ports of a domain lie below those that Linux hands out to others
 
 
@@ -30,19 +32,66 @@ def reserved_domains(count: int) -> Iterator[list[int]]:
     Raises:
         ConfigError: If so many are not free.
     """
-    folder = Path(tempfile.gettempdir()) / f"fulmar_ros_domains_{os.getuid()}"
-    folder.mkdir(exist_ok=True)
+    folder = _lock_folder()
     reserved: list[int] = []
     with contextlib.ExitStack() as locks:
         for domain in random.sample(DOMAINS, len(DOMAINS)):
             if len(reserved) == count:
                 break
             lock = locks.enter_context((folder / str(domain)).open("w"))
-            with contextlib.suppress(BlockingIOError):
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if _locked(lock) and not _run_goes_on(folder, domain):
                 reserved.append(domain)
         if len(reserved) < count:
             raise ConfigError(
                 f"{count} free ROS domains are needed, {len(reserved)} were found. Use fewer --jobs."
             )
         yield reserved
+
+
+@contextlib.contextmanager
+def claimed_domain() -> Iterator[int]:
+    """Claim the domain of the environment for one run until the context ends; two runs in one would mix.
+
+    Not the lock of `reserved_domains`: a run may take place in a domain that its parent process reserved for it.
+
+    Yields:
+        The domain id.
+
+    Raises:
+        ConfigError: Another run of this user goes on in it, or ROS_DOMAIN_ID is no domain.
+    """
+    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
+    if not text.isdecimal() or int(text) > LARGEST:
+        raise ConfigError(f"ROS_DOMAIN_ID = '{text}' must be a whole number from 0 to {LARGEST}.")
+    domain = int(text)
+    with _run_lock_file(_lock_folder(), domain) as lock:
+        if not _locked(lock):
+            raise ConfigError(
+                f"another `fulmar run` is using ROS domain {domain}, and two in one domain would mix. "
+                "Wait for it to end, or set ROS_DOMAIN_ID to another number."
+            )
+        yield domain
+
+
+def _lock_folder() -> Path:
+    folder = Path(tempfile.gettempdir()) / f"fulmar_ros_domains_{os.getuid()}"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def _run_lock_file(folder: Path, domain: int) -> TextIO:
+    return (folder / f"{domain}.run").open("w")
+
+
+def _run_goes_on(folder: Path, domain: int) -> bool:
+    with _run_lock_file(folder, domain) as lock:
+        return not _locked(lock)
+
+
+def _locked(lock: TextIO) -> bool:
+    """Take a lock that lasts until the file is closed; False if somebody has it."""
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

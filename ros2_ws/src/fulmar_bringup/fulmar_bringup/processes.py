@@ -6,6 +6,7 @@ processes that no longer listen.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -13,12 +14,14 @@ import sys
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import IO
 
 import psutil
 
 from fulmar_bringup.node_table import NodeSpec, Parameter
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
+LAST_WORDS_S = 1.0  # for what a child that ended has left in the pipe; a grandchild may keep it open
 
 
 @dataclass(frozen=True)
@@ -26,11 +29,14 @@ class Ended:
     """How a child ended."""
 
     name: str
-    returncode: int
+    returncode: int | None  # None: it could not be ended
+    forced: bool = False  # we had to kill it
 
     @property
     def text(self) -> str:
         """For people."""
+        if self.returncode is None:
+            return f"{self.name} could not be ended"
         if self.returncode < 0:
             return f"{self.name} was killed by {signal.Signals(-self.returncode).name}"
         return f"{self.name} ended with exit code {self.returncode}"
@@ -47,7 +53,7 @@ class ProcessGroup:
         """
         self._environment = {**os.environ, **child_environment(), **(environment or {})}
         self._children: dict[str, psutil.Popen] = {}
-        self._readers: list[threading.Thread] = []
+        self._relays: dict[str, _Relay] = {}
 
     def start(self, spec: NodeSpec) -> None:
         """Start one node in a process of its own."""
@@ -60,9 +66,8 @@ class ProcessGroup:
             start_new_session=True,  # Ctrl-C reaches us alone; we stop the children in order
         )
         self._children[spec.name] = child
-        reader = threading.Thread(target=_relay, args=(spec.name, child.stdout), daemon=True)
-        reader.start()
-        self._readers.append(reader)
+        self._relays[spec.name] = _Relay(spec.name, child.stdout)
+        self._relays[spec.name].start()
 
     def ended(self) -> Ended | None:
         """The first child found to have ended, or None."""
@@ -81,23 +86,30 @@ class ProcessGroup:
         Returns:
             How each ended.
         """
-        chosen = [(name, self._children.pop(name)) for name in names if name in self._children]
+        chosen = [(name, self._children[name]) for name in names if name in self._children]
+        killed: set[int] = set()
         for number, patience_s in ((signal.SIGINT, PATIENCE_S), (signal.SIGTERM, 1.0), (signal.SIGKILL, 2.0)):
             alive = [child for _, child in chosen if child.poll() is None]
             for child in alive:
                 # A stopped process hears nothing but the last signal.
-                asleep = child.status() == psutil.STATUS_STOPPED
-                child.send_signal(signal.SIGKILL if asleep else number)
+                chosen_number = signal.SIGKILL if child.status() == psutil.STATUS_STOPPED else number
+                if chosen_number == signal.SIGKILL:
+                    killed.add(child.pid)
+                child.send_signal(chosen_number)
             psutil.wait_procs(alive, timeout=patience_s)
-        return [Ended(name, int(child.poll() or 0)) for name, child in chosen]
+        for name, _ in chosen:  # not before: whoever interrupts us can still stop them
+            del self._children[name]
+            self._relays[name].join(LAST_WORDS_S)
+        return [Ended(name, child.poll(), forced=child.pid in killed) for name, child in chosen]
 
     def stop_all(self) -> list[Ended]:
         """Stop every child that is left: newest first, so that the recorder sees the others' last words."""
         return [end for name in reversed(list(self._children)) for end in self.stop(name)]
 
-    def pid(self, name: str) -> int:
-        """Process id of a child."""
-        return int(self._children[name].pid)
+    def last_words(self, name: str) -> str:
+        """The last line that a child has printed so far, without what ROS puts before a log message."""
+        text = self._relays[name].last_line
+        return text.partition("]: ")[2] if text.startswith("[") and "]: " in text else text
 
 
 def command_line(spec: NodeSpec) -> list[str]:
@@ -127,9 +139,21 @@ def _yaml(value: Parameter) -> str:
     return repr(value)
 
 
-def _relay(name: str, stream: object) -> None:
-    for line in stream:  # type: ignore[attr-defined]
-        text = line.decode(errors="replace").rstrip()
-        if text:
-            sys.stderr.write(f"[{name}] {text}\n")
-            sys.stderr.flush()
+class _Relay(threading.Thread):
+    """Passes on what a child prints, and remembers the last line."""
+
+    def __init__(self, name: str, stream: IO[bytes]) -> None:
+        super().__init__(name=f"{name} output", daemon=True)
+        self._child, self._stream = name, stream
+        self.last_line = ""
+
+    def run(self) -> None:
+        for line in self._stream:
+            text = line.decode(errors="replace").rstrip()
+            if not text:
+                continue
+            self.last_line = text
+            # Nobody may listen any more, but a pipe that is not emptied would hold the child up.
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                sys.stderr.write(f"[{self._child}] {text}\n")
+                sys.stderr.flush()

@@ -1,32 +1,52 @@
-"""A bar for long work counted in control steps, on standard error, only on a terminal."""
+"""Bars for long work, on standard error, only on a terminal."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from fulmar_bringup.console import console
 
 
-@contextlib.contextmanager
-def step_bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show progress towards a number of steps.
+def step_bar(what: str, total: int) -> contextlib.AbstractContextManager[Callable[[float], None]]:
+    """Show progress towards a number of control steps.
 
     Args:
         what: One word for the work.
         total: Steps in all.
 
-    Yields:
-        A function to call with the steps done so far.
+    Returns:
+        A context that gives a function to call with the steps done so far.
     """
-    columns = (
-        TextColumn(what),
-        BarColumn(),
-        TextColumn("{task.completed:,} of {task.total:,} steps"),
-        TimeRemainingColumn(),
-    )
+    return _bar(what, total, TextColumn("{task.completed:,} of {task.total:,} steps"), TimeRemainingColumn())
+
+
+def time_bar(what: str, total_s: float) -> contextlib.AbstractContextManager[Callable[[float], None]]:
+    """Show progress through simulated time.
+
+    Args:
+        what: One word for the work.
+        total_s: Simulated time in all [s].
+
+    Returns:
+        A context that gives a function to call with the time that has passed [s].
+    """
+    text = TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated")
+    return _bar(what, total_s, text, TimeElapsedColumn())
+
+
+@contextlib.contextmanager
+def _bar(what: str, total: float, *more: ProgressColumn) -> Iterator[Callable[[float], None]]:
+    columns = (TextColumn(what), BarColumn(), *more)
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task(what, total=total)
-        yield lambda steps: bar.update(task, completed=steps)
+        yield lambda done: bar.update(task, completed=done)
