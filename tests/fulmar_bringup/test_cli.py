@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from fulmar_bringup import cli
+from fulmar_bringup import cli, provenance
+from fulmar_core import policy_bundle
 from fulmar_core.paths import config_directory
 from policy_server.shipped import shipped_policy
 
@@ -77,6 +80,9 @@ RUN = ["run", "floating_platform"]
         ([*RUN, "--goal", "0,0,0", "--start", "99,0,0"], "99.0 m apart, the geofence"),
         ([*RUN, "--policy", "/nowhere"], "policy '/nowhere' has no passport.json"),
         ([*RUN, "--control-hz", "7"], "control_hz = 7 must divide"),
+        ([*RUN, "--controller", "lqr", "--control-hz", "1"], "the watchdog closes the actuators after 500 ms"),
+        ([*RUN, "--controller", "lqr", "--policy", SHIPPED], "controller 'lqr' runs no policy bundle"),
+        ([*EVALUATE, "--policy", SHIPPED], "controller 'lqr' runs no policy bundle"),
         ([*RUN, "--record", "/tmp"], "/tmp exists already; nothing recorded is overwritten"),
         ([*EVALUATE, "--through", "gazebo"], "unknown way 'gazebo'. Known: batch, mujoco, ros."),
         ([*EVALUATE, "--scenario", "storm"], "unknown scenario 'storm'"),
@@ -91,7 +97,7 @@ RUN = ["run", "floating_platform"]
         (["report", __file__], "test_cli.py"),
         (["export", "/nowhere", "--out", "x"], "/nowhere: no finished training run"),
         (["train", "floating_platform", "go_to"], "unknown task 'go_to'"),
-        (["train", "floating_platform", "go_to_pose", "--seed", "1000003"], "seed 1000003 must be in"),
+        (["train", "floating_platform", "go_to_pose", "--seed", "1000003"], "kept for judging"),
     ],
     ids=lambda value: " ".join(value)[-45:] if isinstance(value, list) else "",
 )  # fmt: skip
@@ -143,6 +149,84 @@ def test_a_damaged_bundle_is_told(fulmar, tmp_path, name):
     line = complaint(fulmar("evaluate", "floating_platform", "go_to_pose", "--policy", str(folder)))
     assert name in line
     assert name in complaint(fulmar("bundle", "check", str(folder)))
+
+
+def test_a_bundle_for_a_rate_that_the_robot_cannot_keep_is_not_accepted(fulmar, monkeypatch):
+    slow = replace(policy_bundle.read_passport(Path(SHIPPED)), control_hz=7.0)
+    monkeypatch.setattr(policy_bundle, "read_passport", lambda _folder: slow)
+    assert "control_hz = 7 must divide the physics rate" in complaint(fulmar("bundle", "check", SHIPPED))
+
+
+@pytest.mark.parametrize(
+    ("module", "extra", "words"),
+    [
+        ("mujoco", "sim", [*RUN, "--controller", "lqr"]),
+        ("mujoco", "sim", ["evaluate", "floating_platform", "go_to_pose", "--controller", "lqr"]),
+        ("onnxruntime", "policy", RUN),
+        ("onnxruntime", "policy", ["evaluate", "floating_platform", "go_to_pose"]),
+        ("rclpy", "ros", RUN),
+        ("mcap", "bags", ["report", "bag"]),
+        ("matplotlib", "view", ["report", "bag"]),
+        ("torch", "train", ["train", "floating_platform", "go_to_pose"]),
+    ],
+)
+def test_a_part_that_is_not_installed_is_named_with_its_extra(module, extra, words, tmp_path):
+    program = (
+        f"import sys; sys.modules[{module!r}] = None; sys.argv = {['fulmar', *words]!r}\n"
+        "from fulmar_bringup import cli\n"
+        "cli.main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path,
+    )  # fmt: skip
+    told = complaint((done.returncode, done.stdout, done.stderr))
+    assert f"needs '{module}', which the extra '{extra}' brings" in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_doctor_names_the_extra_of_a_part_that_is_not_installed(fulmar, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, out, _ = fulmar("doctor", "--json")
+    assert code == 1
+    (finding,) = (each for each in json.loads(out)["findings"] if each["what"] == "matplotlib")
+    assert "'view'" in finding["advice"]
+
+
+def test_a_run_folder_is_never_trained_into(fulmar, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    (tmp_path / "run.json").write_text("{}")
+    words = ("train", "floating_platform", "go_to_pose", "--out", str(tmp_path))
+    assert "nothing recorded is overwritten" in complaint(fulmar(*words))
+
+
+@pytest.mark.parametrize(
+    ("number", "told"), [(signal.SIGTERM, "stopped by SIGTERM"), (signal.SIGINT, "stopped by the user")]
+)
+def test_a_command_that_is_told_to_stop_says_so_and_ends_with_1(fulmar, monkeypatch, number, told):
+    monkeypatch.setattr(
+        "fulmar_core.rollout.roll_out_in_batch", lambda *_a, **_k: signal.raise_signal(number)
+    )
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        code, out, err = fulmar(*EVALUATE)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert (code, out, err) == (1, "", f"fulmar: {told}\n")
+
+
+def test_a_revision_is_only_given_for_a_file_that_the_repository_holds(monkeypatch, tmp_path):
+    copy = tmp_path / "provenance.py"
+    shutil.copy(provenance.__file__, copy)
+    for words in (
+        ["init"],
+        ["-c", "user.name=x", "-c", "user.email=x@x", "commit", "--allow-empty", "-m", "x"],
+    ):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True, capture_output=True)
+    monkeypatch.setattr(provenance, "__file__", str(copy))
+    assert provenance.git_revision() == ""
+    subprocess.run(["git", "add", copy.name], cwd=tmp_path, check=True, capture_output=True)
+    assert provenance.git_revision().endswith("-dirty")
 
 
 def test_without_a_command_the_help_is_shown_as_bad_usage(fulmar):

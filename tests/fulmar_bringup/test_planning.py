@@ -148,5 +148,18 @@ def test_a_damaged_policy_is_refused_before_anything_starts(plan, tmp_path):
         plan(controller="policy", policy=folder)
 
 
-def test_the_lqr_takes_no_notice_of_a_policy(plan):
-    assert plan(policy=Path("/nowhere")).plan.controller == "lqr"
+def test_a_policy_for_a_controller_that_runs_none_is_refused(plan):
+    with pytest.raises(ConfigError, match="controller 'lqr' runs no policy bundle"):
+        plan(policy=shipped_policy("floating_platform", "go_to_pose"))
+
+
+@pytest.mark.parametrize(("control_hz", "rate"), [(1.0, 1.0), (2.0, 1.0), (1.0, 0.1), (0.5, 3.0)])
+def test_commands_rarer_than_the_watchdog_allows_are_refused_in_real_time_alone(plan, control_hz, rate):
+    with pytest.raises(ConfigError, match=r"the watchdog closes the actuators after \d+ ms"):
+        plan(control_hz=control_hz, rate=rate)
+    assert plan(control_hz=control_hz, lockstep=True).plan.control_hz == control_hz
+
+
+@pytest.mark.parametrize(("control_hz", "rate"), [(2.5, 1.0), (5.0, 0.1), (1.0, 3.0)])
+def test_commands_that_the_watchdog_allows_are_planned(plan, control_hz, rate):
+    assert plan(control_hz=control_hz, rate=rate).plan.rate == rate

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+from types import FrameType
 
 import typer
 
@@ -17,9 +19,11 @@ from fulmar_bringup.commands.report import report
 from fulmar_bringup.commands.run import run
 from fulmar_bringup.commands.train import train
 from fulmar_bringup.console import console
+from fulmar_bringup.extras import advice_for
 from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
 
 DONE, FAILED, BAD_USAGE = 0, 1, 2
+INTERRUPTED = 130  # what typer makes of Ctrl-C
 
 app = typer.Typer(
     name="fulmar",
@@ -42,6 +46,15 @@ app.command()(doctor)
 
 def main() -> None:
     """Run the command line; mistakes end with one line and exit code 2, failures with 1."""
+    told: list[str] = []
+
+    def on_terminate(_number: int, _frame: FrameType | None) -> None:
+        """SIGTERM stops a command as Ctrl-C does, in order; once, though `timeout` sends it twice."""
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        told.append("stopped by SIGTERM")
+        raise KeyboardInterrupt(*told)
+
+    signal.signal(signal.SIGTERM, on_terminate)
     try:
         code = app(prog_name="fulmar", standalone_mode=False)
     except (ConfigError, BundleError, BagError) as error:
@@ -49,16 +62,19 @@ def main() -> None:
     except FulmarError as error:
         sys.exit(_complain(str(error), FAILED))
     except typer.Exit as exit_request:
-        sys.exit(exit_request.exit_code)
-    except typer.Abort:
-        sys.exit(_complain("stopped by the user", FAILED))
-    except KeyboardInterrupt:
-        sys.exit(_complain("stopped by the user", FAILED))
+        code = exit_request.exit_code
+    except (typer.Abort, KeyboardInterrupt):
+        code = INTERRUPTED
     except BrokenPipeError:  # whoever read our output has had enough, as in `fulmar list | head -1`
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - Python flushes it once more at its own end
         sys.exit(FAILED)
     except OSError as error:  # a folder that cannot be written, a full disk
         sys.exit(_complain(f"{error.filename or 'the system'}: {error.strerror or error}.", FAILED))
+    except ModuleNotFoundError as error:
+        advice = advice_for(error)
+        if advice is None:
+            raise
+        sys.exit(_complain(advice, BAD_USAGE))
     except Exception as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # its message is the whole help
             console.print(error.format_message(), markup=False)  # type: ignore[attr-defined]
@@ -66,6 +82,8 @@ def main() -> None:
         if hasattr(error, "format_message"):  # what typer raises for bad usage, whichever click is behind it
             sys.exit(_complain(f"{error.format_message()}{_hint(error)}", BAD_USAGE))
         raise
+    if code == INTERRUPTED:
+        sys.exit(_complain(told[0] if told else "stopped by the user", FAILED))
     sys.exit(code if isinstance(code, int) else DONE)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bringup.extras import EXTRAS
 from fulmar_core.errors import FulmarError
 from fulmar_core.paths import config_directory, config_names
 from fulmar_core.robot import load_robot
@@ -22,7 +23,7 @@ from fulmar_core.tasks import load_task
 
 LATE_MS = 2.0  # what a 50 Hz loop may be late at the 99th percentile
 FREE_BYTES = 1_000_000_000
-PARTS = {"rclpy": "ros", "mujoco": "sim", "onnxruntime": "policy", "mcap": "bags", "matplotlib": "view"}
+PARTS = {EXTRAS[extra][0]: extra for extra in ("ros", "sim", "policy", "bags", "view")}
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         plan: What to run.
         subscribers: Subscriptions of the command to wait for, in lock step.
     """
-    executable = CONTROLLERS[plan.controller]
+    executable = CONTROLLERS[plan.controller].node
     parameters: dict[str, Parameter] = {
         "robot": plan.robot,
         "task": plan.task,

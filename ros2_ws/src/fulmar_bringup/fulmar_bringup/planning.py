@@ -15,6 +15,7 @@ from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError
 from fulmar_core.policy_bundle import check_fit, read_passport
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from policy_server.shipped import shipped_policy
 
@@ -79,8 +80,9 @@ def plan_run(
     _check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
     the_robot, the_task = load_robot(robot), load_task(task)
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
-    if controller == "policy":
-        policy = checked_policy(policy, the_robot, the_task, hz)
+    if not lockstep:
+        check_beat(hz, rate)
+    policy = chosen_policy(controller, policy, the_robot, the_task, hz)
     if record.exists():
         raise ConfigError(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
@@ -135,6 +137,43 @@ def checked_rate(robot: Robot, control_hz: float) -> float:
     except ValueError as error:
         raise ConfigError(f"robot '{robot.name}': {error}") from error
     return control_hz
+
+
+def check_beat(control_hz: float, rate: float) -> None:
+    """Refuse commands so rare that the plant's watchdog would trip between any two of them, in real time.
+
+    Args:
+        control_hz: Command rate, in simulated time [Hz].
+        rate: Simulated seconds a wall-clock second.
+
+    Raises:
+        ConfigError: If the control period is not shorter than the watchdog's timeout.
+    """
+    period_s, timeout_s = 1.0 / (control_hz * rate), default_timeout(1.0 / control_hz) / min(rate, 1.0)
+    if period_s >= timeout_s:
+        raise ConfigError(
+            f"control_hz = {control_hz:g} at rate {rate:g} gives a command every {1e3 * period_s:.0f} ms of wall-clock "
+            f"time, but the watchdog closes the actuators after {1e3 * timeout_s:.0f} ms without one. "
+            "Raise --control-hz, or use --lockstep."
+        )
+
+
+def chosen_policy(
+    controller: str, policy: Path | None, robot: Robot, task: Task, control_hz: float
+) -> Path | None:
+    """The bundle that a controller will run, checked; None for one that runs none.
+
+    Raises:
+        ConfigError: A bundle was given to a controller that runs none.
+        BundleError: None is shipped, or the bundle is damaged or made for something else.
+    """
+    if controller == "policy":
+        return checked_policy(policy, robot, task, control_hz)
+    if policy is not None:
+        raise ConfigError(
+            f"controller '{controller}' runs no policy bundle. Leave --policy out, or use --controller policy."
+        )
+    return None
 
 
 def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: float) -> Path:

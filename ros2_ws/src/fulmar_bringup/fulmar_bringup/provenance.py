@@ -16,17 +16,22 @@ def fulmar_version() -> str:
 
 
 def git_revision() -> str:
-    """Commit of the checkout this file lies in, with `-dirty` where it was changed; empty outside of one."""
-    here = Path(__file__).resolve().parent
+    """Commit of the checkout this file belongs to, with `-dirty` where it was changed; empty outside of one.
+
+    A repository that merely has an installed Fulmar below it, in a virtual environment, does not count.
+    """
+    here = Path(__file__).resolve()
+    if _git(here.parent, "ls-files", "--error-unmatch", here.name) is None:
+        return ""
+    return _git(here.parent, "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*") or ""
+
+
+def _git(folder: Path, *words: str) -> str | None:
+    """What git says in a folder; None if it fails or is not there."""
     try:
         done = subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"],
-            cwd=here,
-            capture_output=True,
-            text=True,
-            timeout=5.0,
-            check=False,
+            ["git", *words], cwd=folder, capture_output=True, text=True, timeout=5.0, check=False
         )
     except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None

@@ -2,15 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from fulmar_core.config import load_config
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.lqr import load_lqr
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.tasks import Task, load_task
 
-CONTROLLERS = {"policy": "policy_node", "lqr": "lqr_node"}  # name and node in policy_server
+
+def _load_policy(robot: Robot, task: Task, control_hz: float, policy: str) -> Controller:
+    from policy_server.policy import Policy
+
+    return Policy(Path(policy), robot, task, control_hz=control_hz)
+
+
+def _load_lqr(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
+    return load_lqr(robot, task, control_hz=control_hz)
+
+
+@dataclass(frozen=True)
+class ControllerEntry:
+    """One line of the table of controllers."""
+
+    title: str
+    node: str  # script and module in policy_server
+    load: Callable[[Robot, Task, float, str], Controller]  # with the command rate and the folder of a bundle
+    needs: tuple[str, ...] = ()  # modules that an extra brings
+
+
+CONTROLLERS = {
+    "policy": ControllerEntry("a learned policy bundle", "policy_node", _load_policy, ("onnxruntime",)),
+    "lqr": ControllerEntry("linear-quadratic regulator with valve allocation", "lqr_node", _load_lqr),
+}
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")
 DRIVERS: dict[str, str] = {}  # robot and module in hardware_drivers
@@ -42,6 +70,11 @@ def load_system(name: str) -> System:
     system = load_config(System, config_path("systems", name))
     check_names(system.robot, system.task, system.controller, system.backend)
     return system
+
+
+def modules_of(controller: str, backend: str) -> tuple[str, ...]:
+    """Modules of extras that the nodes of a controller and a backend import."""
+    return (*CONTROLLERS[controller].needs, *(("mujoco",) if backend == "mujoco" else ()))
 
 
 def system_of(controller: str, backend: str) -> System | None:

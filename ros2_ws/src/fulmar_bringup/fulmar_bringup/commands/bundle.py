@@ -40,6 +40,7 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
 @bundle.command()
 def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
     """Load a bundle as the robot would: hashes, robot, task, rate, names, shapes, golden vectors."""
+    from fulmar_bringup.planning import checked_rate
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
@@ -47,6 +48,7 @@ def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
 
     passport = read_passport(folder)
     robot, task = load_robot(passport.robot), load_task(passport.task)
+    checked_rate(robot, passport.control_hz)
     Policy(folder, robot, task, control_hz=passport.control_hz)
     if as_json:
         print_json({"bundle": str(folder), "accepted": True, "sha256": passport.sha256})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -23,7 +22,6 @@ from fulmar_bringup.commands.arguments import (
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
-from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.metrics import Trajectories
 
@@ -64,8 +62,9 @@ def evaluate(
 
     fulmar evaluate floating_platform go_to_pose --controller lqr --through ros
     """
-    from fulmar_bringup.planning import checked_policy, checked_rate
-    from fulmar_bringup.system import check_names
+    from fulmar_bringup.extras import require
+    from fulmar_bringup.planning import checked_rate, chosen_policy
+    from fulmar_bringup.system import check_names, modules_of
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.metrics import summary
     from fulmar_core.robot import load_robot
@@ -77,8 +76,8 @@ def evaluate(
     the_robot, the_task = load_robot(robot), load_task(task)
     load_scenario(scenario)  # so that a wrong name is told before anything is started
     hz = checked_rate(the_robot, control_hz or the_robot.timing.control_hz)
-    if controller == "policy":
-        policy = checked_policy(policy, the_robot, the_task, hz)
+    policy = chosen_policy(controller, policy, the_robot, the_task, hz)
+    require(*modules_of(controller, "mock" if through == "batch" else "mujoco"))
     plan = RunPlan(
         robot=robot,
         task=task,
@@ -113,6 +112,7 @@ def evaluate(
 
 
 def _roll_out(plan: RunPlan, through: str, episodes: int, jobs: int, progress: Progress) -> Trajectories:
+    from fulmar_bringup.system import CONTROLLERS
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.robot import load_robot
     from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
@@ -123,7 +123,7 @@ def _roll_out(plan: RunPlan, through: str, episodes: int, jobs: int, progress: P
 
         return roll_out_through_ros(plan, episodes=episodes, jobs=jobs, progress=progress)
     robot, task, scenario = load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario)
-    controller = _controller(plan)
+    controller = CONTROLLERS[plan.controller].load(robot, task, plan.control_hz, plan.policy)
     if through == "batch":
         return roll_out_in_batch(
             controller, robot, task, scenario, episodes=episodes, seed=plan.seed, progress=progress
@@ -144,19 +144,6 @@ def _roll_out(plan: RunPlan, through: str, episodes: int, jobs: int, progress: P
 def _cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0))
-
-
-def _controller(plan: RunPlan) -> Controller:
-    from fulmar_core.controllers.lqr import load_lqr
-    from fulmar_core.robot import load_robot
-    from fulmar_core.tasks import load_task
-
-    robot, task = load_robot(plan.robot), load_task(plan.task)
-    if plan.controller == "lqr":
-        return load_lqr(robot, task, control_hz=plan.control_hz)
-    from policy_server.policy import Policy
-
-    return Policy(Path(plan.policy), robot, task, control_hz=plan.control_hz)
 
 
 def _print(figures: dict[str, Any]) -> None:

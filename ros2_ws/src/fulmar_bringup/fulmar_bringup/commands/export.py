@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from fulmar_bringup.console import output
-from fulmar_bringup.extras import needs_extra
 
 
 def export(
@@ -16,12 +15,10 @@ def export(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the bundle.")],
 ) -> None:
     """Write a policy bundle: network, golden vectors and passport; then load it as the robot will."""
-    with needs_extra("train"):
-        from training.export import export as write
-
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
+    from training.export import export as write
 
     passport = write(run, out)
     Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)

@@ -52,10 +52,4 @@ def _entries(family: str) -> dict[str, str]:
         return {name: load_system(name).title for name in config_names("systems")}
     if family == "policies":
         return {path.name: f"{read_passport(path).control_hz:g} Hz" for path in shipped_policies()}
-    return {name: CONTROLLER_TITLES[name] for name in CONTROLLERS}
-
-
-CONTROLLER_TITLES = {
-    "policy": "a learned policy bundle",
-    "lqr": "linear-quadratic regulator with valve allocation",
-}
+    return {name: entry.title for name, entry in CONTROLLERS.items()}

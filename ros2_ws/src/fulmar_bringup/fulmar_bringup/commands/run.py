@@ -69,7 +69,9 @@ def run(
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
     from fulmar_bringup.conductor import conduct
+    from fulmar_bringup.extras import require
     from fulmar_bringup.planning import plan_run
+    from fulmar_bringup.system import modules_of
 
     request = plan_run(
         robot=robot,
@@ -88,6 +90,7 @@ def run(
         record=record or default_record(robot, controller),
         command="fulmar " + " ".join(sys.argv[1:]),
     )
+    require(*modules_of(controller, backend))  # the nodes would fail for want of them one by one
     outcome = conduct(request)
     if as_json:
         print_json(outcome.summary)
@@ -116,5 +119,8 @@ def verdict(summary: dict[str, Any]) -> str:
             f"  {summary['steps']} commands, latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms; "
             f"{summary['overruns']} overruns, {summary['watchdog_trips']} watchdog trips"
         )
-    lines.append(f"  recorded in {summary['bag']}; look at it with: fulmar report {summary['bag']}")
+    if summary["bag"] is None:
+        lines.append("  nothing was recorded")
+    else:
+        lines.append(f"  recorded in {summary['bag']}; look at it with: fulmar report {summary['bag']}")
     return "\n".join(lines)

@@ -11,7 +11,7 @@ import typer
 
 from fulmar_bringup.commands.arguments import RobotArgument, SeedOption, TaskArgument
 from fulmar_bringup.console import console, output
-from fulmar_bringup.extras import needs_extra
+from fulmar_core.errors import ConfigError
 
 
 def train(
@@ -38,19 +38,18 @@ def train(
 
     fulmar train floating_platform go_to_pose --seed 3 --out runs/train/mine
     """
+    from fulmar_bringup.provenance import git_revision
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
+    from training.judge import judge_in_mujoco
+    from training.settings import load_training_settings
+    from training.train import train as learn
 
     the_robot, the_task = load_robot(robot), load_task(task)
-    with needs_extra("train"):
-        from training.judge import judge_in_mujoco
-        from training.settings import load_training_settings
-        from training.train import train as learn
-
-    from fulmar_bringup.provenance import git_revision
-
     settings = load_training_settings(robot, task)
     out = out or Path("runs") / "train" / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{task}_{seed}"
+    if out.is_dir() and any(out.iterdir()):
+        raise ConfigError(f"{out} is not empty; nothing recorded is overwritten. Give --out another folder.")
     record = learn(
         the_robot,
         the_task,
