@@ -111,3 +111,10 @@ def test_after_a_reset_actuators_are_safe_without_a_trip_and_stamps_may_start_an
     assert guard.watchdog.trips == 0
     assert guard.offer(NAMES, GOOD, 901 * MS, stamp_ns=1000 * MS)
     assert guard.output(902 * MS).tolist() == GOOD
+
+
+def test_a_stray_stamp_from_the_future_locks_nobody_out_beyond_one_trip(guard):
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=9_000_000 * MS)
+    assert not guard.offer(NAMES, GOOD, 100 * MS, stamp_ns=5000 * MS)
+    assert not guard.output(10_000 * MS).any()
+    assert guard.offer(NAMES, GOOD, 10_001 * MS, stamp_ns=5000 * MS)

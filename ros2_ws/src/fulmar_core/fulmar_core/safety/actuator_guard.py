@@ -47,6 +47,8 @@ class ActuatorGuard:
         Returns:
             Whether it was taken.
         """
+        if self.watchdog.tripped:
+            self._stamp_ns = 0  # one stray stamp from the future must not lock everybody out for good
         command = np.asarray(values, dtype=float)
         problem = (
             name_problem(names, self._actuators.names)
