@@ -6,13 +6,17 @@ the simulator, as no deployed node may.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
+import signal
 import sys
 import time
-from collections.abc import Callable
-from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -24,15 +28,16 @@ from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.errors import RunFailed
+from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.metrics import Trajectories, TrajectoryLog, join, select
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
-from fulmar_ros.runtime import SWITCH_INTERVAL_S, spinning
+from fulmar_ros.runtime import SWITCH_INTERVAL_S, end_with_parent, spinning
 from sim_nodes.sim_node import make_backend
 
 Progress = Callable[[int], None]
+STOPS = (signal.SIGINT, signal.SIGTERM)  # what ends a worker, with its children, at any time
 
 
 def roll_out_through_ros(
@@ -60,24 +65,83 @@ def roll_out_through_ros(
     shares = [range(first, episodes, jobs) for first in range(jobs)]
     spawn = multiprocessing.get_context("spawn")  # a fork would copy threads of DDS that do not survive it
     counts = [spawn.Value("q", 0) for _ in shares]
-    with reserved_domains(jobs) as domains, ProcessPoolExecutor(jobs, spawn, _take_counts, (counts,)) as pool:
-        futures = [
-            pool.submit(_roll_out_share, plan, share, domain, index)
-            for index, (share, domain) in enumerate(zip(shares, domains, strict=True))
-        ]
-        while not all(future.done() for future in futures):
-            wait(futures, timeout=0.2, return_when=FIRST_EXCEPTION)
-            progress(sum(count.value for count in counts))
+    pool = ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts, os.getpid()))
+    with reserved_domains(jobs) as domains, _shut_down_in_the_end(pool):
+        # Workers inherit that signals are held back, until they are ready for them: none is lost.
+        with _signals_held_back():
+            futures = [
+                pool.submit(_work, plan, share, domain, index)
+                for index, (share, domain) in enumerate(zip(shares, domains, strict=True))
+            ]
+        _wait_for_all(futures, lambda: progress(sum(count.value for count in counts)))
         runs = [future.result() for future in futures]
     return _in_order(runs, shares)
+
+
+def _wait_for_all(futures: list[Future[Trajectories]], tick: Callable[[], None]) -> None:
+    """Wait for all of them, or raise the first error as soon as it is there."""
+    pending = set(futures)
+    while pending:
+        done, pending = wait(pending, timeout=0.2, return_when=FIRST_EXCEPTION)
+        tick()
+        for future in done:
+            try:
+                future.result()
+            except BrokenProcessPool as error:
+                raise RunFailed("a process of the evaluation was ended from outside") from error
+
+
+@contextlib.contextmanager
+def _shut_down_in_the_end(pool: ProcessPoolExecutor) -> Iterator[None]:
+    """Wait for the workers; after an error or Ctrl-C, tell them to stop first."""
+    try:
+        yield
+    except BaseException:
+        for worker in multiprocessing.active_children():
+            if worker.pid is not None:
+                os.kill(worker.pid, signal.SIGINT)
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _signals_held_back() -> Iterator[None]:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOPS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 _counts: list[Any] = []
 
 
-def _take_counts(counts: list[Any]) -> None:
-    """Keep the shared counters in a worker; they can only be handed over when it starts."""
+def _begin_worker(counts: list[Any], parent: int) -> None:
+    """Keep the shared counters in a worker, which must be handed over when it starts, and end when told to."""
     _counts[:] = counts
+    for number in STOPS:
+        signal.signal(number, _on_stop)
+    os.environ["FULMAR_PARENT_PID"] = str(parent)
+    end_with_parent()
+    try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)
+    except SystemExit:  # told to stop before it began; the pool would print where
+        os._exit(1)
+
+
+def _on_stop(_number: int, _frame: FrameType | None) -> None:
+    for number in STOPS:
+        signal.signal(number, signal.SIG_IGN)  # stopping in order must not be disturbed
+    raise SystemExit(1)
+
+
+def _work(plan: RunPlan, numbers: range, domain: int, index: int) -> Trajectories:
+    """Do a share; a worker that is told to stop meanwhile stops its children and takes no further share."""
+    try:
+        return _roll_out_share(plan, numbers, domain, index)
+    except SystemExit:
+        os._exit(1)  # the pool would take it for the outcome of the share and wait for another one
 
 
 def _in_order(runs: list[Trajectories], shares: list[range]) -> Trajectories:
@@ -122,10 +186,13 @@ def _episodes(
 
     began = time.monotonic()
 
-    def alive() -> None:
+    def raise_if_ended() -> None:
         end = group.ended()
         if end is not None:
             raise RunFailed(f"{end.text}; its own words are above")
+
+    def alive() -> None:
+        raise_if_ended()
         if time.monotonic() - began > START_TIMEOUT_S:
             raise RunFailed(
                 f"the controller did not take its goal within {START_TIMEOUT_S:g} s. Try `fulmar doctor`."
@@ -138,13 +205,19 @@ def _episodes(
         plant.clock.advance(control_dt)
         overseer.give_goal(episode.goal, time_ns=plant.clock.now_ns, alive=alive)
         log = TrajectoryLog(control_dt)
-        plant.run_episode(
-            episode,
-            number=number,
-            seed=plan.seed,
-            steps=steps,
-            on_step=lambda sample, command, log=log, goal=episode.goal: log.add(sample.truth, goal, command),
-        )
+        try:
+            plant.run_episode(
+                episode,
+                number=number,
+                seed=plan.seed,
+                steps=steps,
+                on_step=lambda sample, command, log=log, goal=episode.goal: log.add(
+                    sample.truth, goal, command
+                ),
+            )
+        except LockstepError:
+            raise_if_ended()  # a controller that has ended is a better reason than its silence
+            raise
         runs.append(log.trajectories())
         progress(done * steps)
     return join(runs)
