@@ -69,6 +69,17 @@ def json_of(output: str) -> dict[str, Any]:
     return dict(json.loads(output))
 
 
+def wait_for_children(parent: psutil.Popen, count: int, timeout_s: float = 30.0) -> list[psutil.Process]:
+    """All children of a command, direct or not, as soon as there are so many."""
+    until = time.monotonic() + timeout_s
+    while time.monotonic() < until:
+        children = parent.children(recursive=True)
+        if len(children) >= count:
+            return list(children)
+        time.sleep(0.02)
+    raise AssertionError(f"there are no {count} children")
+
+
 def nothing_left(children: list[psutil.Process], timeout_s: float = 10.0) -> bool:
     """Whether every one of these processes ends in time."""
     _, alive = psutil.wait_procs(children, timeout=timeout_s)

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import json
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fulmar_bringup.bag_reader import read_run
-from fulmar_bringup.console import console
+from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec
 from fulmar_bringup.planning import RunRequest
-from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.processes import Ended, ProcessGroup
+from fulmar_bringup.progress import time_bar
 from fulmar_bringup.provenance import fulmar_version, git_revision
+from fulmar_bringup.run_record import Actuation, Motion, RunRecord
 from fulmar_bringup.run_summary import summarise
-from fulmar_bringup.supervisor import SILENT_S, START_TIMEOUT_S, Supervisor, supervisor
-from fulmar_bringup.system import CONTROLLERS
-from fulmar_core.errors import RunFailed
+from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor
+from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.paths import config_path
 from fulmar_core.state import planar_pose
 from fulmar_core.tasks import load_task
 
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 GOAL_STAMP_NS = 1_000_000_000  # the simulated time at which every run begins
+SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
+PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
+LOCKSTEP_SILENT_S = 10.0  # in lock step both are busy, and a plant itself waits 5 s for an answer
 
 
 @dataclass(frozen=True)
@@ -49,30 +53,58 @@ def conduct(request: RunRequest) -> RunOutcome:
         request: What to run.
 
     Returns:
-        The outcome; a failed run has one too, with everything that was recorded.
+        The outcome; a failed run has one too, with whatever was recorded.
 
     Raises:
-        BagError: If nothing readable was recorded at all.
+        ConfigError: Another run goes on in this ROS domain.
+    """
+    with claimed_domain():
+        failure, plant_steps = _run(request)
+    try:
+        record = read_run(request.record)
+        summary = summarise(record)
+    except FulmarError as error:
+        failure, summary = failure or str(error), summarise(_nothing_recorded(request))
+        summary["bag"] = str(request.record) if request.record.exists() else None
+    if not failure and plant_steps > summary["steps"]:
+        failure = f"the bag lacks {plant_steps - summary['steps']} of {plant_steps} commands"
+    return RunOutcome({**summary, "failure": failure or None}, failure)
+
+
+def _run(request: RunRequest) -> tuple[str, int]:
+    """Start, watch and stop everything.
+
+    Returns:
+        Why the run failed, empty if it did not; and how many commands the plant was given in lock step.
     """
     plan = replace(request.plan, supervised=True)
     group = ProcessGroup()
-    failure = ""
+    failure, plant, ends = "", Report(), list[Ended]()
     try:
         group.start(recorder_spec(plan, **_recording(request)))
         group.start(plant_spec(plan, subscribers=2))  # controller and recorder
         group.start(controller_spec(plan, subscribers=2))  # plant and recorder
         task = load_task(plan.task)
         with supervisor(plan.robot, task) as overseer:
+            plant = overseer.plant
             failure = _watch(request, plan, overseer, group)
             # The controller first: the plant then shows that its actuators are safe, and the recorder sees it.
-            group.stop("controller")
-            group.stop("plant")
-    except KeyboardInterrupt:
-        failure = "stopped by the user"
+            ends += group.stop("controller")
+            ends += group.stop("plant")
+    except KeyboardInterrupt as stop:
+        failure = str(stop) or "stopped by the user"
     finally:
-        group.stop_all()
-    summary = summarise(read_run(request.record))
-    return RunOutcome({**summary, "failure": failure or None}, failure)
+        ends += group.stop_all()
+    return _with_ends(failure, ends), int(plant.values.get("steps", 0))
+
+
+def _with_ends(failure: str, ends: list[Ended]) -> str:
+    """Add the children that did not end well when they were asked to, unless the failure speaks of them already."""
+    # SIGINT itself ends a child only before it can listen, and then nothing is lost.
+    bad = [end for end in ends if end.returncode not in (0, -signal.SIGINT)]
+    if failure:
+        bad = [end for end in bad if end.name not in failure and not end.forced]
+    return "; ".join([*([failure] if failure else []), *(f"{end.text} when it was stopped" for end in bad)])
 
 
 def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
@@ -92,8 +124,8 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
         x, y, heading = request.goal
         goal = planar_pose(np.asarray(x), np.asarray(y), np.deg2rad(heading))
         overseer.give_goal(goal, time_ns=GOAL_STAMP_NS, alive=starting)
-        overseer.start_plant(starting)
-        with _progress(plan.duration_s) as moved:
+        overseer.start_plant(starting, lambda: group.last_words("plant"))
+        with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)
     except RunFailed as error:
         time.sleep(LAST_WORDS_S)
@@ -105,21 +137,19 @@ def _wait_for_end(
     plan: RunPlan, overseer: Supervisor, group: ProcessGroup, moved: Callable[[float], None]
 ) -> None:
     began = time.monotonic()
+    plant_limit_s, controller_limit_s = _silence_limits_s(plan)
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
 
     def running() -> None:
         _raise_if_ended(group)
-        moved(float(overseer.plant.values.get("sim_time_s", 0.0) or 0.0))
-        now = time.monotonic()
+        moved(max(0.0, float(overseer.plant.values.get("sim_time_s", 0.0) or 0.0) - GOAL_STAMP_NS / 1e9))
         if overseer.plant.level == "error":
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":
             raise RunFailed(f"controller: {overseer.controller.message}")
-        if not plan.lockstep and overseer.controller.heard and now - overseer.controller.heard > SILENT_S:
-            raise RunFailed(
-                f"controller: has not reported for {now - overseer.controller.heard:.1f} s; it hangs"
-            )
-        if now - began > limit_s:
+        _raise_if_silent("controller", overseer.controller, controller_limit_s)
+        _raise_if_silent("plant", overseer.plant, plant_limit_s)
+        if time.monotonic() - began > limit_s:
             raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
 
     def finished() -> bool:
@@ -127,6 +157,19 @@ def _wait_for_end(
 
     overseer.wait_until(finished, running)
     running()
+
+
+def _silence_limits_s(plan: RunPlan) -> tuple[float, float]:
+    """How long plant and controller may be silent, in wall-clock time [s]."""
+    if plan.lockstep:
+        return LOCKSTEP_SILENT_S, LOCKSTEP_SILENT_S
+    return PLANT_SILENT_S, max(SILENT_S, 3.0 / (plan.control_hz * plan.rate))
+
+
+def _raise_if_silent(name: str, report: Report, limit_s: float) -> None:
+    silent_s = time.monotonic() - report.heard
+    if report.heard and silent_s > limit_s:
+        raise RunFailed(f"{name}: has not reported for {silent_s:.1f} s; it hangs")
 
 
 def _raise_if_ended(group: ProcessGroup) -> None:
@@ -157,7 +200,6 @@ def _recording(request: RunRequest) -> dict[str, str]:
         "task.yaml": config_path("tasks", plan.task),
         "scenario.yaml": config_path("scenarios", plan.scenario),
     }
-    assert plan.controller in CONTROLLERS
     return {
         "directory": str(request.record),
         "run_info": json.dumps(info),
@@ -165,25 +207,20 @@ def _recording(request: RunRequest) -> dict[str, str]:
     }
 
 
-class _progress:  # noqa: N801 - reads as a function where it is used
-    """A bar over the simulated time, on standard error, only on a terminal."""
-
-    def __init__(self, duration_s: float) -> None:
-        self._bar = Progress(
-            TextColumn("running"),
-            BarColumn(),
-            TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated"),
-            TimeElapsedColumn(),
-            console=console,
-            disable=not console.is_terminal,
-            transient=True,
-        )
-        self._task = self._bar.add_task("running", total=duration_s)
-
-    def __enter__(self) -> Callable[[float], None]:
-        self._bar.start()
-        start_s = GOAL_STAMP_NS / 1e9
-        return lambda sim_time_s: self._bar.update(self._task, completed=max(0.0, sim_time_s - start_s))
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+def _nothing_recorded(request: RunRequest) -> RunRecord:
+    """The record of a run that left no bag: what was asked for, and nothing else."""
+    none, vectors = np.empty(0), np.empty((0, 3))
+    motion = Motion(none, none, vectors, np.empty((0, 4)), vectors, none)
+    actuation = Actuation(none, none, (), np.empty((0, 0)))
+    return RunRecord(
+        path=request.record,
+        info=asdict(request.plan),
+        truth=motion,
+        odom=motion,
+        applied=actuation,
+        commanded=actuation,
+        goals=(),
+        controller={},
+        health=(),
+        warnings=(),
+    )

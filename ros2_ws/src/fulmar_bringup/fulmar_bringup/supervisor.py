@@ -30,7 +30,7 @@ from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
 START_TIMEOUT_S = 30.0
-SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
+REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
 
 
 @dataclass
@@ -91,19 +91,32 @@ class Supervisor:
         self._goal.publish(goal_message(goal, self._task.goal_topic, time_ns))
         self.wait_until(lambda: self.controller.values.get("goal_stamp_ns") == str(time_ns), alive)
 
-    def start_plant(self, alive: Callable[[], None]) -> None:
+    def start_plant(self, alive: Callable[[], None], last_words: Callable[[], str] = lambda: "") -> None:
         """Configure and activate the plant.
 
         Args:
             alive: Called while waiting; raises to give up.
+            last_words: The last line that the plant has printed.
+
+        Raises:
+            RunFailed: The plant refuses; with its reason.
         """
         while not self._plant_service.wait_for_service(0.1):
             alive()
-        for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        steps = {"configured": Transition.TRANSITION_CONFIGURE, "activated": Transition.TRANSITION_ACTIVATE}
+        for what, transition in steps.items():
             future = self._plant_service.call_async(ChangeState.Request(transition=Transition(id=transition)))
             while not future.done():
                 alive()
                 time.sleep(0.005)
+            if not future.result().success:
+                raise RunFailed(f"plant: could not be {what}: {self._reason_of_plant(last_words)}")
+
+    def _reason_of_plant(self, last_words: Callable[[], str]) -> str:
+        until = time.monotonic() + REFUSAL_WORDS_S
+        while time.monotonic() < until and not (self.plant.level == "error" or last_words()):
+            time.sleep(0.02)
+        return (self.plant.message if self.plant.level == "error" else last_words()) or "it gave no reason"
 
     def wait_until(self, condition: Callable[[], bool], alive: Callable[[], None]) -> None:
         """Wait for something that the nodes say.
