@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
@@ -48,8 +49,9 @@ def child_running(parent: psutil.Popen, module: str, timeout_s: float = 30.0) ->
     until = time.monotonic() + timeout_s
     while time.monotonic() < until:
         for child in parent.children(recursive=True):
-            if module in child.cmdline():
-                return child
+            with contextlib.suppress(psutil.Error):  # it may have ended meanwhile
+                if module in child.cmdline():
+                    return child
         time.sleep(0.05)
     raise AssertionError(f"no child runs {module}")
 

@@ -173,10 +173,10 @@ def test_a_run_that_is_stopped_before_there_is_a_bag_has_an_outcome_all_the_same
     """As soon as the first child is there; what is not known is null."""
     asked = ("run", "floating_platform", "--controller", "lqr", "--record", "bag", "--json")
     run = start_fulmar(*asked, env=ros_domain.env, cwd=tmp_path)
-    children = wait_for_children(run, 1)
+    children = [child_running(run, "fulmar_ros.recorder_node")]
     run.send_signal(number)
-    out, _ = run.communicate(timeout=30.0)
-    assert run.returncode == 1
+    out, err = run.communicate(timeout=30.0)
+    assert run.returncode == 1, err
     summary = json_of(out)
     assert summary["failure"].startswith("stopped by")
     assert (summary["robot"], summary["controller"], summary["success"]) == (
@@ -185,6 +185,19 @@ def test_a_run_that_is_stopped_before_there_is_a_bag_has_an_outcome_all_the_same
         False,
     )
     assert summary["final_position_error_m"] is None
+    assert nothing_left(children)
+
+
+def test_ctrl_c_ends_a_demo_and_not_its_first_run_alone(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """Nothing is compared, and no second run begins."""
+    demo = start_fulmar("demo", "--out", "demo", env=ros_domain.env, cwd=tmp_path)
+    child_running(demo, "policy_server.policy_node")
+    children = wait_for_children(demo, 3)
+    demo.send_signal(signal.SIGINT)
+    out, err = demo.communicate(timeout=30.0)
+    assert (demo.returncode, out) == (1, ""), err
+    assert "policy: stopped by the user" in err
+    assert not (tmp_path / "demo" / "lqr").exists()
     assert nothing_left(children)
 
 

@@ -24,9 +24,11 @@ def demo(
     """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
     from fulmar_bringup.bag_reader import read_run
     from fulmar_bringup.conductor import conduct
+    from fulmar_bringup.extras import require
     from fulmar_bringup.planning import plan_run
     from fulmar_bringup.report import write_report
 
+    require("mujoco", "onnxruntime", "matplotlib")
     out = out or Path("runs") / f"demo_{time.strftime('%Y%m%d_%H%M%S')}"
     outcomes = []
     for controller in ("policy", "lqr"):
@@ -53,8 +55,9 @@ def demo(
             command="fulmar " + " ".join(sys.argv[1:]),
         )
         outcome = conduct(request)
-        if outcome.failure:
+        if outcome.failure:  # Ctrl-C among them: there is nothing to compare
             console.print(f"{controller}: {outcome.failure}", markup=False, soft_wrap=True)
+            raise typer.Exit(outcome.exit_code)
         outcomes.append(outcome)
     output.print(_table([outcome.summary for outcome in outcomes]))
     page = write_report([read_run(out / name) for name in ("policy", "lqr")], out / "report.html")
