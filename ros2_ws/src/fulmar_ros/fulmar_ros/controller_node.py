@@ -27,6 +27,7 @@ from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.parameters import read_parameters
+from fulmar_ros.phase import ArrivalPhase
 from fulmar_ros.runtime import FAILED, RequestExit
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
@@ -34,9 +35,6 @@ DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILU
 PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
 WARM_UP = 20  # the first inferences are slow; they happen before anything moves
 SAFE_REPEATS = 5
-AFTER_ODOMETRY_NS = (
-    2_000_000  # the beat comes this long after the odometry, which may be a little late itself
-)
 STATUS_PERIOD_S = 0.4  # at least 2 Hz
 
 
@@ -75,6 +73,7 @@ class ControllerNode(LifecycleNode):
         self._goal_stamp_ns = 0
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._deadlines = self._new_deadlines()
+        self._phase = ArrivalPhase(self.settings.rate)
         self._inference_ms = Spread()
         self._steps = 0
         self._said: tuple[object, ...] = ()
@@ -121,6 +120,7 @@ class ControllerNode(LifecycleNode):
                 self._flags, activated=True, last_input_ns=None, input_problem=""
             )
         self._deadlines = self._new_deadlines()
+        self._phase = ArrivalPhase(self.settings.rate)
         if not self.settings.lockstep:
             self._stop.clear()
             self._thread = threading.Thread(target=self._run, name="control", daemon=True)
@@ -208,10 +208,12 @@ class ControllerNode(LifecycleNode):
             problem = self._input_gate.problem(measurement) or ""
             changes: dict[str, object] = {"input_problem": problem}
             if not problem:
-                if self._newest is None:
-                    self._deadlines.align(time.monotonic_ns() + AFTER_ODOMETRY_NS)
+                now = time.monotonic_ns()
+                anchor = self._phase.anchor_ns(measurement.stamp_ns, now)
+                if anchor is not None:
+                    self._deadlines.align(anchor)
                 self._newest = measurement
-                changes["last_input_ns"] = time.monotonic_ns()
+                changes["last_input_ns"] = now
                 if self._goal is not None:
                     changes["goal_distance"] = _distance(measurement, self._goal)
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]

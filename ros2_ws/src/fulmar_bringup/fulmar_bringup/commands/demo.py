@@ -71,9 +71,9 @@ def _table(summaries: list[dict[str, Any]]) -> Table:
     columns = (
         "controller",
         "goal",
-        "position error",
-        "heading error",
-        "valves open",
+        "position",
+        "heading",
+        "valves",
         "rate",
         "latency p99",
         "trips",
