@@ -28,7 +28,7 @@ from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
-from fulmar_ros.runtime import FAILED, RequestExit
+from fulmar_ros.runtime import FAILED, RequestExit, settle_memory
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -121,6 +121,7 @@ class ControllerNode(LifecycleNode):
             )
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
+        settle_memory()
         if not self.settings.lockstep:
             self._stop.clear()
             self._thread = threading.Thread(target=self._run, name="control", daemon=True)

@@ -22,7 +22,7 @@ from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.realtime_loop import RealtimeLoop
-from fulmar_ros.runtime import FAILED, RequestExit
+from fulmar_ros.runtime import FAILED, RequestExit, settle_memory
 from fulmar_ros.simulated_time import SimulatedTime
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
@@ -101,6 +101,7 @@ class PlantNode(LifecycleNode):
             self.guard.reset()
         self._make_loops(self._backend)
         self.health.mode = "waiting"
+        settle_memory()
         self._thread = threading.Thread(target=self._run, args=(self._backend,), name="plant", daemon=True)
         self._thread.start()
         return super().on_activate(state)
@@ -232,6 +233,7 @@ class PlantNode(LifecycleNode):
 
     def _make_safe(self) -> None:
         assert self._backend is not None
+        self.wires.expect_no_answers()
         try:
             self._backend.make_safe()
         finally:

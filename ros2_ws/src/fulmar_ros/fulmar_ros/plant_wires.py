@@ -99,6 +99,11 @@ class PlantWires:
         """Publish what the actuators are doing from this time on."""
         self._state.publish(self._write_state.write(command, time_ns))
 
+    def expect_no_answers(self) -> None:
+        """Time no command any more that answers what was sent so far: the plant does not listen now."""
+        with self.lock:
+            self._sent_ns.clear()
+
     def flush(self) -> None:
         """Wait, not for ever, until every subscriber has the last states."""
         self._state.wait_for_all_acked(FLUSH)
