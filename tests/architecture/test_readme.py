@@ -7,6 +7,7 @@ import shlex
 
 import pytest
 import typer.main
+
 from fulmar_bringup.cli import app
 from fulmar_core.topics import WIRES
 
@@ -44,7 +45,9 @@ def test_every_inline_command_names_a_real_subcommand(readme):
 
 
 def test_every_make_target_in_the_readme_exists(readme, repository):
-    targets = set(re.findall(r"^([a-z-]+):", (repository / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    targets = set(
+        re.findall(r"^([a-z-]+):", (repository / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    )
     assert set(re.findall(r"make ([a-z-]+)", readme)) <= targets | {"a"}
 
 
@@ -57,7 +60,10 @@ def test_every_file_the_readme_links_to_exists_and_is_small(readme, repository):
 
 def test_the_readme_lists_every_wire_as_the_code_defines_it(readme):
     for wire in WIRES:
-        assert f"| `{wire.name}` | {wire.type.replace('/msg/', '/')} | {wire.source} | {wire.content} |" in readme
+        assert (
+            f"| `{wire.name}` | {wire.type.replace('/msg/', '/')} | {wire.source} | {wire.content} |"
+            in readme
+        )
 
 
 def test_every_folder_the_readme_names_exists(readme, repository):

@@ -1,0 +1,125 @@
+"""A hand-made neighbour for one node under test: it publishes by hand, and keeps what it hears."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.state import planar_pose, planar_state
+from fulmar_core.topics import (
+    ACTUATORS_STATE,
+    COMMAND,
+    DIAGNOSTICS,
+    GOAL_POSE,
+    ODOMETRY,
+)
+from fulmar_ros.convert import OdometryWriter, VectorWriter, goal_message
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+
+NAMESPACE = "/floating_platform"
+
+
+class Neighbour:
+    """Another node: publishes by hand, and keeps what it hears."""
+
+    def __init__(self) -> None:
+        self.node = Node("neighbour", namespace=NAMESPACE)
+        self.robot = load_robot("floating_platform")
+        self.applied: list[np.ndarray] = []
+        self.commands: list[np.ndarray] = []
+        self.said: dict[str, tuple[str, dict[str, str]]] = {}
+        listen, many = self.node.create_subscription, {"reliable": True, "depth": 50}
+        listen(
+            JointState,
+            ACTUATORS_STATE.name,
+            self._applied,
+            subscriber_qos(ACTUATORS_STATE, **many),
+        )
+        listen(JointState, COMMAND.name, self._commanded, subscriber_qos(COMMAND, **many))
+        listen(
+            DiagnosticArray,
+            DIAGNOSTICS.name,
+            self._hear,
+            subscriber_qos(DIAGNOSTICS, **many),
+        )
+        self._command = self.node.create_publisher(JointState, COMMAND.name, publisher_qos(COMMAND))
+        self._odometry = self.node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+        self.goal_publisher = self.node.create_publisher(
+            PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE)
+        )
+
+    def _applied(self, message: JointState) -> None:
+        self.applied.append(np.array(message.effort))
+
+    def _commanded(self, message: JointState) -> None:
+        self.commands.append(np.array(message.effort))
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.said[status.name.split(": ")[1]] = (
+                status.message,
+                {pair.key: pair.value for pair in status.values},
+            )
+
+    def command(self, values: list[float], names: list[str] | None = None) -> None:
+        """Send one command."""
+        self._command.publish(VectorWriter(names or self.robot.actuators.names).write(np.array(values), 0))
+
+    def give_goal(self) -> None:
+        """Ask for a pose far away, so that valves open."""
+        self.goal_publisher.publish(goal_message(planar_pose(4.0, 0.0, 0.0), "goal_pose", 1))
+
+    def odometry(
+        self, stamp_ns: int, spoil: Callable[[Odometry], None] = lambda _message: None, x: float = 0.0
+    ) -> None:
+        """Send one measurement, spoilt if asked."""
+        message = OdometryWriter(self.robot.sensors.odometry).write(planar_state(x, 0.0, 0.0), stamp_ns)
+        spoil(message)
+        self._odometry.publish(message)
+
+
+def until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
+    """Wait for something."""
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.01)
+
+
+def open_valves(robot: Robot) -> list[float]:
+    return [1.0] + [0.0] * (len(robot.actuators.names) - 1)
+
+
+class Stream:
+    """Odometry at 50 Hz from a thread, until told otherwise."""
+
+    def __init__(self, neighbour: Neighbour) -> None:
+        self.neighbour, self.spoil, self.step_ns, self.moving = (
+            neighbour,
+            lambda _message: None,
+            20_000_000,
+            True,
+        )
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        stamp, count = 1_000_000_000, 0
+        while not self._stop.wait(0.02):
+            stamp, count = stamp + self.step_ns, count + int(self.moving)
+            self.neighbour.odometry(stamp, self.spoil, x=1e-6 * count)
+
+    def stop(self) -> None:
+        """Fall silent."""
+        self._stop.set()
+        self._thread.join()

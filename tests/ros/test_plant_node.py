@@ -1,0 +1,101 @@
+"""The plant node against a hand-made neighbour: refuses what it must, and says so."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from fulmar_core.backend import Sample
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.runtime import spinning
+from sim_nodes.mock_backend import MockBackend
+from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
+
+
+def test_a_command_opens_valves_and_silence_closes_them_within_the_timeout(
+    neighbour: Neighbour, plant: PlantNode
+) -> None:
+    """The watchdog of 0.4 s at 5 Hz, seen from outside."""
+    until(lambda: neighbour.command(open_valves(neighbour.robot)) or neighbour.applied[-1].any())
+    silent_since = time.monotonic()
+    until(lambda: not neighbour.applied[-1].any())
+    assert 0.3 < time.monotonic() - silent_since < 0.6
+    until(lambda: "no command for" in neighbour.said["plant"][0])
+
+
+@pytest.mark.parametrize(
+    ("values", "names", "reason"),
+    [
+        ([float("nan")] + [1.0] * 7, None, "not finite"),
+        ([1.0] * 7, [f"thruster_{i}" for i in range(1, 8)], "names 7 actuators"),
+        ([1.0] * 8, [f"thruster_{i}" for i in (2, 1, 3, 4, 5, 6, 7, 8)], "'thruster_2' as actuator 1"),
+    ],
+)
+def test_a_senseless_command_is_refused_and_named(
+    values: list[float], names: list[str] | None, reason: str, neighbour: Neighbour, plant: PlantNode
+) -> None:
+    """The valves stay closed, and the diagnostics say why."""
+    until(lambda: neighbour.command(values, names) or reason in neighbour.said.get("plant", ("",))[0])
+    assert not any(applied.any() for applied in neighbour.applied)
+
+
+def test_a_stale_command_does_not_survive_a_deactivation(neighbour: Neighbour, plant: PlantNode) -> None:
+    """Deactivate with an open valve, activate again at once: the plant begins with closed valves."""
+    until(lambda: neighbour.command(open_valves(neighbour.robot)) or neighbour.applied[-1].any())
+    assert plant.trigger_deactivate() == plant.trigger_activate()
+    until(lambda: not neighbour.applied[-1].any())
+    before = len(neighbour.applied)
+    until(lambda: len(neighbour.applied) > before + 10)
+    assert not any(applied.any() for applied in neighbour.applied[before:])
+    assert plant.guard.watchdog.trips == 0
+
+
+def test_shutdown_from_active_stops_the_loop_and_closes_the_valves(
+    neighbour: Neighbour, plant: PlantNode
+) -> None:
+    """A finalized plant moves nothing any more."""
+    until(lambda: neighbour.command(open_valves(neighbour.robot)) or neighbour.applied[-1].any())
+    plant.trigger_shutdown()
+    until(lambda: not neighbour.applied[-1].any())
+    time.sleep(0.2)
+    count = len(neighbour.applied)
+    time.sleep(0.2)
+    assert len(neighbour.applied) == count
+
+
+def test_a_backend_that_raises_ends_the_process_with_closed_valves(neighbour: Neighbour) -> None:
+    """Even if it raises again when it shall be made safe."""
+
+    class Broken(MockBackend):
+        def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+            raise OSError("the bus is gone")
+
+        def make_safe(self) -> None:
+            raise OSError("still gone")
+
+    codes: list[int] = []
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    node = PlantNode(lambda robot, _settings: Broken(robot), codes.append, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: codes == [1])
+        until(lambda: "the bus is gone" in neighbour.said.get("plant", ("",))[0])
+
+
+def test_a_backend_that_hangs_is_reported_and_its_watchdog_counts(neighbour: Neighbour) -> None:
+    """A step that does not come back cannot hide behind an old status."""
+    release = threading.Event()
+
+    class Hanging(MockBackend):
+        def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+            release.wait()
+            return super().step(command, ticks)
+
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    node = PlantNode(lambda robot, _settings: Hanging(robot), lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: "it hangs" in neighbour.said.get("plant", ("",))[0])
+        release.set()
+        node.stop()
