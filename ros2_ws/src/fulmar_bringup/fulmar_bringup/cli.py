@@ -21,8 +21,8 @@ from fulmar_bringup.commands.train import train
 from fulmar_bringup.console import console
 from fulmar_bringup.extras import advice_for
 from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
+from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
 
-DONE, FAILED, BAD_USAGE = 0, 1, 2
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 
 app = typer.Typer(

@@ -15,6 +15,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
+from fulmar_core.exit_codes import FAILED
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.command_gate import Rejections, command_problem
@@ -28,7 +29,7 @@ from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
-from fulmar_ros.runtime import FAILED, RequestExit, settle_memory
+from fulmar_ros.runtime import RequestExit, settle_memory
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE

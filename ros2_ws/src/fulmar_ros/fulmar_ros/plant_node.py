@@ -12,6 +12,7 @@ from fulmar_core.backend import Backend, Sample
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
 from fulmar_core.episode import WORLD, Episode, episode_rng
 from fulmar_core.errors import FulmarError
+from fulmar_core.exit_codes import FAILED
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
@@ -22,7 +23,7 @@ from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.realtime_loop import RealtimeLoop
-from fulmar_ros.runtime import FAILED, RequestExit, settle_memory
+from fulmar_ros.runtime import RequestExit, settle_memory
 from fulmar_ros.simulated_time import SimulatedTime
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]

@@ -14,12 +14,13 @@ from typing import Any
 from rclpy.node import Node
 
 from fulmar_core.errors import BagError, ConfigError
+from fulmar_core.exit_codes import DONE, FAILED
 from fulmar_core.topics import WIRES, Wire
 from fulmar_ros.bag_thread import BagThread
 from fulmar_ros.bag_writer import BagWriter
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import subscriber_qos
-from fulmar_ros.runtime import DONE, FAILED, RequestExit, run_node
+from fulmar_ros.runtime import RequestExit, run_node
 
 # Messages of one topic that may wait for a callback; a lock-stepped run is far faster than real time.
 DEPTH = 5000

@@ -26,8 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from fulmar_core.errors import FulmarError
-
-DONE, FAILED, BAD_USAGE = 0, 1, 2
+from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
 
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
