@@ -55,6 +55,8 @@ def main() -> None:
         raise KeyboardInterrupt(*told)
 
     signal.signal(signal.SIGTERM, on_terminate)
+    # A shell starts its background jobs with Ctrl-C ignored, and so would everything that we start.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         code = app(prog_name="fulmar", standalone_mode=False)
     except (ConfigError, BundleError, BagError) as error:

@@ -26,7 +26,7 @@ from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
-from fulmar_ros.deadline import Deadlines, Spread
+from fulmar_ros.deadline import Deadlines, Spread, take_priority
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -223,6 +223,7 @@ class ControllerNode(LifecycleNode):
             self._control(measurement)
 
     def _run(self) -> None:
+        take_priority()
         deadlines = self._deadlines
         while deadlines.wait(self._stop):
             self._control(self._newest)
