@@ -79,7 +79,8 @@ def _table(summaries: list[dict[str, Any]]) -> Table:
         "trips",
     )
     for column in columns:
-        table.add_column(column, justify="left" if column in ("controller", "goal") else "right")
+        left = column in ("controller", "goal")
+        table.add_column(column, justify="left" if left else "right", no_wrap=left)
     for s in summaries:
         table.add_row(
             str(s["controller"]),
