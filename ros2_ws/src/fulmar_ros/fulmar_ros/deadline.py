@@ -13,7 +13,7 @@ KEPT = 20_000  # newest samples that percentiles are taken over
 
 NS = 1_000_000_000
 LONG_NS = NS // 2
-EARLY_NS = 1_500_000  # stay awake for the last of the wait
+EARLY_NS = 300_000  # stay awake for the last of the wait; longer would keep callbacks from the interpreter
 PRIORITY = 10  # above every ordinary thread, below the kernel's own
 
 
@@ -98,7 +98,7 @@ class Deadlines:
         if ahead > EARLY_NS and not stop.is_set():
             time.sleep((ahead - EARLY_NS) / NS)  # wakes more punctually than waiting for an event
         while time.monotonic_ns() < self._next_ns and not stop.is_set():
-            time.sleep(0.0)  # a sleeper wakes late by up to a millisecond; who only lets others pass does not
+            time.sleep(0.0)  # a sleeper wakes late; who only lets others pass does not
         if stop.is_set():
             return False
         now = time.monotonic_ns()

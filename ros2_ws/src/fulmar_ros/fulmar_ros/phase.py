@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 LISTEN = 25  # measurements; the least delayed of them tells the phase
-MARGIN_NS = 2_000_000  # what an ordinary measurement may be later than the least delayed one
+MARGIN_NS = 3_000_000  # what an ordinary measurement may be later than the least delayed one
 
 
 class ArrivalPhase:
