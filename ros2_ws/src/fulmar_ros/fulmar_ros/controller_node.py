@@ -211,6 +211,8 @@ class ControllerNode(LifecycleNode):
             changes: dict[str, object] = {"input_problem": problem}
             if not problem:
                 now = time.monotonic_ns()
+                if self._newest is None and not self.settings.lockstep:
+                    take_priority()  # for the executor's thread too: it shares the interpreter with the control loop
                 anchor = self._phase.anchor_ns(measurement.stamp_ns, now)
                 if anchor is not None:
                     self._deadlines.align(anchor)
