@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 
 import pytest
 
-from fulmar_ros.deadline import Deadlines, Spread
+from fulmar_ros.deadline import CONTROL_PRIORITY, PLANT_PRIORITY, Deadlines, Spread, take_priority
 
 
 class FakeClock:
@@ -74,3 +75,21 @@ def test_a_set_stop_ends_the_beat(clock):
 
 def test_a_spread_without_samples_says_nothing():
     assert Spread().percentiles("x") == {"x_p50": "", "x_p99": "", "x_max": ""}
+
+
+def test_the_plant_interrupts_a_controller_that_spins_and_never_the_other_way_round():
+    assert PLANT_PRIORITY > CONTROL_PRIORITY
+
+
+def test_only_the_calling_thread_takes_priority():
+    found = {}
+
+    def look() -> None:
+        if take_priority(CONTROL_PRIORITY):
+            found["own"] = (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    thread.join()
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
+    assert found.get("own", (os.SCHED_FIFO, CONTROL_PRIORITY)) == (os.SCHED_FIFO, CONTROL_PRIORITY)

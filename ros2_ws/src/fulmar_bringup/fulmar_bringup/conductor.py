@@ -25,9 +25,9 @@ from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.paths import config_path
 from fulmar_core.state import planar_pose
 from fulmar_core.tasks import load_task
+from fulmar_core.topics import SIMULATION_START_NS
 
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
-GOAL_STAMP_NS = 1_000_000_000  # the simulated time at which every run begins
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
 LOCKSTEP_SILENT_S = 10.0  # in lock step both are busy, and a plant itself waits 5 s for an answer
@@ -123,7 +123,7 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
     try:
         x, y, heading = request.goal
         goal = planar_pose(np.asarray(x), np.asarray(y), np.deg2rad(heading))
-        overseer.give_goal(goal, time_ns=GOAL_STAMP_NS, alive=starting)
+        overseer.give_goal(goal, time_ns=SIMULATION_START_NS, alive=starting)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)
@@ -142,7 +142,9 @@ def _wait_for_end(
 
     def running() -> None:
         _raise_if_ended(group)
-        moved(max(0.0, float(overseer.plant.values.get("sim_time_s", 0.0) or 0.0) - GOAL_STAMP_NS / 1e9))
+        moved(
+            max(0.0, float(overseer.plant.values.get("sim_time_s", 0.0) or 0.0) - SIMULATION_START_NS / 1e9)
+        )
         if overseer.plant.level == "error":
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":

@@ -27,7 +27,7 @@ from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
+from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.metrics import Trajectories, TrajectoryLog, join, select
 from fulmar_core.robot import load_robot
@@ -181,7 +181,7 @@ def _episodes(
 ) -> Trajectories:
     robot, task, scenario = load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario)
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
-    steps = round(task.episode_s / control_dt)
+    steps = episode_steps(task, control_dt)
     runs: list[Trajectories] = []
 
     began = time.monotonic()

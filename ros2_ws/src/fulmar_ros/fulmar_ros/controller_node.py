@@ -26,7 +26,7 @@ from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
-from fulmar_ros.deadline import Deadlines, Spread, take_priority
+from fulmar_ros.deadline import CONTROL_PRIORITY, Deadlines, Spread, take_priority
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -211,11 +211,8 @@ class ControllerNode(LifecycleNode):
             changes: dict[str, object] = {"input_problem": problem}
             if not problem:
                 now = time.monotonic_ns()
-                if self._newest is None and not self.settings.lockstep:
-                    take_priority()  # for the executor's thread too: it shares the interpreter with the control loop
-                anchor = self._phase.anchor_ns(measurement.stamp_ns, now)
-                if anchor is not None:
-                    self._deadlines.align(anchor)
+                if not self.settings.lockstep:
+                    self._follow(measurement, now)
                 self._newest = measurement
                 changes["last_input_ns"] = now
                 if self._goal is not None:
@@ -224,8 +221,17 @@ class ControllerNode(LifecycleNode):
         if self.settings.lockstep:
             self._control(measurement)
 
+    def _follow(self, measurement: Measurement, now_ns: int) -> None:
+        """Let the beat follow the arrivals, in real time."""
+        if self._newest is None:
+            # The executor's thread, which this is, shares the interpreter with the control loop.
+            take_priority(CONTROL_PRIORITY)
+        anchor = self._phase.anchor_ns(measurement.stamp_ns, now_ns)
+        if anchor is not None:
+            self._deadlines.align(anchor)
+
     def _run(self) -> None:
-        take_priority()
+        take_priority(CONTROL_PRIORITY)
         deadlines = self._deadlines
         while deadlines.wait(self._stop):
             self._control(self._newest)

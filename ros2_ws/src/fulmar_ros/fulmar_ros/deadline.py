@@ -14,7 +14,9 @@ KEPT = 20_000  # newest samples that percentiles are taken over
 NS = 1_000_000_000
 LONG_NS = NS // 2
 EARLY_NS = 300_000  # stay awake for the last of the wait; longer would keep callbacks from the interpreter
-PRIORITY = 10  # above every ordinary thread, below the kernel's own
+# Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
+# other, and a controller that spins for ever must not keep the watchdog from closing the valves.
+CONTROL_PRIORITY, PLANT_PRIORITY = 10, 20
 
 
 class Spread:
@@ -41,14 +43,17 @@ class Spread:
         }
 
 
-def take_priority() -> bool:
+def take_priority(priority: int) -> bool:
     """Put the calling thread before every ordinary one (SCHED_FIFO), where this process may.
+
+    Args:
+        priority: Among such threads, 1 to 99; the higher interrupts the lower.
 
     Returns:
         Whether it could; without the right to it the thread keeps its place and is late when others are busy.
     """
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except (PermissionError, AttributeError):
         return False
     return True

@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_ros.deadline import Deadlines, take_priority
+from fulmar_ros.deadline import PLANT_PRIORITY, Deadlines, take_priority
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.simulated_time import SimulatedTime
 
@@ -44,7 +44,7 @@ class RealtimeLoop:
             ticks: How many; None for no end.
             stop: Set by another thread.
         """
-        take_priority()
+        take_priority(PLANT_PRIORITY)
         self._ticked_ns = time.monotonic_ns()
         self._wires.publish_sample(sample, self._clock.now_ns)
         while (ticks is None or self.ticks < ticks) and self.deadlines.wait(stop):

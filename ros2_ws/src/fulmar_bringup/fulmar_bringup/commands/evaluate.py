@@ -22,6 +22,7 @@ from fulmar_bringup.commands.arguments import (
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
+from fulmar_core.episode import JUDGE_SEED
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.metrics import Trajectories
 
@@ -42,7 +43,7 @@ def evaluate(
         ),
     ] = "mujoco",
     episodes: Annotated[int, typer.Option(metavar="N", min=1, help="Number of episodes.")] = 256,
-    seed: SeedOption = 2026,
+    seed: SeedOption = JUDGE_SEED,
     scenario: ScenarioOption = "nominal",
     control_hz: Annotated[
         float | None, typer.Option(metavar="HZ", min=0.01, help="Command rate; the robot's own by default.")
