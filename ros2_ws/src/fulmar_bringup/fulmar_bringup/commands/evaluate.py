@@ -22,7 +22,7 @@ from fulmar_bringup.commands.arguments import (
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.episode import JUDGE_SEED, episode_steps
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.metrics import Trajectories
 
@@ -91,7 +91,7 @@ def evaluate(
         lockstep=True,
     )
     began = time.monotonic()
-    with step_bar("judging", episodes * round(the_task.episode_s * hz)) as progress:
+    with step_bar("judging", episodes * episode_steps(the_task, 1.0 / hz)) as progress:
         run = _roll_out(plan, through, episodes, jobs or _cores(), progress)
     wall_s = time.monotonic() - began
     figures = {
