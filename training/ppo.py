@@ -9,6 +9,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
+from training.fast_ppo import FastPPO
 from training.settings import PpoSettings
 
 
@@ -51,7 +52,7 @@ class KlFeedback(BaseCallback):
 
 
 def build_ppo(
-    settings: PpoSettings, env: VecEnv, *, seed: int, tensorboard: str | None = None
+    settings: PpoSettings, env: VecEnv, *, seed: int, tensorboard: str | None = None, fast: bool = True
 ) -> tuple[PPO, KlFeedback]:
     """PPO over an environment.
 
@@ -60,13 +61,14 @@ def build_ppo(
         env: Environment, usually normalised.
         seed: Seed of weights and action sampling.
         tensorboard: Folder for TensorBoard, or None.
+        fast: Use our faster PPO, instead of Stable-Baselines3's own.
 
     Returns:
         The learner, and the callback it must learn with.
     """
     rate = KlAdaptiveRate(settings)
     net_arch: dict[str, Any] = {"pi": list(settings.hidden), "vf": list(settings.hidden)}
-    learner = PPO(
+    learner = (FastPPO if fast else PPO)(
         "MlpPolicy",
         env,
         learning_rate=rate,
