@@ -14,14 +14,14 @@ from fulmar_core.episode import episode_steps
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.planar import planar_error
 
 
 class BatchVecEnv(VecEnv):
     """Worlds that learn together; each begins again by itself when its episode is over.
 
-    An episode ends when the robot leaves the geofence (terminated) or its time is up (truncated: the value of
-    the last state still counts). First episodes have random lengths, so that resets spread out over time.
+    Actions are on/off for valves that know only these, else shares of full command in [-1, 1]. An episode ends when
+    the robot leaves the geofence or touches an obstacle (terminated), or its time is up (truncated: the value of the
+    last state still counts). First episodes have random lengths, so that resets spread out over time.
     """
 
     def __init__(
@@ -34,6 +34,7 @@ class BatchVecEnv(VecEnv):
         seed: int,
         reward_scale: float = 1.0,
         training: bool = True,
+        strength: float = 1.0,
     ) -> None:
         """Build the worlds.
 
@@ -45,19 +46,32 @@ class BatchVecEnv(VecEnv):
             seed: Seed of every draw.
             reward_scale: Factor on the rewards.
             training: Start episodes where learning starts.
+            strength: How much of the scenario counts, from 0 to 1; may be moved later by `set_strength` [-].
         """
         self._robot, self._task, self._reward_scale = robot, task, reward_scale
-        self._new_simulation = lambda seed: BatchSimulation(
-            robot, task, scenario, worlds=worlds, seed=seed, training=training
+        self._new_simulation = lambda seed, strength: BatchSimulation(
+            robot, task, scenario, worlds=worlds, seed=seed, training=training, strength=strength
         )
-        self.simulation = self._new_simulation(seed)
         self._seed = seed
+        self.simulation = self._new_simulation(seed, strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
-        observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(task.observation_names),), np.float32)
-        action_space = gymnasium.spaces.MultiBinary(len(robot.actuators.names))
+        self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
+        count = len(robot.actuators.names)
+        observation_space = gymnasium.spaces.Box(
+            -np.inf, np.inf, (len(self.simulation.observer.names),), np.float32
+        )
+        action_space: gymnasium.Space[Any] = (
+            gymnasium.spaces.MultiBinary(count)
+            if robot.actuators.binary
+            else gymnasium.spaces.Box(-1.0, 1.0, (count,), np.float32)
+        )
         super().__init__(worlds, observation_space, action_space)
         self._age = np.zeros(worlds, dtype=int)
-        self._actions = np.zeros((worlds, len(robot.actuators.names)), dtype=np.float32)
+        self._actions = np.zeros((worlds, count), dtype=np.float32)
+
+    def set_strength(self, strength: float) -> None:
+        """How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-]."""
+        self.simulation.strength = strength
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed of the next `reset`."""
@@ -66,12 +80,12 @@ class BatchVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """Begin anew in every world; returns the observations, shape (worlds, n)."""
-        self.simulation = self._new_simulation(self._seed)
+        self.simulation = self._new_simulation(self._seed, self.simulation.strength)
         self._age = np.random.Generator(np.random.Philox(self._seed)).integers(
             0, self._horizon, self.num_envs
         )
         self.reset_infos = [{} for _ in range(self.num_envs)]
-        return self._observe()
+        return np.asarray(self.simulation.observe())
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
@@ -80,31 +94,44 @@ class BatchVecEnv(VecEnv):
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Move one control step; returns observations, rewards, dones and infos."""
         simulation = self.simulation
-        before = simulation.truth
-        simulation.step(self._actions)
-        reward = self._task.reward(before, simulation.truth, simulation.goal, self._actions)
+        before, goal, previous = simulation.truth, simulation.goal, simulation.command
+        simulation.step(self._actions * self._scale)
+        after = simulation.truth
+        reward = self._task.reward(before, after, goal) - self._cost(previous)
         self._age += 1
-        lost = planar_error(simulation.truth, simulation.goal).position > self._robot.limits.geofence
-        timed_out = (self._age >= self._horizon) & ~lost
-        done = lost | timed_out
+        errors = self._task.errors(after, simulation.goal)
+        ended_early = np.zeros(self.num_envs, dtype=bool)
+        if errors.position is not None:
+            ended_early = errors.position > self._robot.limits.geofence
+        touching = self._task.collides(after, goal, self._robot)
+        if touching is not None:
+            reward = reward - self._task.collision_cost * touching  # type: ignore[union-attr]
+            ended_early = ended_early | touching
+        timed_out = (self._age >= self._horizon) & ~ended_early
+        done = ended_early | timed_out
+        observations = np.asarray(simulation.observe())
         # One shared dictionary where nothing ended: a thousand empty ones a step would cost more than the physics.
         infos: list[dict[str, Any]] = [_NOTHING_TO_SAY] * self.num_envs
         ended = np.flatnonzero(done)
         if ended.size:
-            last = self._observe()
             for world in ended:
                 infos[world] = {
-                    "terminal_observation": last[world],
+                    "terminal_observation": observations[world],
                     "TimeLimit.truncated": bool(timed_out[world]),
                 }
             simulation.reset(ended)
             self._age[ended] = 0
-        return self._observe(), np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
+            observations = np.asarray(simulation.observe())
+        return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
 
-    def _observe(self) -> np.ndarray:
-        return np.asarray(
-            self._task.observe(self.simulation.measured, self.simulation.goal), dtype=np.float32
-        )
+    def _cost(self, previous: np.ndarray) -> np.ndarray:
+        """What using the actuators costs, shape (worlds,)."""
+        costs = self._robot.costs
+        share = self.simulation.command / self._scale
+        cost = costs.effort * np.sum(np.abs(share), axis=1)
+        if costs.change:
+            cost = cost + costs.change * np.sum(np.square(share - previous / self._scale), axis=1)
+        return np.asarray(cost)
 
     def close(self) -> None:
         """Nothing to release."""

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fulmar_core.disturbances.scenario import World
+from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
@@ -30,12 +30,12 @@ class Backend(Protocol):
 
     robot: Robot
 
-    def reset(self, start: RigidBodyState, world: World, *, seed: int, number: int = 0) -> Sample:
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Begin anew.
 
         Args:
-            start: Where to begin; real robots begin where they are.
-            world: Body and wrench of the episode; real robots have their own.
+            episode: Where to begin, in which world, and what stands about, without a batch axis; real robots begin
+                where they are, in the world that they have.
             seed: Seed of the sensor noise.
             number: Number of the episode.
 

@@ -9,10 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.disturbances.scenario import Scenario, World, draw_world
+from fulmar_core.counter_rng import START, WORLD, Draws
+from fulmar_core.disturbances.scenario import Scenario, draw_world
+from fulmar_core.disturbances.world import World
 from fulmar_core.errors import ConfigError
+from fulmar_core.goal import Goal
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from fulmar_core.state import Pose, RigidBodyState
 from fulmar_core.tasks import Task
 
 JUDGE_SEED = 2026  # of episodes that finished controllers are judged on
@@ -22,14 +25,15 @@ JUDGING_SEEDS = (JUDGE_SEED, HELD_OUT_SEED)  # no training seeds: no run shall h
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """Where one episode starts, where it shall go, and in which world."""
+    """Where an episode starts, what it is about, and in which world; or many episodes at once."""
 
-    start: RigidBodyState
-    goal: Pose
+    start: PlanarState
+    goal: Goal
     world: World
 
-
-START, NOISE, WORLD = 0, 1, 2  # streams of random numbers that do not disturb one another
+    def __getitem__(self, index: int) -> Episode:
+        """One episode out of many."""
+        return Episode(self.start[index], self.goal[index], self.world[index])
 
 
 def episode_steps(task: Task, control_dt: float) -> int:
@@ -54,45 +58,39 @@ def episode_steps(task: Task, control_dt: float) -> int:
     return steps
 
 
-def episode_rng(seed: int, number: int, *, repeat: int = 0, stream: int = START) -> np.random.Generator:
-    """Counter-based generator of one episode.
-
-    Args:
-        seed: Seed of the run, >= 0.
-        number: Number of the episode, or of the world it runs in, >= 0.
-        repeat: How many episodes that world has had before, >= 0.
-        stream: START for start and goal, WORLD for body and wrench, NOISE for the sensors during the steps.
-
-    Returns:
-        A generator that no other (seed, number, repeat, stream) shares.
-    """
-    return np.random.Generator(np.random.Philox(key=[seed, number], counter=[0, 0, stream, repeat]))
-
-
-def draw_episode(
+def draw_episodes(
     robot: Robot,
     task: Task,
     scenario: Scenario,
     *,
     seed: int,
-    number: int,
-    repeat: int = 0,
+    numbers: np.ndarray,
+    repeats: np.ndarray | None = None,
     training: bool = False,
+    strength: float = 1.0,
 ) -> Episode:
-    """Draw one episode.
+    """Draw episodes.
 
     Args:
         robot: The robot.
-        task: Says where episodes start.
+        task: Says where episodes start and what they are about.
         scenario: Says what may differ.
         seed: Seed of the run, >= 0.
-        number: Number of the episode, or of the world it runs in, >= 0.
-        repeat: How many episodes that world has had before, >= 0.
+        numbers: Numbers of the episodes, or of the worlds they run in, shape (n,), >= 0.
+        repeats: How many episodes each of these worlds has had before, shape (n,); none by default.
         training: Start where learning starts instead of where judging does.
+        strength: How much of the scenario counts, from 0 to 1 [-].
 
     Returns:
-        The episode.
+        As many episodes.
     """
-    start, goal = task.start.draw(episode_rng(seed, number, repeat=repeat), training=training)
-    world = draw_world(robot, scenario, episode_rng(seed, number, repeat=repeat, stream=WORLD))
+    numbers = np.asarray(numbers)
+    repeats = np.zeros_like(numbers) if repeats is None else repeats
+    start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)
+    world = draw_world(robot, scenario, Draws(seed, numbers, repeats, WORLD), strength=strength)
     return Episode(start, goal, world)
+
+
+def draw_episode(robot: Robot, task: Task, scenario: Scenario, *, seed: int, number: int) -> Episode:
+    """Draw one episode, without a batch axis; arguments as in `draw_episodes`."""
+    return draw_episodes(robot, task, scenario, seed=seed, numbers=np.array([number]))[0]

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.config import load_config
+from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
 from fulmar_core.sensors.imu import ImuSpec
-from fulmar_core.sensors.odometry import OdometrySpec
+from fulmar_core.sensors.odometer import OdometrySpec
 
+Actuators = Thrusters | Propellers | DifferentialDrive | Ackermann
+Rolling = DifferentialDrive | Ackermann  # families whose wheels do not slip sideways
 Range = tuple[float, float]
 Vector3 = tuple[float, float, float]
 
@@ -21,9 +27,10 @@ class Body:
 
     mass: float  # [kg]
     inertia: Vector3  # principal moments about the body axes [kg·m²]
-    radius: float  # outline seen from above [m]
+    radius: float  # of the circle around the outline seen from above; what must not touch anything [m]
     height: float  # [m]
     planar: bool  # True: only x, y and yaw move
+    footprint: tuple[float, float] | None = None  # length and width of a box; None: a disc of `radius` [m]
 
     def __post_init__(self) -> None:
         """Refuse bodies that cannot exist."""
@@ -41,13 +48,49 @@ class Uncertainty:
 
     mass: Range  # [kg]
     yaw_inertia: Range  # [kg·m²]
+    center_of_mass: float = 0.0  # how far from the body's origin, in any direction [m]
+    drag: Range = (1.0, 1.0)  # factor on the damping of the water [-]
 
     def __post_init__(self) -> None:
         """Refuse spans that are empty or not positive."""
-        for name in ("mass", "yaw_inertia"):
+        for name in ("mass", "yaw_inertia", "drag"):
             low, high = getattr(self, name)
             if not 0.0 < low <= high:
                 raise ValueError(f"'{name}' must be [low, high] with 0 < low <= high, found [{low}, {high}].")
+        if self.center_of_mass < 0.0:
+            raise ValueError("'center_of_mass' must not be negative.")
+
+
+@dataclass(frozen=True)
+class Performance:
+    """What the machine can do at its best; tasks, scenarios and scores scale with it."""
+
+    force: float  # push in its strongest direction [N]
+    torque: float  # largest yaw moment [N·m]
+    top_speed: float  # the fastest it goes in a straight line [m/s]
+    speed: float  # ahead, that tasks ask for [m/s]
+    reverse_speed: float  # astern, that tasks ask for [m/s]
+    lateral_speed: float  # to either side, that tasks ask for; 0: it cannot [m/s]
+    yaw_rate: float  # that tasks ask for [rad/s]
+    turning_acceleration: float  # speed times turn rate that it can sustain [m/s²]
+
+    def __post_init__(self) -> None:
+        """Refuse machines that cannot move."""
+        needed = (self.force, self.torque, self.top_speed, self.speed, self.yaw_rate, self.turning_acceleration)
+        if min(needed) <= 0.0:
+            raise ValueError(
+                "force, torque, top_speed, speed, yaw_rate and turning_acceleration must be greater than 0."
+            )
+        if min(self.reverse_speed, self.lateral_speed) < 0.0:
+            raise ValueError("reverse_speed and lateral_speed must not be negative.")
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What using the actuators costs a learner, in the units of the tasks' rewards, per control step."""
+
+    effort: float  # times the sum of the shares of full command
+    change: float  # times the sum of their squared changes
 
 
 @dataclass(frozen=True)
@@ -116,9 +159,17 @@ class Robot:
     body: Body
     uncertainty: Uncertainty
     timing: Timing
-    actuators: Thrusters
+    actuators: Actuators
+    performance: Performance
+    costs: Costs
     sensors: Sensors
     limits: Limits
+    hydrodynamics: Hydrodynamics | None = None  # of a hull that swims
+
+    def __post_init__(self) -> None:
+        """Refuse wheels that swim."""
+        if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
+            raise ValueError("'hydrodynamics' and wheels exclude one another.")
 
 
 def load_robot(name: str) -> Robot:

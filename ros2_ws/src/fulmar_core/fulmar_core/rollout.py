@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 
+import numpy as np
+
 from fulmar_core.backend import Backend
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import draw_episode, episode_steps
-from fulmar_core.metrics import Trajectories, TrajectoryLog, join
+from fulmar_core.episode import draw_episodes, episode_steps
+from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join
+from fulmar_core.observation import Observer, slewed
+from fulmar_core.planar import planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.state import stack_poses, stack_states
 from fulmar_core.tasks import Task
 
 SIDE_BY_SIDE = 256  # simulators alive at once
@@ -51,11 +54,11 @@ def roll_out_in_batch(
         robot, task, scenario, worlds=episodes, seed=seed, control_hz=controller.control_hz
     )
     controller.reset()
-    log = TrajectoryLog(simulation.control_dt)
+    log = TrajectoryLog(robot, task, simulation.control_dt)
+    judge = Judge(task, simulation.goal, simulation.control_dt)
     for step in range(episode_steps(task, simulation.control_dt)):
-        command = robot.actuators.limited(controller.act(task.observe(simulation.measured, simulation.goal)))
-        simulation.step(command)
-        log.add(simulation.truth, simulation.goal, command)
+        simulation.step(np.asarray(controller.act(simulation.observe())))
+        log.add(simulation.truth, judge.see(simulation.truth), simulation.command)
         progress((step + 1) * episodes)
     return log.trajectories()
 
@@ -116,22 +119,23 @@ def _side_by_side(
     robot = backends[0].robot
     substeps = robot.timing.substeps(controller.control_hz)
     control_dt = substeps * robot.timing.physics_dt
-    episodes = [draw_episode(robot, task, scenario, seed=seed, number=number) for number in numbers]
-    backends = backends[: len(episodes)]
+    drawn = draw_episodes(robot, task, scenario, seed=seed, numbers=np.asarray(numbers))
     samples = [
-        backend.reset(episode.start, episode.world, seed=seed, number=number)
-        for backend, episode, number in zip(backends, episodes, numbers, strict=True)
+        backend.reset(drawn[i], seed=seed, number=number)
+        for i, (backend, number) in enumerate(zip(backends, numbers, strict=False))
     ]
-    goal = stack_poses([episode.goal for episode in episodes])
+    count = len(samples)
+    observer = Observer(robot, task)
     controller.reset()
-    log = TrajectoryLog(control_dt)
+    goal, command = drawn.goal, np.tile(robot.actuators.safe_command, (count, 1))
+    log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, drawn.goal, control_dt)
     for step in range(episode_steps(task, control_dt)):
-        measured = stack_states([sample.odometry for sample in samples])
-        commands = robot.actuators.limited(controller.act(task.observe(measured, goal)))
-        samples = [
-            backend.step(command, substeps) for backend, command in zip(backends, commands, strict=True)
-        ]
-        truths = [sample.truth for sample in samples if sample.truth is not None]
-        log.add(stack_states(truths), goal, commands)
-        progress((step + 1) * len(episodes))
+        measured = stack_planar([planar_of(sample.odometry) for sample in samples])
+        goal = task.advance(goal, measured, np.asarray(step * control_dt)) if step else goal
+        action = np.asarray(controller.act(observer(measured, goal, command)))
+        command = slewed(robot.actuators.limited(action), command, robot, control_dt)
+        samples = [backend.step(each, substeps) for backend, each in zip(backends, command, strict=False)]
+        truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])
+        log.add(truth, judge.see(truth), command)
+        progress((step + 1) * count)
     return log.trajectories()

@@ -6,24 +6,33 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from array_api_compat import array_namespace, is_numpy_namespace
 
+from fulmar_core.counter_rng import uniform_from, words, world_keys
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.dynamics.rigid_body import Disturbance, MassProperties, step
-from fulmar_core.episode import NOISE, Episode, draw_episode, episode_rng
+from fulmar_core.disturbances.world import FIELDS, World
+from fulmar_core.episode import Episode, draw_episodes
+from fulmar_core.goal import Goal
+from fulmar_core.motion import actuation_of, control_step, may_be_late, may_be_off_centre
+from fulmar_core.observation import Observer, slewed
+from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.sensors.odometry import measure_odometry
-from fulmar_core.state import Pose, RigidBodyState, planar_pose, planar_state
+from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.tasks import Task
+
+ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
 
 class BatchSimulation:
     """Worlds that step together; each is reset by itself.
 
     Attributes:
-        truth: True state, leading shape (worlds,).
+        truth: True state, shapes (worlds,).
         measured: What the odometry reports of it.
         goal: Goal of each world.
+        command: What was last commanded, after every limit, shape (worlds, n).
+        strength: How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-].
     """
 
     def __init__(
@@ -36,7 +45,10 @@ class BatchSimulation:
         seed: int,
         control_hz: float | None = None,
         training: bool = False,
-        dtype: Any = np.float32,
+        strength: float = 1.0,
+        xp: Any = np,
+        device: Any = None,
+        dtype: Any = None,
     ) -> None:
         """Build the worlds and reset them all.
 
@@ -48,26 +60,42 @@ class BatchSimulation:
             seed: World w draws its episodes from (seed, w).
             control_hz: Command rate; the robot's own by default [Hz].
             training: Start episodes where learning starts.
-            dtype: NumPy floating type of every array.
+            strength: How much of the scenario counts [-].
+            xp: Array library: NumPy, or torch.
+            device: Where its arrays live, for torch.
+            dtype: Floating type; the library's float32 by default.
         """
         self.robot, self.task, self.scenario, self.seed = robot, task, scenario, seed
-        self.worlds, self.training, self.dtype = worlds, training, dtype
+        self.worlds, self.training, self.strength = worlds, training, strength
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
-        self._repeats = np.zeros(worlds, dtype=int)
-        self._noise_rng = episode_rng(seed, 0, stream=NOISE)
-        zeros = np.zeros(worlds)
-        self.truth: RigidBodyState = planar_state(zeros, zeros, zeros).astype(dtype)
-        self.goal: Pose = planar_pose(zeros, zeros, zeros).astype(dtype)
-        self._body = MassProperties(np.ones((worlds, 1), dtype=dtype), np.ones((worlds, 3), dtype=dtype))
-        self._disturbance = Disturbance(
-            np.zeros((worlds, 3), dtype=dtype), np.zeros((worlds, 3), dtype=dtype)
+        self.observer = Observer(robot, task)
+        self._xp, self._device, self._dtype = xp, device, dtype or xp.float32
+        self._numbers = self._whole(np.arange(worlds))
+        self._repeats = self._whole(np.zeros(worlds))
+        self._steps = self._whole(np.zeros(worlds))
+        self._delayed, self._off_centre = may_be_late(robot, scenario), may_be_off_centre(robot, scenario)
+        self._noisy = scenario.actuation.noise > 0.0
+        self._odometer = Odometer(
+            robot.sensors.odometry,
+            seed=seed,
+            period=self.control_dt,
+            max_delay_s=scenario.sensing.delay_s,
+            noisy=scenario.sensor_noise,
         )
-        self.reset(range(worlds))
+        safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
+        self._safe = self._real(safe)
+        self._actuation = actuation_of(robot, self._safe)
+        self.command: Array = self._safe.T
+        self._begin(self._draw(np.arange(worlds), np.zeros(worlds, dtype=int)))
 
     @property
     def control_dt(self) -> float:
         """Time of one control step [s]."""
         return self.substeps * self.robot.timing.physics_dt
+
+    def observe(self) -> Array:
+        """What controllers see now, shape (worlds, n)."""
+        return self.observer(self.measured, self.goal, self.command)
 
     def reset(self, worlds: Sequence[int] | np.ndarray | range) -> None:
         """Begin a new episode in some worlds.
@@ -75,50 +103,88 @@ class BatchSimulation:
         Args:
             worlds: Numbers of the worlds.
         """
-        for world in worlds:
-            episode = draw_episode(
-                self.robot,
-                self.task,
-                self.scenario,
-                seed=self.seed,
-                number=int(world),
-                repeat=int(self._repeats[world]),
-                training=self.training,
-            )
-            self._repeats[world] += 1
-            self._place(int(world), episode)
-        self._measure()
-
-    def _place(self, world: int, episode: Episode) -> None:
-        self.truth.write(world, episode.start)
-        self.goal.write(world, episode.goal)
-        self._body.mass[world] = episode.world.mass
-        self._body.inertia[world] = episode.world.inertia
-        self._disturbance.force_in_world[world] = episode.world.force_in_world
-        self._disturbance.torque_in_world[world] = episode.world.torque_in_world
+        which = np.asarray(worlds, dtype=int)
+        if which.size == 0:
+            return
+        index = self._whole(which)
+        self._repeats[index] = self._repeats[index] + 1
+        repeats = np.asarray(self._repeats[index].tolist()) if self._on_torch else self._repeats[which]
+        drawn = self._draw(which, repeats)
+        self._steps[index] = 0
+        for name in COLUMNS:
+            getattr(self.truth, name)[index] = self._real(getattr(drawn.start, name))
+        for name in Goal.__slots__:
+            getattr(self.goal, name)[index] = self._real(getattr(drawn.goal, name))
+        for name in FIELDS:
+            getattr(self.world, name)[..., index] = self._real(getattr(drawn.world, name))
+        self._actuation.reset(index, self._safe[:, :1])
+        self.command = self._xp.asarray(self.command, copy=True)
+        self.command[index] = self._safe[:, 0]
+        self._measure(index)
 
     def step(self, command: Array) -> None:
         """Apply one command for one control step.
 
         Args:
-            command: Within the actuators' limits, shape (worlds, n).
+            command: Anything finite, shape (worlds, n); limits and slew are applied here.
         """
-        force, torque = self.robot.actuators.wrench_in_body(np.asarray(command, dtype=self.dtype))
-        self.truth = step(
+        xp = self._xp
+        wanted = self.robot.actuators.limited(self._real(command))
+        self.command = slewed(wanted, self.command, self.robot, self.control_dt)
+        noise = None
+        if self._noisy:
+            keys = world_keys(self.seed, self._numbers, self._repeats, ACTUATOR_NOISE)
+            bits = words(keys, self._steps, self.command.shape[1])
+            noise = 2.0 * uniform_from(bits, self._dtype) - 1.0
+        self._actuation.begin(xp.asarray(self.command.T, copy=True), self.world, noise)
+        time_s = xp.astype(self._steps, self._dtype) * self.control_dt
+        self.truth = control_step(
+            self.robot,
             self.truth,
-            force,
-            torque,
-            body=self._body,
-            disturbance=self._disturbance,
-            planar=self.robot.body.planar,
-            dt=self.robot.timing.physics_dt,
+            self._actuation,
+            self.world,
+            time_s=time_s,
             substeps=self.substeps,
+            delayed=self._delayed,
+            off_centre=self._off_centre,
         )
-        self._measure()
+        self._steps = self._steps + 1
+        self.goal = self.task.advance(self.goal, self.truth, time_s + self.control_dt)
+        self._measure(None)
 
-    def _measure(self) -> None:
-        self.measured = (
-            measure_odometry(self.truth, self.robot.sensors.odometry, self._noise_rng)
-            if self.scenario.sensor_noise
-            else self.truth
+    def _draw(self, numbers: np.ndarray, repeats: np.ndarray) -> Episode:
+        return draw_episodes(
+            self.robot,
+            self.task,
+            self.scenario,
+            seed=self.seed,
+            numbers=numbers,
+            repeats=repeats,
+            training=self.training,
+            strength=self.strength,
         )
+
+    def _begin(self, drawn: Episode) -> None:
+        self.truth = PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS))
+        self.goal = Goal(*(self._real(getattr(drawn.goal, name)) for name in Goal.__slots__))
+        self.world = World(*(self._real(getattr(drawn.world, name)) for name in FIELDS))
+        self._measure(None)
+
+    def _measure(self, restarted: Array | None) -> None:
+        """Measure every world; where only some restarted, the others keep what they had."""
+        self.measured = self._odometer.measure(
+            self.truth, self.world, self._numbers, self._repeats, self._steps, only=restarted
+        )
+
+    @property
+    def _on_torch(self) -> bool:
+        return not is_numpy_namespace(self._xp)
+
+    def _real(self, values: Array) -> Array:
+        """A copy of its own, in the simulation's floating type, where its arrays live."""
+        kwargs = {} if self._device is None else {"device": self._device}
+        return self._xp.asarray(values, dtype=self._dtype, copy=True, **kwargs)
+
+    def _whole(self, values: np.ndarray) -> Array:
+        kwargs = {} if self._device is None else {"device": self._device}
+        return self._xp.asarray(np.asarray(values, dtype=np.int64), **kwargs)

@@ -1,4 +1,4 @@
-"""On/off gas thrusters fed by one pressure line."""
+"""Gas thrusters fed by one pressure line: on/off valves, or valves that open by degrees."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from array_api_compat import array_namespace, device
 
+from fulmar_core.actuators.response import Response
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
@@ -30,16 +31,19 @@ class Nozzle:
 
 @dataclass(frozen=True)
 class Thrusters:
-    """A bank of valves; a command is 1 (open) or 0 (closed) for each.
+    """A bank of valves; a command is 0 (closed) to 1 (open) for each, and nothing between for on/off valves.
 
     With a shared pressure line, n open valves give 1/n of the full thrust each (thesis §3.5.1;
-    RANS `tasks/MFP2D_Virtual.py`), so opening more valves redirects the thrust but never adds to it.
+    RANS `tasks/MFP2D_Virtual.py`), so opening more valves redirects the thrust but never adds to it. Valves that
+    open by degrees share alike: once their openings add up to more than 1, each gives its part of the full thrust.
     """
 
     kind: Literal["thrusters"]
     thrust: float  # of one valve that is open alone [N]
     shared_pressure: bool
     nozzles: tuple[Nozzle, ...]
+    continuous: bool = False  # valves open by degrees
+    response: Response = Response()
 
     def __post_init__(self) -> None:
         """Refuse banks without thrust or with two valves of one name."""
@@ -47,6 +51,18 @@ class Thrusters:
             raise ValueError("'thrust' must be greater than 0.")
         if not self.nozzles or len(set(self.names)) != len(self.nozzles):
             raise ValueError("'nozzles' must not be empty, and each needs a name of its own.")
+        if self.response.slew and len(self.response.slew) != len(self.nozzles):
+            raise ValueError(f"'slew' needs {len(self.nozzles)} values, one for each nozzle.")
+
+    @property
+    def binary(self) -> bool:
+        """Whether valves know only open and closed."""
+        return not self.continuous
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Largest command of each, shape (n,) [-]."""
+        return np.ones(len(self.nozzles))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -70,12 +86,14 @@ class Thrusters:
         """Nearest command that the hardware can carry out.
 
         Args:
-            command: Finite values, shape (..., n); anything above one half opens a valve.
+            command: Finite values, shape (..., n); anything above one half opens an on/off valve.
 
         Returns:
-            Zeros and ones, shape (..., n).
+            Zeros and ones, or what lies between for valves that open by degrees, shape (..., n).
         """
         xp = array_namespace(command)
+        if self.continuous:
+            return xp.clip(command, 0.0, 1.0)
         return xp.astype(command > 0.5, command.dtype)
 
     def thrusts(self, command: Array) -> Array:
@@ -106,3 +124,23 @@ class Thrusters:
         matrix = xp.asarray(self.wrench_per_newton, dtype=command.dtype, device=device(command))
         wrench = self.thrusts(command) @ matrix
         return wrench[..., 0:3], wrench[..., 3:6]
+
+    def planar_wrench(self, applied: Array, gain: Array) -> tuple[Array, Array, Array]:
+        """Force and moment in the body's plane.
+
+        Args:
+            applied: How far each valve is open, shape (n, ...).
+            gain: Factor on each thrust, same shape.
+
+        Returns:
+            Force ahead [N], to the left [N], and yaw moment [N·m], shapes (...,).
+        """
+        xp = array_namespace(applied)
+        thrust = applied * gain * self.thrust
+        if self.shared_pressure:
+            thrust = thrust / xp.clip(xp.sum(applied, axis=0), 1.0, None)
+        matrix = xp.asarray(
+            self.wrench_per_newton[:, (0, 1, 5)].T.copy(), dtype=applied.dtype, device=device(applied)
+        )
+        wrench = matrix @ thrust
+        return wrench[0], wrench[1], wrench[2]

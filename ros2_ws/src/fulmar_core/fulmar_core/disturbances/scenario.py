@@ -1,4 +1,4 @@
-"""A named set of disturbances, as read from `configs/scenarios/<name>.yaml`."""
+"""A named set of disturbances, as read from `configs/scenarios/<name>.yaml`, and the worlds drawn from it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,75 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
+from array_api_compat import array_namespace
 
 from fulmar_core.config import load_config
+from fulmar_core.counter_rng import Draws
+from fulmar_core.disturbances.world import World
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force and a torque, as shares of what the robot itself can bring up (`performance` of its YAML)."""
+
+    force: float = 0.0  # largest [-]
+    torque: float = 0.0  # largest, of either sign [-]
+    least: float = 0.0  # smallest, as a share of the largest [-]
+
+    def __post_init__(self) -> None:
+        """Refuse negative magnitudes."""
+        if min(self.force, self.torque) < 0.0 or not 0.0 <= self.least <= 1.0:
+            raise ValueError("force and torque must not be negative, and 'least' must lie in [0, 1].")
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A push that is sinusoidal in the place: an uneven floor (RANS `cfg/task/disturbances`)."""
+
+    force: float = 0.0  # largest amplitude, share of the robot's own [-]
+    torque: float = 0.0  # same [-]
+    wave_number: Range = (0.25, 3.0)  # [rad/m]
+
+
+@dataclass(frozen=True)
+class Kick:
+    """A push for one control step, again and again (RoboRAN `domain_randomization`)."""
+
+    force: float = 0.0  # largest, share of the robot's own [-]
+    every_s: Range = (4.0, 6.0)  # [s]
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What may be wrong with the actuators."""
+
+    noise: float = 0.0  # largest relative error at each control step, uniform [-]
+    gain: Range = (1.0, 1.0)  # each actuator's own factor, for a whole episode [-]
+    delay_s: float = 0.0  # largest delay of commands [s]
+    failures: int = 0  # most actuators that stay closed or still for a whole episode
+    failure_chance: float = 0.0  # of each of these [-]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if min(self.noise, self.delay_s, self.failures, self.gain[0], self.failure_chance) < 0.0:
+            raise ValueError("noise, delay, gain and failures must not be negative.")
+        if self.gain[0] > self.gain[1] or self.failure_chance > 1.0:
+            raise ValueError("'gain' must be [low, high] with low <= high, 'failure_chance' at most 1.")
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """What may be wrong with the sensors, beyond what the robot's YAML says of them."""
+
+    noise: float = 1.0  # factor on the robot's own noise [-]
+    bias: float = 1.0  # factor on the robot's own biases [-]
+    delay_s: float = 0.0  # largest delay beyond the robot's own [s]
+    dropout: float = 0.0  # largest chance that a measurement is lost [-]
 
 
 @dataclass(frozen=True)
@@ -18,25 +82,13 @@ class Scenario:
     """How far an episode may differ from the nominal robot in a still world."""
 
     title: str
-    sensor_noise: bool
-    body: Literal["nominal", "uncertain"]  # uncertain: mass and yaw inertia over the robot's whole span
-    max_force: float  # of a constant force in a random direction [N]
-    max_torque: float  # of a constant torque of random sign [N·m]
-
-    def __post_init__(self) -> None:
-        """Refuse negative magnitudes."""
-        if min(self.max_force, self.max_torque) < 0.0:
-            raise ValueError("max_force and max_torque must not be negative.")
-
-
-@dataclass(frozen=True, slots=True)
-class World:
-    """One draw of a scenario: the body and the wrench of one episode."""
-
-    mass: float  # [kg]
-    inertia: tuple[float, float, float]  # [kg·m²]
-    force_in_world: tuple[float, float, float]  # [N]
-    torque_in_world: tuple[float, float, float]  # [N·m]
+    sensor_noise: bool  # whether sensors are as the robot's YAML says, or perfect
+    body: Literal["nominal", "uncertain"]  # uncertain: over the whole spans of the robot's `uncertainty`
+    push: Push = Push()
+    wave: Wave = Wave()
+    kick: Kick = Kick()
+    actuation: Actuation = Actuation()
+    sensing: Sensing = Sensing()
 
 
 def load_scenario(name: str) -> Scenario:
@@ -48,33 +100,92 @@ def load_scenario(name: str) -> Scenario:
     return load_config(Scenario, config_path("scenarios", name))
 
 
-def draw_world(robot: Robot, scenario: Scenario, rng: np.random.Generator) -> World:
-    """Draw the world of one episode.
+def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: float = 1.0) -> World:
+    """Draw the worlds of some episodes.
+
+    The same numbers are drawn whatever the scenario, so that episodes of one seed differ between scenarios in nothing
+    but what these say.
 
     Args:
         robot: Its body and the spans it is uncertain over.
         scenario: What may differ.
-        rng: Generator of this episode; five numbers are drawn whatever the scenario, so that episodes of
-            one seed begin alike in every scenario.
+        draws: One row for each episode.
+        strength: How much of the scenario counts, from 0 (nominal) to 1; what a curriculum moves [-].
 
     Returns:
-        The world.
+        Worlds of as many episodes as `draws` has.
     """
-    mass_share, inertia_share, force_share, torque_share = rng.uniform(0.0, 1.0, 4)
-    direction = rng.uniform(-math.pi, math.pi)
-    ixx, iyy, izz = robot.body.inertia
-    mass = robot.body.mass
-    if scenario.body == "uncertain":
-        mass = _between(robot.uncertainty.mass, mass_share)
-        izz = _between(robot.uncertainty.yaw_inertia, inertia_share)
-    force = scenario.max_force * force_share
+    count = len(robot.actuators.names)
+    uncertain = strength if scenario.body == "uncertain" else 0.0
+    spans = robot.uncertainty
+    mass = _around(robot.body.mass, spans.mass, uncertain, draws)
+    izz = _around(robot.body.inertia[2], spans.yaw_inertia, uncertain, draws)
+    drag = _around(1.0, spans.drag, uncertain, draws)
+    bearing = draws.uniform(-math.pi, math.pi)
+    offset = uncertain * draws.uniform(0.0, spans.center_of_mass)
+    xp = array_namespace(mass)
+    force, torque = robot.performance.force, robot.performance.torque
+    push, wave, kick = scenario.push, scenario.wave, scenario.kick
+    size = strength * force * push.force * draws.uniform(push.least, 1.0)
+    direction = draws.uniform(-math.pi, math.pi)
+    share = draws.uniform(-1.0, 1.0)
+    twist = xp.sign(share) * (push.least + (1.0 - push.least) * xp.abs(share))
+    wave_size = draws.uniform(0.0, 1.0)
+    wave_number = draws.uniform(*wave.wave_number)
+    phases = draws.uniform(-math.pi, math.pi, 2)
+    kick_size, kick_period = draws.uniform(0.0, 1.0), draws.uniform(*kick.every_s)
+    kick_direction = draws.uniform(-math.pi, math.pi)
+    faults, sensing = scenario.actuation, scenario.sensing
+    gain_share, lottery = draws.uniform(0.0, 1.0, count), draws.uniform(0.0, 1.0, count)
+    chances = draws.uniform(0.0, 1.0, count)
+    delay, noise = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
+    bias, scale = draws.normal(1.0, 6), draws.normal(1.0, 6)
+    sensor_delay, dropout = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
+    low, high = faults.gain
+    gain = 1.0 + strength * (low + (high - low) * gain_share - 1.0)
+    measured = strength if scenario.sensor_noise else 0.0
+    zero = xp.zeros_like(mass)
     return World(
-        mass,
-        (ixx, iyy, izz),
-        (force * math.cos(direction), force * math.sin(direction), 0.0),
-        (0.0, 0.0, scenario.max_torque * (2.0 * torque_share - 1.0)),
+        mass=mass,
+        yaw_inertia=izz,
+        com_x=offset * xp.cos(bearing),
+        com_y=offset * xp.sin(bearing),
+        drag=drag,
+        gain=gain.T,
+        alive=_survivors(lottery, chances, faults, strength),
+        action_noise=zero + strength * faults.noise * noise,
+        action_delay=strength * faults.delay_s * delay,
+        force_x=size * xp.cos(direction),
+        force_y=size * xp.sin(direction),
+        torque=strength * torque * push.torque * twist,
+        wave_force=strength * force * wave.force * wave_size,
+        wave_torque=strength * torque * wave.torque * wave_size,
+        wave_number=wave_number,
+        wave_phase_x=phases[:, 0],
+        wave_phase_y=phases[:, 1],
+        kick=strength * force * kick.force * kick_size,
+        kick_period=kick_period,
+        kick_direction=kick_direction,
+        noise=zero + (sensing.noise if scenario.sensor_noise else 0.0),
+        sensor_bias=(measured * sensing.bias * bias).T,
+        sensor_scale=(measured * sensing.bias * scale).T,
+        sensor_delay=strength * sensing.delay_s * sensor_delay,
+        dropout=strength * sensing.dropout * dropout,
     )
 
 
-def _between(span: tuple[float, float], share: float) -> float:
-    return span[0] + share * (span[1] - span[0])
+def _around(nominal: float, span: Range, strength: float, draws: Draws) -> Array:
+    """Between the ends of a span; with less strength, nearer to the nominal value."""
+    drawn = draws.uniform(span[0], span[1])
+    return nominal + strength * (drawn - nominal)
+
+
+def _survivors(lottery: Array, chances: Array, faults: Actuation, strength: float) -> Array:
+    """1 for actuators that work, 0 for those that failed, shape (n, worlds).
+
+    The actuators with the smallest lots are the candidates, each fails with its own chance.
+    """
+    xp = array_namespace(lottery)
+    ranks = xp.argsort(xp.argsort(lottery, axis=1), axis=1)
+    fails = (ranks < faults.failures) & (chances < strength * faults.failure_chance)
+    return 1.0 - xp.astype(fails, lottery.dtype).T

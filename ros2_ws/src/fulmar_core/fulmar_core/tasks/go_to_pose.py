@@ -7,19 +7,24 @@ from typing import ClassVar, Literal
 
 from array_api_compat import array_namespace
 
+from fulmar_core.counter_rng import Draws
+from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.state import Pose, RigidBodyState
-from fulmar_core.tasks.planar import (
+from fulmar_core.tasks.terms import (
     FINE_TERMS,
     HEADING_TERMS,
     MOTION_TERMS,
     POSITION_TERMS,
+    Errors,
     Start,
     Tolerance,
     fine_terms,
-    goal_and_motion_in_body,
+    goal_terms,
     heading_terms,
-    planar_error,
+    motion_terms,
+    pose_errors,
 )
 
 
@@ -34,7 +39,6 @@ class PoseReward:
     facing: float  # times (1 + cos e) / 2: no plateau at a quarter turn
     approach: float  # times metres come nearer
     turn: float  # times radians come nearer
-    open_valve: float  # cost of each actuator in use
 
 
 @dataclass(frozen=True)
@@ -58,36 +62,27 @@ class GoToPose:
         *FINE_TERMS,
     )
 
-    def observe(self, state: RigidBodyState, goal: Pose) -> Array:
-        """What every controller of this task sees, in training and on the robot.
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+        """Draw starts and goals; see `TaskProtocol.draw`."""
+        start, target = self.start.draw(draws, training=training)
+        zero = array_namespace(target).zeros_like(start.x)
+        return start, Goal(target[:, None, :], zero, no_obstacles(draws.worlds), target[:, :2] * 0.0)
 
-        Args:
-            state: Measured state.
-            goal: Goal pose.
+    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        x, y = goal_terms(state, goal.current)
+        fine = fine_terms(x, y, saturation=self.fine_distance)
+        return (x, y, *heading_terms(state, goal.current), *motion_terms(state), *fine)
 
-        Returns:
-            Terms in the order of `observation_names`, shape (..., 10).
-        """
-        xp = array_namespace(state.position_in_world)
-        offset, motion = goal_and_motion_in_body(state, goal)
-        fine = fine_terms(offset, saturation=self.fine_distance)
-        return xp.concat((offset, heading_terms(state, goal), motion, fine), axis=-1)
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The goal stays."""
+        return goal
 
-    def reward(self, before: RigidBodyState, after: RigidBodyState, goal: Pose, command: Array) -> Array:
-        """Reward of one control step.
-
-        Args:
-            before: True state at its start.
-            after: True state at its end.
-            goal: Goal pose.
-            command: Applied command, shape (..., n).
-
-        Returns:
-            Reward, shape (...,).
-        """
-        xp = array_namespace(command)
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+        """Reward of one control step; see `TaskProtocol.reward`."""
+        old, new = self.errors(before, goal), self.errors(after, goal)
+        xp = array_namespace(after.x)
         w = self.reward_weights
-        old, new = planar_error(before, goal), planar_error(after, goal)
         d, e = new.position, xp.abs(new.heading)
         return (
             w.position * xp.exp(-d / 0.25)
@@ -97,5 +92,12 @@ class GoToPose:
             + w.facing * 0.5 * (1.0 + xp.cos(e))
             + w.approach * (old.position - d)
             + w.turn * (xp.abs(old.heading) - e)
-            - w.open_valve * xp.sum(xp.abs(command), axis=-1)
         )
+
+    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+        """Distance from the goal, and heading error."""
+        return pose_errors(state, goal.current, heading=True)
+
+    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+        """Nothing stands about."""
+        return None

@@ -7,17 +7,22 @@ from typing import ClassVar, Literal
 
 from array_api_compat import array_namespace
 
+from fulmar_core.counter_rng import Draws
+from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.state import Pose, RigidBodyState
-from fulmar_core.tasks.planar import (
+from fulmar_core.tasks.terms import (
     FINE_TERMS,
     MOTION_TERMS,
     POSITION_TERMS,
+    Errors,
     Start,
     Tolerance,
     fine_terms,
-    goal_and_motion_in_body,
-    planar_error,
+    goal_terms,
+    motion_terms,
+    pose_errors,
 )
 
 
@@ -30,7 +35,17 @@ class PositionReward:
     near: float  # times exp(-d / 0.1 m): asks for centimetres
     approach: float  # times metres come nearer
     spin: float  # cost of the turn rate [per rad/s]
-    open_valve: float  # cost of each actuator in use
+
+    def of(self, old: Array, d: Array, after: PlanarState) -> Array:
+        """Reward of having come from a distance to another [m], shape (...,)."""
+        xp = array_namespace(d)
+        return (
+            self.position * xp.exp(-d / 0.25)
+            + self.far * xp.exp(-d / 2.0)
+            + self.near * xp.exp(-d / 0.1)
+            + self.approach * (old - d)
+            - self.spin * xp.abs(after.yaw_rate)
+        )
 
 
 @dataclass(frozen=True)
@@ -49,30 +64,30 @@ class GoToPosition:
     goal_topic: ClassVar[str] = "goal_point"
     observation_names: ClassVar[tuple[str, ...]] = (*POSITION_TERMS, *MOTION_TERMS, *FINE_TERMS)
 
-    def observe(self, state: RigidBodyState, goal: Pose) -> Array:
-        """What every controller of this task sees, in training and on the robot.
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+        """Draw starts and goals; see `TaskProtocol.draw`."""
+        start, target = self.start.draw(draws, training=training)
+        zero = array_namespace(target).zeros_like(start.x)
+        return start, Goal(target[:, None, :], zero, no_obstacles(draws.worlds), target[:, :2] * 0.0)
 
-        Args:
-            state: Measured state.
-            goal: Goal; its heading does not matter.
+    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        x, y = goal_terms(state, goal.current)
+        return (x, y, *motion_terms(state), *fine_terms(x, y, saturation=self.fine_distance))
 
-        Returns:
-            Terms in the order of `observation_names`, shape (..., 8).
-        """
-        xp = array_namespace(state.position_in_world)
-        offset, motion = goal_and_motion_in_body(state, goal)
-        return xp.concat((offset, motion, fine_terms(offset, saturation=self.fine_distance)), axis=-1)
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The goal stays."""
+        return goal
 
-    def reward(self, before: RigidBodyState, after: RigidBodyState, goal: Pose, command: Array) -> Array:
-        """Reward of one control step; arguments and shape as in `GoToPose.reward`."""
-        xp = array_namespace(command)
-        w = self.reward_weights
-        old, d = planar_error(before, goal).position, planar_error(after, goal).position
-        return (
-            w.position * xp.exp(-d / 0.25)
-            + w.far * xp.exp(-d / 2.0)
-            + w.near * xp.exp(-d / 0.1)
-            + w.approach * (old - d)
-            - w.spin * xp.abs(after.angular_velocity_in_body[..., 2])
-            - w.open_valve * xp.sum(xp.abs(command), axis=-1)
-        )
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+        """Reward of one control step; see `TaskProtocol.reward`."""
+        old, new = self.errors(before, goal).position, self.errors(after, goal).position
+        return self.reward_weights.of(old, new, after)
+
+    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+        """Distance from the goal."""
+        return pose_errors(state, goal.current, heading=False)
+
+    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+        """Nothing stands about."""
+        return None

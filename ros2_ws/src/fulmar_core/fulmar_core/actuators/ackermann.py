@@ -1,0 +1,66 @@
+"""Steered front wheels and driven wheels, as cars have them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from array_api_compat import array_namespace, device
+
+from fulmar_core.actuators.response import Response
+from fulmar_core.rotation import Array
+
+
+@dataclass(frozen=True)
+class Ackermann:
+    """A command is (speed ahead [m/s], steering angle of the middle front wheel [rad]), left positive.
+
+    The body's origin is above the middle of the rear axle.
+    """
+
+    kind: Literal["ackermann"]
+    wheel_radius: float  # [m]
+    track: float  # between left and right wheels [m]
+    wheelbase: float  # between the axles [m]
+    max_speed: float  # ahead and astern [m/s]
+    max_steering: float  # [rad], below a quarter turn
+    wheel_force: float  # the most that all wheels push together [N]
+    friction: float  # of the tyres on the floor [-]
+    response: Response = Response()
+
+    def __post_init__(self) -> None:
+        """Refuse cars that cannot exist."""
+        positive = (
+            self.wheel_radius, self.track, self.wheelbase, self.max_speed,
+            self.max_steering, self.wheel_force, self.friction,
+        )  # fmt: skip
+        if min(positive) <= 0.0 or self.max_steering >= 0.5 * np.pi:
+            raise ValueError(
+                "sizes, speed, force and friction must be greater than 0, and the steering below 1.57 rad."
+            )
+        if self.response.slew and len(self.response.slew) != 2:
+            raise ValueError("'slew' needs two values: of the speed and of the steering angle.")
+
+    binary = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of a command's entries."""
+        return "speed", "steering_angle"
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Largest command [m/s, rad]."""
+        return np.array([self.max_speed, self.max_steering])
+
+    @property
+    def safe_command(self) -> np.ndarray:
+        """Standing still with the wheels straight."""
+        return np.zeros(2)
+
+    def limited(self, command: Array) -> Array:
+        """Nearest command that the car can carry out, shape (..., 2)."""
+        xp = array_namespace(command)
+        most = xp.asarray(self.scale, dtype=command.dtype, device=device(command))
+        return xp.clip(command, -most, most)

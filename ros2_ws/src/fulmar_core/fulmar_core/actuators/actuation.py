@@ -1,0 +1,87 @@
+"""Between a command and what the actuators do: failures, noise, delay, slew and lag, the same in every simulator."""
+
+from __future__ import annotations
+
+from array_api_compat import array_namespace, device
+
+from fulmar_core.actuators.response import Response
+from fulmar_core.disturbances.world import World
+from fulmar_core.rotation import Array
+
+
+class ActuationState:
+    """What the actuators of a batch of worlds do now; actuators first, worlds last."""
+
+    def __init__(self, response: Response, *, binary: bool, safe: Array) -> None:
+        """Begin in the safe state.
+
+        Args:
+            response: Delay, slew and lag.
+            binary: On/off actuators: errors act on what they do, not on the command.
+            safe: Safe command of every world, shape (n, worlds), of the floating type to compute in.
+        """
+        self._response, self._binary = response, binary
+        self._before, self._wanted, self.applied = safe, safe, safe
+        self.gain = array_namespace(safe).ones_like(safe)
+        self._since_s = 0.0
+        self._late: Array | None = None
+        self._slew: Array | None = None
+        if response.slew:
+            xp = array_namespace(safe)
+            self._slew = xp.asarray(response.slew, dtype=safe.dtype, device=device(safe))[:, None]
+
+    def reset(self, which: Array, safe: Array) -> None:
+        """Bring some worlds back to the safe state.
+
+        Args:
+            which: Their numbers.
+            safe: Safe command, shape (n, 1).
+        """
+        for name in ("_before", "_wanted", "applied"):
+            values = array_namespace(safe).asarray(getattr(self, name), copy=True)
+            values[:, which] = safe
+            setattr(self, name, values)
+
+    def begin(self, command: Array, world: World, noise: Array | None) -> None:
+        """Take a new command.
+
+        Args:
+            command: Within the actuators' limits, shape (n, worlds).
+            world: Failures, gains, noise and delays.
+            noise: Numbers in [-1, 1], shape (n, worlds); None for none.
+        """
+        self._before = self._wanted
+        self.gain = world.gain
+        if noise is None:
+            self._wanted = command * world.alive
+        elif self._binary:
+            self._wanted = command * world.alive
+            self.gain = world.gain * (1.0 + world.action_noise * noise)
+        else:
+            self._wanted = (command + world.action_noise * noise) * world.alive
+        self._since_s = 0.0
+        self._late = self._response.delay_s + world.action_delay
+
+    def advance(self, dt: float, *, delayed: bool) -> Array:
+        """Let time pass.
+
+        Args:
+            dt: For how long [s].
+            delayed: Whether any world has a delay; saves the work where none has.
+
+        Returns:
+            What each actuator does during that time, shape (n, worlds).
+        """
+        target = self._wanted
+        xp = array_namespace(target)
+        if delayed:
+            assert self._late is not None
+            target = xp.where(self._since_s + 0.5 * dt < self._late, self._before, target)
+            self._since_s += dt
+        if self._slew is not None:
+            most = self._slew * dt
+            target = self.applied + xp.clip(target - self.applied, -most, most)
+        if self._response.lag_s > 0.0 and self._slew is None:
+            target = self.applied + (target - self.applied) * min(1.0, dt / self._response.lag_s)
+        self.applied = target
+        return target

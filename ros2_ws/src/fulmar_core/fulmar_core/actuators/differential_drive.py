@@ -1,0 +1,80 @@
+"""Two driven wheels on one axle, commanded by speed and turn rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from array_api_compat import array_namespace, device
+
+from fulmar_core.actuators.response import Response
+from fulmar_core.rotation import Array
+
+
+@dataclass(frozen=True)
+class DifferentialDrive:
+    """A command is (speed ahead [m/s], turn rate [rad/s]), turning left counted positive (REP-103)."""
+
+    kind: Literal["differential_drive"]
+    wheel_radius: float  # [m]
+    track: float  # between the wheels' contact points [m]
+    max_speed: float  # of the body, ahead and astern [m/s]
+    max_yaw_rate: float  # [rad/s]
+    max_wheel_speed: float  # [rad/s]
+    wheel_force: float  # the most that one wheel pushes: motor or friction, whichever is less [N]
+    friction: float  # of the tyres on the floor [-]
+    caster_x: float  # where the casters are, ahead and behind the axle; negative: behind alone [m]
+    response: Response = Response()
+
+    def __post_init__(self) -> None:
+        """Refuse drives that cannot exist."""
+        positive = (
+            self.wheel_radius, self.track, self.max_speed, self.max_yaw_rate,
+            self.max_wheel_speed, self.wheel_force, self.friction,
+        )  # fmt: skip
+        if min(positive) <= 0.0:
+            raise ValueError("sizes, speeds, force and friction must be greater than 0.")
+        if self.response.slew and len(self.response.slew) != 2:
+            raise ValueError("'slew' needs two values: of the speed and of the turn rate.")
+
+    binary = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of a command's entries."""
+        return "speed", "turn_rate"
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Largest command [m/s, rad/s]."""
+        return np.array([self.max_speed, self.max_yaw_rate])
+
+    @property
+    def safe_command(self) -> np.ndarray:
+        """Standing still."""
+        return np.zeros(2)
+
+    def limited(self, command: Array) -> Array:
+        """Nearest command that the wheels can carry out, shape (..., 2).
+
+        Where the wheels cannot turn fast enough, speed and turn rate shrink alike, so that the path stays.
+        """
+        xp = array_namespace(command)
+        most = xp.asarray(self.scale, dtype=command.dtype, device=device(command))
+        within = xp.clip(command, -most, most)
+        outer = xp.abs(within[..., 0:1]) + 0.5 * self.track * xp.abs(within[..., 1:2])
+        return within / xp.clip(outer / (self.max_wheel_speed * self.wheel_radius), 1.0, None)
+
+    def wheel_speeds(self, command: Array) -> Array:
+        """Speeds of the left and the right wheel.
+
+        Args:
+            command: Shape (..., 2) [m/s, rad/s].
+
+        Returns:
+            Shape (..., 2) [rad/s].
+        """
+        xp = array_namespace(command)
+        speed, turn = command[..., 0], 0.5 * self.track * command[..., 1]
+        return xp.stack((speed - turn, speed + turn), axis=-1) / self.wheel_radius

@@ -1,0 +1,104 @@
+"""Fixed propellers with a thrust curve, as boats have them."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from array_api_compat import array_namespace, device
+
+from fulmar_core.actuators.response import Response
+from fulmar_core.rotation import Array
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Propeller:
+    """One propeller, in the body frame; it pushes along the body's x axis."""
+
+    name: str
+    position: Vector3  # where the force acts [m]
+
+
+@dataclass(frozen=True)
+class Propellers:
+    """A command is -1 (full astern) to 1 (full ahead) for each."""
+
+    kind: Literal["propellers"]
+    propellers: tuple[Propeller, ...]
+    curve: tuple[float, ...]  # thrust at evenly spaced commands from -1 to 1 [N]
+    response: Response = Response()
+
+    def __post_init__(self) -> None:
+        """Refuse propellers of one name, and curves that say nothing."""
+        if not self.propellers or len(set(self.names)) != len(self.propellers):
+            raise ValueError("'propellers' must not be empty, and each needs a name of its own.")
+        if len(self.curve) < 2 or list(self.curve) != sorted(self.curve):
+            raise ValueError("'curve' needs at least two thrusts, none less than the one before.")
+        if self.response.slew and len(self.response.slew) != len(self.propellers):
+            raise ValueError(f"'slew' needs {len(self.propellers)} values, one for each propeller.")
+
+    binary = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the propellers, in the order of every command vector."""
+        return tuple(propeller.name for propeller in self.propellers)
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Largest command of each, shape (n,) [-]."""
+        return np.ones(len(self.propellers))
+
+    @property
+    def safe_command(self) -> np.ndarray:
+        """All propellers stopped, shape (n,)."""
+        return np.zeros(len(self.propellers))
+
+    @functools.cached_property
+    def lever_arms(self) -> np.ndarray:
+        """Yaw moment of 1 N ahead at each propeller, shape (n,) [m]."""
+        return np.array([-propeller.position[1] for propeller in self.propellers])
+
+    def limited(self, command: Array) -> Array:
+        """Nearest command that the hardware can carry out, shape (..., n)."""
+        return array_namespace(command).clip(command, -1.0, 1.0)
+
+    def thrust(self, command: Array) -> Array:
+        """Thrust by linear interpolation of the curve.
+
+        Args:
+            command: Within [-1, 1], any shape.
+
+        Returns:
+            Same shape [N].
+        """
+        xp = array_namespace(command)
+        table = xp.asarray(self.curve, dtype=command.dtype, device=device(command))
+        last = len(self.curve) - 1
+        place = (xp.clip(command, -1.0, 1.0) + 1.0) * (0.5 * last)
+        below = xp.clip(xp.floor(place), 0.0, last - 1.0)
+        i = xp.astype(below, xp.int64)
+        low = xp.reshape(xp.take(table, xp.reshape(i, (-1,))), i.shape)
+        high = xp.reshape(xp.take(table, xp.reshape(i + 1, (-1,))), i.shape)
+        return low + (high - low) * (place - below)
+
+    def planar_wrench(self, applied: Array, gain: Array) -> tuple[Array, Array, Array]:
+        """Force and moment in the body's plane.
+
+        Args:
+            applied: What each propeller does, shape (n, ...).
+            gain: Factor on each thrust, same shape.
+
+        Returns:
+            Force ahead [N], to the left [N], and yaw moment [N·m], shapes (...,).
+        """
+        xp = array_namespace(applied)
+        thrust = self.thrust(applied) * gain
+        ahead = xp.sum(thrust, axis=0)
+        arms = self.lever_arms
+        moment = sum(float(arms[i]) * thrust[i] for i in range(len(arms)))
+        return ahead, xp.zeros_like(ahead), moment

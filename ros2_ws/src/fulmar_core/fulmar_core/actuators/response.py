@@ -1,0 +1,24 @@
+"""How fast actuators follow: the same three numbers for every family."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Response:
+    """From a command to what an actuator does; 0 or nothing switches a part off."""
+
+    delay_s: float = 0.0  # before anything happens, at most one control step [s]
+    slew: tuple[float, ...] = ()  # fastest change of each actuator, in its command's unit [per s]
+    lag_s: float = 0.0  # time constant of a first-order lag [s]
+
+    def __post_init__(self) -> None:
+        """Refuse times and rates without meaning."""
+        if min(self.delay_s, self.lag_s) < 0.0 or any(rate <= 0.0 for rate in self.slew):
+            raise ValueError("delay_s and lag_s must not be negative, and every slew must be greater than 0.")
+
+    @property
+    def remembers(self) -> bool:
+        """Whether what an actuator does depends on more than the newest command."""
+        return bool(self.slew) or self.lag_s > 0.0

@@ -1,0 +1,148 @@
+"""Random numbers by counter: every number is a function of what it is for, never of what was drawn before.
+
+World w of a batch depends on (seed, number of the world, how often it began anew, stream) alone, so it gets the same
+numbers among 64 worlds and among 4,096. Each number is a 32-bit hash of its counters; the mixing function is
+`lowbias32` of C. Wellons' hash-prospector (public domain, bias below 0.2 %). Not for cryptography.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from array_api_compat import array_namespace, device, is_numpy_array
+
+from fulmar_core.rotation import Array
+
+START, NOISE, WORLD = 0, 1, 2  # streams that do not disturb one another
+MASK = 0xFFFFFFFF
+GOLDEN = 0x9E3779B9  # 2³² / golden ratio: neighbouring counters become far apart
+OTHER = 0x85EBCA6B  # an odd number that shares nothing with it
+
+Keys = tuple[Array, Array]  # two words for each world, shapes (n,)
+
+
+def world_keys(seed: int, numbers: Array, repeats: Array, stream: int) -> Keys:
+    """What the numbers of some worlds hang on.
+
+    Args:
+        seed: Seed of the run, >= 0.
+        numbers: Number of each world or episode, shape (n,), integers >= 0.
+        repeats: How often each has begun anew, shape (n,), integers >= 0.
+        stream: What for: START, WORLD or NOISE.
+
+    Returns:
+        Keys for `words`.
+    """
+    n, r = _counter(numbers), _counter(repeats)
+    keys = []
+    for odd in (GOLDEN, OTHER):
+        start = _mix_number(_mix_number((seed & MASK) ^ odd) ^ (seed >> 32 & MASK) ^ (stream * odd & MASK))
+        keys.append(_mix(_mix(n * odd + start & MASK) + r * GOLDEN & MASK))
+    return keys[0], keys[1]
+
+
+def words(keys: Keys, counter: Array | int, count: int) -> Array:
+    """Hash counters to words.
+
+    Args:
+        keys: Of the worlds.
+        counter: Such as the step of an episode: one number, or one for each world, shape (n,).
+        count: How many words for each world.
+
+    Returns:
+        Words in [0, 2³²), shape (count, n): numbers of one kind lie together.
+    """
+    first, second = keys
+    xp = array_namespace(first)
+    here = counter * OTHER & MASK if isinstance(counter, int) else _counter(counter) * OTHER & MASK
+    base = _mix(first + here & MASK) ^ second
+    channel = xp.asarray(
+        [(i + 1) * GOLDEN & MASK for i in range(count)], dtype=base.dtype, device=device(base)
+    )
+    return _mix(base[None, :] + channel[:, None] & MASK)
+
+
+def uniform_from(bits: Array, dtype: Any) -> Array:
+    """Words as numbers in (0, 1), same shape; float32 may round the largest up to 1."""
+    return (array_namespace(bits).astype(bits, dtype) + 0.5) * 2.0**-32
+
+
+def normal_from(bits: Array, dtype: Any) -> Array:
+    """Words as standard normal numbers, pair by pair (Box and Muller 1958).
+
+    Args:
+        bits: Shape (2k, n).
+        dtype: Floating type of the result.
+
+    Returns:
+        Shape (2k, n).
+    """
+    xp = array_namespace(bits)
+    unit = uniform_from(bits, dtype)
+    half = bits.shape[0] // 2
+    radius = xp.sqrt(-2.0 * xp.log(unit[:half]))
+    angle = 2.0 * math.pi * unit[half:]
+    return xp.concat((radius * xp.cos(angle), radius * xp.sin(angle)), axis=0)
+
+
+class Draws:
+    """Numbers for some worlds, in an order that the code fixes; what an episode is drawn from."""
+
+    def __init__(self, seed: int, numbers: Array, repeats: Array, stream: int = START) -> None:
+        """Prepare the worlds; arguments as in `world_keys`."""
+        self._keys = world_keys(seed, numbers, repeats, stream)
+        self._drawn = 0
+        self.worlds = int(self._keys[0].shape[0])
+
+    @classmethod
+    def of_episode(cls, seed: int, number: int, *, repeat: int = 0, stream: int = START) -> Draws:
+        """The numbers of one episode, as a batch of one."""
+        return cls(seed, np.asarray([number]), np.asarray([repeat]), stream)
+
+    def uniform(self, low: Any, high: Any, *shape: int) -> Array:
+        """Numbers between two bounds.
+
+        Args:
+            low: Lower bound; a number or something that broadcasts to the result.
+            high: Upper bound.
+            shape: Of what each world gets.
+
+        Returns:
+            Shape (worlds, *shape), float64.
+        """
+        return low + (high - low) * self._unit(shape)
+
+    def normal(self, std: Any, *shape: int) -> Array:
+        """Normal numbers about zero, shape (worlds, *shape), float64."""
+        radius, turn = self._unit(shape), self._unit(shape)
+        xp = array_namespace(radius)
+        return std * xp.sqrt(-2.0 * xp.log(radius)) * xp.cos(2.0 * math.pi * turn)
+
+    def _unit(self, shape: tuple[int, ...]) -> Array:
+        count = math.prod(shape)
+        bits = words(self._keys, self._drawn, count)
+        self._drawn += 1
+        xp = array_namespace(bits)
+        return xp.reshape(uniform_from(bits, xp.float64).T, (self.worlds, *shape))
+
+
+def _counter(values: Array) -> Array:
+    """Integers as words: 32-bit where the library can compute with them, else the low half of 64."""
+    if is_numpy_array(values):
+        return np.asarray(values).astype(np.uint32)
+    xp = array_namespace(values)
+    return xp.astype(values, xp.int64) & MASK
+
+
+def _mix(x: Array) -> Array:
+    x = (x ^ (x >> 16)) * 0x7FEB352D & MASK
+    x = (x ^ (x >> 15)) * 0x846CA68B & MASK
+    return x ^ (x >> 16)
+
+
+def _mix_number(x: int) -> int:
+    x = (x ^ (x >> 16)) * 0x7FEB352D & MASK
+    x = (x ^ (x >> 15)) * 0x846CA68B & MASK
+    return x ^ (x >> 16)

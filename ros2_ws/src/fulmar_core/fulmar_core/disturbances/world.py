@@ -1,0 +1,60 @@
+"""One draw of a scenario for each world: everything that stays the same during an episode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.rotation import Array
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """Body, actuators, surroundings and sensors of episodes; world axis last.
+
+    Arrays have the shape (...,), those of actuators (n, ...), those of measured columns (6, ...).
+    """
+
+    mass: Array  # [kg]
+    yaw_inertia: Array  # [kg·m²]
+    com_x: Array  # centre of mass ahead of the body's origin [m]
+    com_y: Array  # to its left [m]
+    drag: Array  # factor on the damping of the water [-]
+    gain: Array  # (n, ...) factor on what each actuator does [-]
+    alive: Array  # (n, ...) 1, or 0 for an actuator that stays closed or still [-]
+    action_noise: Array  # largest relative error of what an actuator does, anew at each control step [-]
+    action_delay: Array  # until a command acts, beyond the actuators' own, at most one control step [s]
+    force_x: Array  # constant, in the world [N]
+    force_y: Array  # [N]
+    torque: Array  # constant [N·m]
+    wave_force: Array  # amplitude of a force that is sinusoidal in the place (an uneven floor) [N]
+    wave_torque: Array  # same for the torque [N·m]
+    wave_number: Array  # [rad/m]
+    wave_phase_x: Array  # [rad]
+    wave_phase_y: Array  # [rad]
+    kick: Array  # force of a kick that lasts one control step [N]
+    kick_period: Array  # from kick to kick [s]
+    kick_direction: Array  # [rad]
+    noise: Array  # factor on the sensors' noise [-]
+    sensor_bias: Array  # (6, ...) in the sensors' own standard deviations of bias [-]
+    sensor_scale: Array  # (6, ...) in the sensors' own standard deviations of scale [-]
+    sensor_delay: Array  # beyond the sensors' own [s]
+    dropout: Array  # chance that a measurement is lost [-]
+
+    def __getitem__(self, index: Any) -> World:
+        """Pick worlds out of a batch."""
+        return World(*(getattr(self, name)[..., index] for name in FIELDS))
+
+    def write(self, index: Any, other: World) -> None:
+        """Overwrite some worlds of a batch in place."""
+        for name in FIELDS:
+            getattr(self, name)[..., index] = getattr(other, name)
+
+    def astype(self, dtype: Any) -> World:
+        """Copy in another NumPy floating type."""
+        return World(*(np.array(getattr(self, name), dtype=dtype) for name in FIELDS))
+
+
+FIELDS = tuple(f.name for f in fields(World))

@@ -1,0 +1,66 @@
+"""A planar body that floats on air or water and is pushed about.
+
+Semi-implicit Euler (new velocity, then new position with it), as MuJoCo's Euler integrator. The velocity is kept in the
+world, where nothing but forces changes it; the body's own frame would need Coriolis terms that Euler steps inflate.
+"""
+
+from __future__ import annotations
+
+from array_api_compat import array_namespace
+
+from fulmar_core.disturbances.world import World
+from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
+from fulmar_core.planar import PlanarState
+from fulmar_core.rotation import Array
+
+Wrench = tuple[Array, Array, Array]  # forces along two axes [N] and yaw moment [N·m], shapes (...,)
+
+
+def free_body_step(
+    state: PlanarState,
+    push: Wrench,
+    outside: Wrench,
+    world: World,
+    water: Hydrodynamics | None,
+    dt: float,
+) -> PlanarState:
+    """Move the centre of mass through one integration step.
+
+    With added mass m_u, m_v and I_r the surge and sway equations (Fossen 2011, eq. 6.109 on the diagonal) read
+    (m + m_u) u' = X + (m + m_v) v r and (m + m_v) v' = Y - (m + m_u) u r. In the world's frame their centripetal parts
+    of equal mass cancel, and what remains is the difference of the added masses.
+
+    Args:
+        state: Of the centre of mass; all arrays of one floating type.
+        push: By the actuators, about the centre of mass, in the body's frame.
+        outside: By the surroundings, in the world's frame.
+        world: Mass, inertia and the factor on the damping.
+        water: What the hull swims in; None for a body on air.
+        dt: Integration step, > 0 [s].
+
+    Returns:
+        State after `dt`.
+    """
+    xp = array_namespace(state.x)
+    c, s = xp.cos(state.yaw), xp.sin(state.yaw)
+    ahead, left, moment = push
+    if water is None:
+        ax = (c * ahead - s * left + outside[0]) / world.mass
+        ay = (s * ahead + c * left + outside[1]) / world.mass
+        spin = (moment + outside[2]) / world.yaw_inertia
+    else:
+        u, v, r = c * state.vx + s * state.vy, c * state.vy - s * state.vx, state.yaw_rate
+        drag = water.planar_damping(u, v, r)
+        mu, mv, ir = water.planar_added_mass
+        surge = ahead + world.drag * drag[0] + c * outside[0] + s * outside[1]
+        sway = left + world.drag * drag[1] + c * outside[1] - s * outside[0]
+        au = (surge + (mv - mu) * v * r) / (world.mass + mu) if mv != mu else surge / (world.mass + mu)
+        av = (sway + (mv - mu) * u * r) / (world.mass + mv) if mv != mu else sway / (world.mass + mv)
+        munk = (mu - mv) * u * v if mv != mu else 0.0
+        spin = (moment + world.drag * drag[2] + outside[2] + munk) / (world.yaw_inertia + ir)
+        ax, ay = c * au - s * av, s * au + c * av
+    vx, vy = state.vx + dt * ax, state.vy + dt * ay
+    yaw_rate = state.yaw_rate + dt * spin
+    return PlanarState(
+        state.x + dt * vx, state.y + dt * vy, state.yaw + dt * yaw_rate, vx, vy, yaw_rate
+    )

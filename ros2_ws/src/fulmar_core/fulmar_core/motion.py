@@ -1,0 +1,98 @@
+"""How a robot moves: actuators, dynamics and surroundings of a batch of worlds, joined into one control step."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from array_api_compat import array_namespace
+
+from fulmar_core.actuators.actuation import ActuationState
+from fulmar_core.disturbances.outside import outside_wrench
+from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.disturbances.world import World
+from fulmar_core.dynamics.free_body import Wrench, free_body_step
+from fulmar_core.dynamics.rolling import rolling_step
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot, Rolling
+from fulmar_core.rotation import Array
+
+
+def actuation_of(robot: Robot, safe: Array) -> ActuationState:
+    """The actuators of a robot in their safe state.
+
+    Args:
+        robot: The robot.
+        safe: Its safe command in every world, shape (n, worlds).
+    """
+    response = robot.actuators.response
+    if isinstance(robot.actuators, Rolling):
+        response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
+    return ActuationState(response, binary=robot.actuators.binary, safe=safe)
+
+
+def may_be_late(robot: Robot, scenario: Scenario) -> bool:
+    """Whether commands act late in any world."""
+    return robot.actuators.response.delay_s > 0.0 or scenario.actuation.delay_s > 0.0
+
+
+def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:
+    """Whether the centre of mass is beside the body's origin in any world."""
+    return scenario.body == "uncertain" and robot.uncertainty.center_of_mass > 0.0
+
+
+def control_step(
+    robot: Robot,
+    state: PlanarState,
+    actuation: ActuationState,
+    world: World,
+    *,
+    time_s: Array,
+    substeps: int,
+    delayed: bool,
+    off_centre: bool,
+) -> PlanarState:
+    """Move through one control step; the actuators have their command already.
+
+    Args:
+        robot: The robot.
+        state: Of the body's origin, shapes (worlds,).
+        actuation: What the actuators do.
+        world: Bodies and surroundings.
+        time_s: Time in each episode [s].
+        substeps: Integration steps.
+        delayed: As of `may_be_late`.
+        off_centre: As of `may_be_off_centre`.
+
+    Returns:
+        State after `substeps` physics steps.
+    """
+    dt = robot.timing.physics_dt
+    outside = outside_wrench(state, world, time_s, substeps * dt)
+    if isinstance(robot.actuators, Rolling):
+        for _ in range(substeps):
+            target = actuation.advance(dt, delayed=delayed)
+            state = rolling_step(state, target, actuation.gain, outside, world, robot.actuators, dt)
+        return state
+    steady = not (delayed or robot.actuators.response.remembers)
+    if off_centre:
+        state = _moved(state, world, 1.0)
+    push: Wrench | None = None
+    for _ in range(substeps):
+        applied = actuation.advance(dt, delayed=delayed)
+        if push is None or not steady:
+            push = robot.actuators.planar_wrench(applied, actuation.gain)
+            if off_centre:
+                ahead, left, moment = push
+                push = ahead, left, moment - (world.com_x * left - world.com_y * ahead)
+        state = free_body_step(state, push, outside, world, robot.hydrodynamics, dt)
+    return _moved(state, world, -1.0) if off_centre else state
+
+
+def _moved(state: PlanarState, world: World, sign: float) -> PlanarState:
+    """State of the centre of mass from that of the origin (+1), or back (-1)."""
+    xp = array_namespace(state.x)
+    c, s = xp.cos(state.yaw), xp.sin(state.yaw)
+    dx = sign * (c * world.com_x - s * world.com_y)
+    dy = sign * (s * world.com_x + c * world.com_y)
+    r = state.yaw_rate
+    return PlanarState(state.x + dx, state.y + dy, state.yaw, state.vx - r * dy, state.vy + r * dx, r)

@@ -1,0 +1,70 @@
+"""The vector that a controller is fed, defined once for training, evaluation and the robot."""
+
+from __future__ import annotations
+
+import numpy as np
+from array_api_compat import array_namespace, device
+
+from fulmar_core.goal import Goal
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks import Task
+
+
+class Observer:
+    """A task's terms, and the robot's own where its actuators take time to follow.
+
+    Attributes:
+        names: Of the terms, in order.
+    """
+
+    def __init__(self, robot: Robot, task: Task) -> None:
+        """Combine a robot and a task."""
+        self._task = task
+        self._remembers = robot.actuators.response.remembers
+        self._scale = robot.actuators.scale
+        own = tuple(f"previous_{name}" for name in robot.actuators.names) if self._remembers else ()
+        self.names: tuple[str, ...] = (*task.observation_names, *own)
+
+    def __call__(self, state: PlanarState, goal: Goal, previous_command: Array) -> Array:
+        """Observe.
+
+        Args:
+            state: Measured state, shapes (...,).
+            goal: Goal of the same leading shape.
+            previous_command: What was last commanded, after every limit, shape (..., m).
+
+        Returns:
+            Terms in the order of `names`, shape (..., n).
+        """
+        terms = self._task.observe(state, goal)
+        xp = array_namespace(state.x)
+        columns = [xp.broadcast_to(xp.asarray(term), state.x.shape) for term in terms]
+        if self._remembers:
+            scale = xp.asarray(self._scale, dtype=previous_command.dtype, device=device(previous_command))
+            share = previous_command / scale
+            columns += [share[..., i] for i in range(share.shape[-1])]
+        return xp.stack(columns, axis=-1)
+
+
+def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> Array:
+    """A command that the actuators reach within one control step.
+
+    With it the previous command says what the actuators do now, so that a controller needs no other sensor for it.
+
+    Args:
+        command: Within the actuators' limits, shape (..., n).
+        previous: The one before, same shape.
+        robot: Says how fast its actuators follow.
+        control_dt: Time of one control step [s].
+
+    Returns:
+        Shape (..., n).
+    """
+    if not robot.actuators.response.slew:
+        return command
+    xp = array_namespace(command)
+    most = control_dt * np.asarray(robot.actuators.response.slew)
+    limit = xp.asarray(most, dtype=command.dtype, device=device(command))
+    return previous + xp.clip(command - previous, -limit, limit)

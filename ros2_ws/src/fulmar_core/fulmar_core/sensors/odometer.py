@@ -1,0 +1,181 @@
+"""Pose and velocity as a motion-capture or odometry source reports them: the same code in training and on ROS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from array_api_compat import array_namespace, device
+
+from fulmar_core.counter_rng import NOISE, normal_from, uniform_from, words, world_keys
+from fulmar_core.disturbances.world import World
+from fulmar_core.planar import PlanarState
+from fulmar_core.rotation import Array
+
+
+@dataclass(frozen=True)
+class Channel:
+    """How one measured quantity differs from the true one; 0 switches a part off."""
+
+    std: float = 0.0  # white noise, anew with each measurement
+    bias_std: float = 0.0  # of a bias that stays for an episode
+    scale_std: float = 0.0  # of a scale error that stays for an episode [-]
+    limit: float = 0.0  # readings are cut to ± this
+    quantum: float = 0.0  # readings are whole multiples of this
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if min(self.std, self.bias_std, self.scale_std, self.limit, self.quantum) < 0.0:
+            raise ValueError("std, bias_std, scale_std, limit and quantum must not be negative.")
+
+
+@dataclass(frozen=True)
+class OdometrySpec:
+    """What the odometry reports, and when."""
+
+    position: Channel = Channel()  # each world axis [m]
+    heading: Channel = Channel()  # [rad]
+    velocity: Channel = Channel()  # each world axis [m/s]
+    yaw_rate: Channel = Channel()  # [rad/s]
+    rate_hz: float = 0.0  # new readings; 0: at every plant tick [Hz]
+    delay_s: float = 0.0  # from motion to reading [s]
+
+    def __post_init__(self) -> None:
+        """Refuse negative rates and delays."""
+        if min(self.rate_hz, self.delay_s) < 0.0:
+            raise ValueError("rate_hz and delay_s must not be negative.")
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Of x, y, yaw, v_x, v_y and the turn rate."""
+        return self.position, self.position, self.heading, self.velocity, self.velocity, self.yaw_rate
+
+    def column(self, part: str) -> np.ndarray:
+        """One number of each channel, shape (6, 1)."""
+        return np.array([[getattr(channel, part)] for channel in self.channels])
+
+
+class Odometer:
+    """Measures a batch of worlds, once every `period` seconds; remembers what it held back."""
+
+    def __init__(
+        self, spec: OdometrySpec, *, seed: int, period: float, max_delay_s: float = 0.0, noisy: bool = True
+    ) -> None:
+        """Prepare.
+
+        Args:
+            spec: What differs from the truth.
+            seed: Seed of the noise.
+            period: Time between two calls of `measure` [s].
+            max_delay_s: Longest delay that worlds add to the spec's own [s].
+            noisy: False: perfect, and at once.
+        """
+        self._spec, self._seed, self._noisy, self._period = spec, seed, noisy, period
+        self._every = max(1, round(1.0 / (spec.rate_hz * period))) if spec.rate_hz and noisy else 1
+        longest = spec.delay_s + max_delay_s if noisy else 0.0
+        self._depth = int(np.ceil(longest / period - 1e-9)) + 1 if longest > 0.0 else 1
+        self._constants: dict[str, Array] = {}
+        self._history: Array | None = None
+        self._held: Array | None = None
+
+    def measure(
+        self,
+        truth: PlanarState,
+        world: World,
+        numbers: Array,
+        repeats: Array,
+        steps: Array,
+        *,
+        only: Array | None = None,
+    ) -> PlanarState:
+        """What is reported now.
+
+        Args:
+            truth: True state, shapes (n,).
+            world: Noise factors, biases, delays and losses.
+            numbers: Number of each world, shape (n,).
+            repeats: How often each began anew, shape (n,).
+            steps: How many measurements each had in this episode, shape (n,); 0 forgets its past.
+            only: Numbers of worlds that began anew since the last call, which alone are measured again.
+
+        Returns:
+            Measured state, shapes (n,).
+        """
+        if not self._noisy:
+            return truth
+        xp = array_namespace(truth.x)
+        if only is not None:
+            return self._restart(truth[only], world[only], numbers[only], repeats[only], only)
+        columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
+        bits = words(world_keys(self._seed, numbers, repeats, NOISE), steps, 7)
+        reading = self._disturbed(columns, world, bits)
+        fresh = steps == 0
+        if self._depth > 1:
+            reading = self._delayed(reading, world, steps, fresh)
+        lost = uniform_from(bits[6], columns.dtype) < world.dropout
+        if self._every > 1:
+            lost = lost | (steps % self._every != 0)
+        if self._held is not None:
+            reading = xp.where(lost & ~fresh, self._held, reading)
+        self._held = reading
+        return PlanarState(*(reading[i] for i in range(6)))
+
+    def _restart(
+        self, truth: PlanarState, world: World, numbers: Array, repeats: Array, only: Array
+    ) -> PlanarState:
+        """First measurement of some worlds; nothing of their past remains."""
+        assert self._held is not None
+        xp = array_namespace(truth.x)
+        columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
+        keys = world_keys(self._seed, numbers, repeats, NOISE)
+        reading = self._disturbed(columns, world, words(keys, 0, 7))
+        self._held = xp.asarray(self._held, copy=True)
+        self._held[:, only] = reading
+        if self._history is not None:
+            self._history[:, :, only] = reading[None]
+        return PlanarState(*(self._held[i] for i in range(6)))
+
+    def _constant(self, part: str, like: Array) -> Array:
+        if part not in self._constants:
+            xp = array_namespace(like)
+            self._constants[part] = xp.asarray(
+                self._spec.column(part), dtype=like.dtype, device=device(like)
+            )
+        return self._constants[part]
+
+    def _disturbed(self, columns: Array, world: World, bits: Array) -> Array:
+        xp = array_namespace(columns)
+        spec = self._spec
+        if _any(spec.column("scale_std")):
+            columns = columns * (1.0 + self._constant("scale_std", columns) * world.sensor_scale)
+        if _any(spec.column("bias_std")):
+            columns = columns + self._constant("bias_std", columns) * world.sensor_bias
+        if _any(spec.column("std")):
+            noise = normal_from(bits[:6], columns.dtype) * world.noise
+            columns = columns + self._constant("std", columns) * noise
+        if _any(spec.column("limit")):
+            limit = self._constant("limit", columns)
+            most = xp.where(limit > 0.0, limit, xp.full_like(limit, xp.inf))
+            columns = xp.clip(columns, -most, most)
+        if _any(spec.column("quantum")):
+            quantum = self._constant("quantum", columns)
+            safe = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
+            columns = xp.where(quantum > 0.0, xp.round(columns / safe) * safe, columns)
+        return columns
+
+    def _delayed(self, reading: Array, world: World, steps: Array, fresh: Array) -> Array:
+        """Reading of some measurements ago; before the first one, the first."""
+        xp = array_namespace(reading)
+        if self._history is None:
+            self._history = xp.stack([reading] * self._depth)
+        old = xp.concat((reading[None], self._history[:-1]))
+        self._history = xp.where(fresh, reading[None], old)
+        late = (self._spec.delay_s + world.sensor_delay) / self._period
+        back = xp.clip(xp.round(late), 0, self._depth - 1)
+        worlds = reading.shape[1]
+        return self._history[xp.astype(back, xp.int64), :, xp.arange(worlds, device=device(reading))].T
+
+
+def _any(values: Any) -> bool:
+    return bool(np.any(values != 0.0))

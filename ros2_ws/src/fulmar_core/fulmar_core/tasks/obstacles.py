@@ -1,0 +1,124 @@
+"""Discs that stand about: where they are drawn, what controllers see of them, and what counts as touching."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.planar import PlanarState, to_body
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+
+CANDIDATES = 8  # places tried for each obstacle; one that fits nowhere is left out
+TOUCH = 0.01  # nearer than this counts as touching; contacts of simulators are as soft [m]
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """How many, how large, and how far from what (RoboRAN tasks_cfg/go_to_position_with_obstacles_cfg.py)."""
+
+    most: int  # drawn for an episode; at least one is tried
+    radius: float  # [m]
+    height: float  # for simulators that have one [m]
+    from_goal: float  # least distance of the centre [m]
+    from_start: float  # same [m]
+    apart: float  # least distance between two centres [m]
+    seen: int  # how many of the nearest a controller sees
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the observation terms."""
+        return tuple(f"obstacle_{i + 1}_{axis}_in_body" for i in range(self.seen) for axis in "xy")
+
+    def draw(self, draws: Draws, robot: Robot, start: PlanarState, target: np.ndarray) -> np.ndarray:
+        """Draw obstacles between and around start and goal.
+
+        Args:
+            draws: One row for each episode.
+            robot: Its outline keeps clear of them at the start and at the goal.
+            start: Starts.
+            target: Goals, shape (worlds, 3).
+
+        Returns:
+            Shape (worlds, most, 3): x [m], y [m] and radius [m], which is 0 for those that are not there.
+        """
+        n = draws.worlds
+        begin, end = np.stack((start.x, start.y), axis=-1), np.asarray(target)[:, :2]
+        middle, reach = 0.5 * (begin + end), 0.75 * np.linalg.norm(end - begin, axis=-1)
+        clear = robot.body.radius + self.radius + 0.2
+        wanted = np.asarray(draws.uniform(1.0, self.most + 1.0))
+        placed = np.zeros((n, self.most, 3))
+        for i in range(self.most):
+            distance = reach[:, None] * np.sqrt(np.asarray(draws.uniform(0.0, 1.0, CANDIDATES)))
+            angle = np.asarray(draws.uniform(-math.pi, math.pi, CANDIDATES))
+            spots = middle[:, None] + distance[..., None] * np.stack((np.cos(angle), np.sin(angle)), -1)
+            fits = np.linalg.norm(spots - begin[:, None], axis=-1) >= max(self.from_start, clear)
+            fits &= np.linalg.norm(spots - end[:, None], axis=-1) >= max(self.from_goal, clear)
+            gaps = np.linalg.norm(spots[:, :, None] - placed[:, None, :i, :2], axis=-1)
+            fits &= np.all((gaps >= self.apart) | (placed[:, None, :i, 2] == 0.0), axis=-1)
+            pick = np.argmax(fits, axis=1)
+            there = fits[np.arange(n), pick] & (i + 1.0 <= wanted)
+            placed[:, i, :2] = spots[np.arange(n), pick]
+            placed[:, i, 2] = np.where(there, self.radius, 0.0)
+        return placed
+
+    def observe(self, state: PlanarState, obstacles: Array) -> tuple[Array, ...]:
+        """Directions of the nearest obstacles in the body's frame, longer the nearer they are.
+
+        Args:
+            state: Measured state.
+            obstacles: Shape (..., m, 3).
+
+        Returns:
+            `2 seen` terms of shape (...,): unit vectors times exp(-gap / 1 m), zero where there is none.
+        """
+        xp = array_namespace(state.x)
+        x, y, gap = _relative(state, obstacles)
+        missing = self.seen - obstacles.shape[-2]
+        if missing > 0:
+            pad = xp.zeros((*x.shape[:-1], missing), dtype=x.dtype)
+            x, y, gap = (xp.concat((a, pad + b), axis=-1) for a, b in ((x, 0.0), (y, 0.0), (gap, 1e3)))
+        order = xp.argsort(gap, axis=-1)[..., : self.seen]
+        x, y, gap = (xp.take_along_axis(a, order, axis=-1) for a in (x, y, gap))
+        distance = xp.clip(xp.sqrt(x * x + y * y), 1e-3, None)
+        size = xp.exp(-xp.clip(gap, 0.0, 50.0)) / distance
+        columns = (x * size, y * size)
+        return tuple(columns[axis][..., i] for i in range(self.seen) for axis in (0, 1))
+
+
+def touches(state: PlanarState, obstacles: Array, robot: Robot) -> Array:
+    """Whether the robot's outline is at an obstacle.
+
+    Args:
+        state: True state, shapes (...,).
+        obstacles: Shape (..., m, 3).
+        robot: Its outline: a box, or a disc.
+
+    Returns:
+        Truth values, shape (...,).
+    """
+    xp = array_namespace(state.x)
+    x, y, _ = _relative(state, obstacles)
+    radius = obstacles[..., 2]
+    if robot.body.footprint is None:
+        gap = xp.sqrt(x * x + y * y) - robot.body.radius - radius
+    else:
+        length, width = robot.body.footprint
+        dx = xp.clip(xp.abs(x) - 0.5 * length, 0.0, None)
+        dy = xp.clip(xp.abs(y) - 0.5 * width, 0.0, None)
+        gap = xp.sqrt(dx * dx + dy * dy) - radius
+    return xp.any((gap < TOUCH) & (radius > 0.0), axis=-1)
+
+
+def _relative(state: PlanarState, obstacles: Array) -> tuple[Array, Array, Array]:
+    """Centres in the body's frame, and gaps between the body's centre and the discs, shapes (..., m) [m]."""
+    xp = array_namespace(state.x)
+    dx = obstacles[..., 0] - state.x[..., None]
+    dy = obstacles[..., 1] - state.y[..., None]
+    x, y = to_body(state.yaw[..., None], dx, dy)
+    gap = xp.sqrt(dx * dx + dy * dy) - obstacles[..., 2]
+    return x, y, xp.where(obstacles[..., 2] > 0.0, gap, xp.full_like(gap, 1e3))

@@ -1,0 +1,47 @@
+"""What every task is: one interface for learners, evaluations and the robot."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.goal import Goal
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks.terms import Errors, Tolerance
+
+
+class TaskProtocol(Protocol):
+    """Frozen, free of side effects; every array has the leading shape of the state it goes with."""
+
+    name: str
+    title: str
+    episode_s: float  # length of an episode [s]
+    tolerance: Tolerance
+    goal_topic: str
+    observation_names: tuple[str, ...]
+
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+        """Draw starts and goals, as NumPy float64, leading shape (worlds,)."""
+        ...
+
+    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+        """Terms in the order of `observation_names`, each of shape (...,)."""
+        ...
+
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The goal after a control step: targets may be done, or their time may be over."""
+        ...
+
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+        """Reward of one control step, shape (...,), for the goal that it began with; actuators cost extra."""
+        ...
+
+    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+        """How far a state is from the current target."""
+        ...
+
+    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+        """Whether a state touches something it must not, shape (...,); None where nothing stands about."""
+        ...

@@ -1,0 +1,115 @@
+"""Move with a wanted velocity and turn rate, which change now and then."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from array_api_compat import array_namespace
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.planar import PlanarState, at_rest
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
+
+ERROR_TERMS = ("velocity_error_x_in_body", "velocity_error_y_in_body", "yaw_rate_error")
+FINE_ERROR_TERMS = ("fine_velocity_error_x_in_body", "fine_velocity_error_y_in_body", "fine_yaw_rate_error")
+
+
+@dataclass(frozen=True)
+class VelocityReward:
+    """Weights of the reward, per control step."""
+
+    velocity: float  # times exp(-e / 0.1 m/s): RANS cfg/task/reward/*.yaml
+    velocity_far: float  # times exp(-e / 0.5 m/s): RoboRAN tasks_cfg/track_velocities_cfg.py
+    yaw_rate: float  # times exp(-|e| / 0.1 rad/s)
+    yaw_rate_far: float  # times exp(-|e| / 0.5 rad/s): RoboRAN, same file
+    joint: float  # times exp(-e / 0.1 m/s - |e| / 0.1 rad/s): asks for both at once
+
+
+@dataclass(frozen=True)
+class TrackVelocities:
+    """Track a velocity in the body's frame; the target arrives on `goal_velocity`.
+
+    Targets are drawn from what the robot can do: up to its speeds, and no faster a turn than its sideways acceleration
+    sustains at that speed.
+    """
+
+    kind: Literal["track_velocities"]
+    name: str
+    title: str
+    episode_s: float  # length of an episode [s]
+    hold_s: float  # time of one target [s]
+    tolerance: Tolerance
+    fine_velocity: float  # where the magnified velocity error saturates [m/s]
+    fine_yaw_rate: float  # same for the turn rate [rad/s]
+    reward_weights: VelocityReward
+
+    goal_topic: ClassVar[str] = "goal_velocity"
+    observation_names: ClassVar[tuple[str, ...]] = (*ERROR_TERMS, *MOTION_TERMS, *FINE_ERROR_TERMS)
+
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+        """Draw a start at rest, and as many targets as the episode has time for."""
+        count = math.ceil(self.episode_s / self.hold_s)
+        can = robot.performance
+        ahead = draws.uniform(-can.reverse_speed, can.speed, count)
+        left = draws.uniform(-can.lateral_speed, can.lateral_speed, count)
+        turn = draws.uniform(-can.yaw_rate, can.yaw_rate, count)
+        yaw = draws.uniform(-math.pi, math.pi)
+        xp = array_namespace(ahead)
+        speed = xp.sqrt(ahead * ahead + left * left)
+        fastest = can.turning_acceleration / xp.clip(speed, 1e-6, None)
+        targets = xp.stack((ahead, left, xp.clip(turn, -fastest, fastest)), axis=-1)
+        zero = xp.zeros_like(yaw)
+        return at_rest(zero, zero, yaw), Goal(
+            targets, zero, no_obstacles(draws.worlds), targets[:, 0, :2] * 0.0
+        )
+
+    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        xp = array_namespace(state.x)
+        u, v, r = motion_terms(state)
+        target = goal.current
+        eu, ev, er = target[..., 0] - u, target[..., 1] - v, target[..., 2] - r
+        size = xp.clip(xp.sqrt(eu * eu + ev * ev), self.fine_velocity, None)
+        turn = xp.clip(er / self.fine_yaw_rate, -1.0, 1.0)
+        return eu, ev, er, u, v, r, eu / size, ev / size, turn
+
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The next target comes when the time of this one is over."""
+        if goal.targets.shape[-2] == 1:
+            return goal
+        xp = array_namespace(goal.targets)
+        done = xp.floor((time_s + 1e-6) / self.hold_s)
+        last = goal.targets.shape[-2] - 1
+        done = xp.astype(xp.clip(done, 0.0, float(last)), goal.done.dtype)
+        return Goal(goal.targets, xp.broadcast_to(done, goal.done.shape), goal.obstacles, goal.block)
+
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+        """Reward of one control step; see `TaskProtocol.reward`."""
+        xp = array_namespace(after.x)
+        w = self.reward_weights
+        errors = self.errors(after, goal)
+        e, r = errors.velocity, xp.abs(errors.yaw_rate)
+        return (
+            w.velocity * xp.exp(-e / 0.1)
+            + w.velocity_far * xp.exp(-e / 0.5)
+            + w.yaw_rate * xp.exp(-r / 0.1)
+            + w.yaw_rate_far * xp.exp(-r / 0.5)
+            + w.joint * xp.exp(-e / 0.1 - r / 0.1)
+        )
+
+    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+        """Length of the velocity error, and turn rate error."""
+        xp = array_namespace(state.x)
+        u, v, r = motion_terms(state)
+        target = goal.current
+        eu, ev = target[..., 0] - u, target[..., 1] - v
+        return Errors(velocity=xp.sqrt(eu * eu + ev * ev), yaw_rate=target[..., 2] - r)
+
+    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+        """Nothing stands about."""
+        return None
