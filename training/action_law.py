@@ -1,4 +1,4 @@
-"""How actions are drawn from what a policy network puts out, in as few operations as possible."""
+"""How actions are drawn from what a policy network puts out, with the gradients that an update needs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from torch.nn.functional import softplus
 
 
 class ActionLaw(Protocol):
-    """A distribution of actions, shaped by the network's outputs; arguments have shape (batch, m)."""
+    """A distribution of actions, shaped by the network's outputs; both have shape (batch, m)."""
 
     def sample(self, outputs: torch.Tensor) -> torch.Tensor:
         """Draw actions, shape (batch, m)."""
@@ -22,6 +22,22 @@ class ActionLaw(Protocol):
 
     def entropy(self, outputs: torch.Tensor) -> torch.Tensor:
         """Mean entropy over the batch, a scalar."""
+
+    def backward(
+        self, outputs: torch.Tensor, actions: torch.Tensor, weights: torch.Tensor, of_entropy: float
+    ) -> torch.Tensor:
+        """Gradient of `(weights * log_prob).sum() + of_entropy * entropy`.
+
+        Args:
+            outputs: The network's.
+            actions: Those that were drawn.
+            weights: Of each row, shape (batch,).
+            of_entropy: Weight of the entropy.
+
+        Returns:
+            With respect to the outputs, shape (batch, m); with respect to parameters of the law itself it is left
+            in their `grad`.
+        """
 
 
 class OnOff:
@@ -39,6 +55,16 @@ class OnOff:
         """Sum over the actuators, mean over the batch."""
         return (softplus(outputs) - outputs * torch.sigmoid(outputs)).sum(1).mean()
 
+    def backward(
+        self, outputs: torch.Tensor, actions: torch.Tensor, weights: torch.Tensor, of_entropy: float
+    ) -> torch.Tensor:
+        """See `ActionLaw.backward`."""
+        on = torch.sigmoid(outputs)
+        gradient = (actions - on).mul_(weights.unsqueeze(1))
+        if of_entropy:
+            gradient -= of_entropy / len(outputs) * outputs * on * (1.0 - on)
+        return gradient
+
 
 class Gaussian:
     """Each actuator is normally distributed around the output, as widely in every situation."""
@@ -53,12 +79,22 @@ class Gaussian:
 
     def log_prob(self, outputs: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
         """Sum over the actuators."""
-        away = (actions - outputs) * (-self._log_std).exp()
-        return -0.5 * away.square().sum(1) - (self._log_std + 0.5 * math.log(2.0 * math.pi)).sum()
+        squares = ((actions - outputs) * (-self._log_std).exp()).square_()
+        return -0.5 * squares.sum(1) - (self._log_std + 0.5 * math.log(2.0 * math.pi)).sum()
 
     def entropy(self, outputs: torch.Tensor) -> torch.Tensor:
         """The same for every row."""
         return (self._log_std + 0.5 * math.log(2.0 * math.pi * math.e)).sum()
+
+    def backward(
+        self, outputs: torch.Tensor, actions: torch.Tensor, weights: torch.Tensor, of_entropy: float
+    ) -> torch.Tensor:
+        """See `ActionLaw.backward`."""
+        narrow = (-self._log_std).exp()
+        away = (actions - outputs) * narrow
+        of_std = ((away.square() - 1.0) * weights.unsqueeze(1)).sum(0)
+        self._log_std.grad = of_std + of_entropy
+        return away * narrow * weights.unsqueeze(1)
 
 
 def action_law(policy: ActorCriticPolicy) -> ActionLaw:

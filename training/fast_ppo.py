@@ -1,12 +1,12 @@
-"""PPO of Stable-Baselines3 with an update and a rollout that two CPU cores compute quickly.
+"""PPO of Stable-Baselines3 with an update and a rollout that a CPU computes quickly.
 
-Same loss, same buffers, same files and callbacks; what differs is how it is computed:
+Same loss, same buffer, same files, policies and callbacks; what differs is how it is computed:
 
 - hidden layers in bfloat16 where the processor has it, output layers and all losses in float32;
+- gradients written out, since PyTorch's bookkeeping costs as much as the arithmetic of such small networks;
 - all samples in one matrix, shuffled once an epoch and cut into contiguous minibatches;
-- values and log-probabilities of a rollout in one pass at its end, with the network that the update will use,
-  so that the ratio of the first minibatch is exactly one;
-- Adam in one fused step.
+- values and log-probabilities of a rollout in one pass at its end, by the very network that the update begins
+  with, so that the first ratio is one in bfloat16 too.
 """
 
 from __future__ import annotations
@@ -21,35 +21,38 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import explained_variance
 from stable_baselines3.common.vec_env import VecEnv
-from torch.nn.functional import linear, mse_loss
+from torch.nn.utils import clip_grad_norm_
 
 from training.action_law import ActionLaw, action_law
-from training.fast_mlp import fast_precision, tanh_stack
+from training.fast_mlp import FastMlp, fast_precision
+
+_COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
 
 
 class FastPPO(PPO):
     """PPO for an `MlpPolicy` of separate tanh networks over MultiBinary or Box actions, on a CPU."""
 
     def _setup_model(self) -> None:
-        self.policy_kwargs = {"activation_fn": torch.nn.Tanh, **self.policy_kwargs}
-        self.policy_kwargs.setdefault("optimizer_kwargs", {"eps": 1e-5, "fused": True})
+        self.policy_kwargs = {
+            "activation_fn": torch.nn.Tanh,
+            "optimizer_kwargs": {"eps": 1e-5, "fused": True},
+            **self.policy_kwargs,
+        }
         super()._setup_model()
-        self._precision = fast_precision()
-        action_law(self.policy)  # refuses other action spaces
+        self._networks(fast_precision())  # refuses other policies
 
-    @property
-    def _law(self) -> ActionLaw:
-        return action_law(self.policy)
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), "_actor", "_critic", "_law"]
 
-    def _actor(self, observations: torch.Tensor) -> torch.Tensor:
-        """Outputs of the policy network, shape (batch, m)."""
-        hidden = tanh_stack(observations, self.policy.mlp_extractor.policy_net, self._precision)
-        return linear(hidden, self.policy.action_net.weight, self.policy.action_net.bias)
+    def _networks(self, precision: torch.dtype) -> None:
+        policy = self.policy
+        self._law: ActionLaw = action_law(policy)
+        self._actor = FastMlp(policy.mlp_extractor.policy_net, policy.action_net, precision)
+        self._critic = FastMlp(policy.mlp_extractor.value_net, policy.value_net, precision)
 
-    def _critic(self, observations: torch.Tensor) -> torch.Tensor:
-        """Values, shape (batch,)."""
-        hidden = tanh_stack(observations, self.policy.mlp_extractor.value_net, self._precision)
-        return linear(hidden, self.policy.value_net.weight, self.policy.value_net.bias).flatten()
+    def _refresh(self) -> None:
+        self._actor.refresh()
+        self._critic.refresh()
 
     def collect_rollouts(
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
@@ -57,14 +60,17 @@ class FastPPO(PPO):
         """Fill the buffer; returns False if the callback wants to stop."""
         assert self._last_obs is not None
         self.policy.set_training_mode(False)
+        self._refresh()  # weights may have been loaded since the last update
         rollout_buffer.reset()
         callback.on_rollout_start()
-        buffer, law, box = rollout_buffer, self._law, self.action_space
+        buffer, box = rollout_buffer, self.action_space
         cut: list[tuple[int, int, np.ndarray]] = []  # step, world and last observation of truncated episodes
+        outputs: list[torch.Tensor] = []
         for step in range(n_rollout_steps):
             observations = np.asarray(self._last_obs, dtype=np.float32)
+            outputs.append(self._actor(torch.from_numpy(observations)))
             with torch.no_grad():
-                actions = law.sample(self._actor(torch.from_numpy(observations))).numpy()
+                actions = self._law.sample(outputs[-1]).numpy()
             allowed = np.clip(actions, box.low, box.high) if isinstance(box, spaces.Box) else actions
             self._last_obs, rewards, dones, infos = env.step(allowed)
             self.num_timesteps += env.num_envs
@@ -84,83 +90,101 @@ class FastPPO(PPO):
                 if infos[world].get("TimeLimit.truncated", False)
             ]
         buffer.pos, buffer.full = n_rollout_steps, True
-        last_values = self._appraise(buffer, cut)
+        last_values = self._appraise(buffer, torch.cat(outputs), cut)
         buffer.compute_returns_and_advantage(last_values=last_values, dones=dones)
         callback.update_locals(locals())
         callback.on_rollout_end()
         return True
 
     @torch.no_grad()
-    def _appraise(self, buffer: RolloutBuffer, cut: list[tuple[int, int, np.ndarray]]) -> torch.Tensor:
+    def _appraise(
+        self, buffer: RolloutBuffer, outputs: torch.Tensor, cut: list[tuple[int, int, np.ndarray]]
+    ) -> torch.Tensor:
         """Fill in values and log-probabilities, and what truncated episodes would still have earned.
+
+        Args:
+            buffer: Filled but for that.
+            outputs: Of the policy network, one row for each sample.
+            cut: Step, world and last observation of each truncated episode.
 
         Returns:
             Values of the observations after the last step, shape (worlds,).
         """
-        observations, actions = _rows(buffer.observations), _rows(buffer.actions)
-        buffer.values[:] = self._critic(observations).view(buffer.values.shape).numpy()
-        log_probs = self._law.log_prob(self._actor(observations), actions)
+        values = self._critic(_rows(buffer.observations))
+        buffer.values[:] = values.view(buffer.values.shape).numpy()
+        log_probs = self._law.log_prob(outputs, _rows(buffer.actions))
         buffer.log_probs[:] = log_probs.view(buffer.log_probs.shape).numpy()
         if cut:
             steps, worlds, last = zip(*cut, strict=True)
-            values = self._critic(torch.from_numpy(np.stack(last).astype(np.float32)))
+            values = self._critic(torch.from_numpy(np.stack(last).astype(np.float32))).flatten()
             buffer.rewards[list(steps), list(worlds)] += self.gamma * values.numpy()
-        return self._critic(torch.from_numpy(np.asarray(self._last_obs, dtype=np.float32)))
+        return self._critic(torch.from_numpy(np.asarray(self._last_obs, dtype=np.float32))).flatten()
 
+    @torch.no_grad()
     def train(self) -> None:
         """Update policy and value from the buffer."""
         self.policy.set_training_mode(True)
         self._update_learning_rate(self.policy.optimizer)
         clip = self.clip_range(self._current_progress_remaining)
-        buffer, law = self.rollout_buffer, self._law
-        columns = [
-            _rows(getattr(buffer, name))
-            for name in ("observations", "actions", "log_probs", "advantages", "returns")
-        ]
+        columns = [_rows(getattr(self.rollout_buffer, name)) for name in _COLUMNS]
         widths = [column.shape[1] for column in columns]
         samples = torch.cat(columns, dim=1)
+        told: list[torch.Tensor] = []
         for _ in range(self.n_epochs):
-            shuffled = samples[torch.randperm(len(samples))]
-            told: list[torch.Tensor] = []
-            for minibatch in shuffled.split(self.batch_size):
-                observations, actions, old, advantages, returns = minibatch.split(widths, dim=1)
-                loss, figures = self._loss(
-                    law, observations, actions, old.flatten(), advantages.flatten(), returns.flatten(), clip
-                )
-                self.policy.optimizer.zero_grad()
-                loss.backward()
-                torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
-                self.policy.optimizer.step()
-                told.append(figures)
+            shuffled = samples.index_select(0, torch.randperm(len(samples)))
+            told = [
+                self._learn_from(*minibatch.split(widths, dim=1), clip)
+                for minibatch in shuffled.split(self.batch_size)
+            ]
             self._n_updates += 1
         self._tell(torch.stack(told).mean(0), clip)
 
-    def _loss(
+    def _learn_from(
         self,
-        law: ActionLaw,
         observations: torch.Tensor,
         actions: torch.Tensor,
-        old_log_prob: torch.Tensor,
+        old_log_probs: torch.Tensor,
         advantages: torch.Tensor,
         returns: torch.Tensor,
         clip: float,
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """The clipped loss of one minibatch, and figures about it: policy and value loss, KL, share clipped."""
-        outputs = self._actor(observations)
+    ) -> torch.Tensor:
+        """One step of the optimiser.
+
+        Args:
+            observations: Normalised, shape (batch, n).
+            actions: As drawn, shape (batch, m).
+            old_log_probs: Of the actions when they were drawn, shape (batch, 1), as all that follow.
+            advantages: How much better than expected they turned out.
+            returns: What the values should have been.
+            clip: How far a ratio of probabilities may be from one.
+
+        Returns:
+            Policy loss, value loss, KL divergence (estimator k3, joschu.net/blog/kl-approx.html), share clipped.
+        """
+        old_log_probs, advantages = old_log_probs.flatten(), advantages.flatten()
         if self.normalize_advantage:
             std, mean = torch.std_mean(advantages)
             advantages = (advantages - mean) / (std + 1e-8)
-        change = law.log_prob(outputs, actions) - old_log_prob
+        outputs, surprise = self._actor(observations), self._critic(observations) - returns
+        change = self._law.log_prob(outputs, actions) - old_log_probs
         ratio = change.exp()
-        policy_loss = -torch.min(advantages * ratio, advantages * ratio.clamp(1 - clip, 1 + clip)).mean()
-        value_loss = mse_loss(self._critic(observations), returns)
-        loss = policy_loss + self.vf_coef * value_loss
-        if self.ent_coef:
-            loss = loss - self.ent_coef * law.entropy(outputs)
-        with torch.no_grad():
-            kl = (ratio - 1.0 - change).mean()
-            clipped = ((ratio - 1.0).abs() > clip).float().mean()
-            return loss, torch.stack((policy_loss, value_loss, kl, clipped))
+        gain = advantages * ratio
+        clipped_gain = advantages * ratio.clamp(1.0 - clip, 1.0 + clip)
+        # The smaller of the two is maximised; where it is the clipped one, it does not depend on the weights.
+        weights = torch.where(gain <= clipped_gain, gain, 0.0).mul_(-1.0 / len(gain))
+        self._actor.backward(self._law.backward(outputs, actions, weights, -self.ent_coef))
+        self._critic.backward(surprise * (2.0 * self.vf_coef / len(gain)))
+        clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
+        self.policy.optimizer.step()
+        self._refresh()
+        return torch.stack(
+            (
+                -torch.min(gain, clipped_gain).mean(),
+                surprise.square().mean(),
+                (ratio - 1.0 - change).mean(),
+                ((ratio - 1.0).abs() > clip).float().mean(),
+            )
+        )
 
     def _tell(self, figures: torch.Tensor, clip: float) -> None:
         names = ("policy_gradient_loss", "value_loss", "approx_kl", "clip_fraction")

@@ -11,7 +11,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from torch import nn
 
-from training.fast_mlp import fast_precision, tanh_stack
+from training.action_law import action_law
+from training.fast_mlp import FastMlp, fast_precision
 from training.fast_ppo import FastPPO
 
 MULTI_BINARY, BOX = spaces.MultiBinary(3), spaces.Box(-1.0, 1.0, (2,))
@@ -39,32 +40,44 @@ def learner(kind, action_space, *, precision=torch.float32, **kwargs):
     env = make_vec_env(lambda: Drift(action_space), n_envs=8, seed=1)
     made = kind("MlpPolicy", env, n_steps=8, batch_size=16, n_epochs=2, seed=1, device="cpu", **kwargs)
     if isinstance(made, FastPPO):
-        made._precision = precision
+        made._networks(precision)
     return made
 
 
-def layers():
-    torch.manual_seed(1)
-    return nn.Sequential(nn.Linear(4, 16), nn.Tanh(), nn.Linear(16, 8), nn.Tanh())
-
-
 @pytest.mark.parametrize(("precision", "near"), [(torch.float32, 1e-5), (torch.bfloat16, 3e-2)])
-def test_hidden_layers_and_their_gradients_are_those_of_torch(precision, near):
-    stack, inputs = layers(), torch.randn(64, 4)
-    fast = tanh_stack(inputs, stack, precision)
-    fast.square().sum().backward()
-    fast_gradients = [p.grad.clone() for p in stack.parameters()]
-    stack.zero_grad()
-    exact = stack(inputs)
-    exact.square().sum().backward()
-    torch.testing.assert_close(fast, exact, atol=near, rtol=near)
-    for fast_one, parameter in zip(fast_gradients, stack.parameters(), strict=True):
-        assert (fast_one - parameter.grad).norm() <= near * parameter.grad.norm()
+def test_outputs_and_gradients_are_those_of_torch(precision, near):
+    torch.manual_seed(1)
+    hidden = nn.Sequential(nn.Linear(4, 16), nn.Tanh(), nn.Linear(16, 8), nn.Tanh())
+    head, inputs, pull = nn.Linear(8, 3), torch.randn(64, 4), torch.randn(64, 3)
+    parameters = [*hidden.parameters(), *head.parameters()]
+    fast = FastMlp(hidden, head, precision)
+    outputs = fast(inputs)
+    fast.backward(pull)
+    gradients = [parameter.grad.clone() for parameter in parameters]
+    exact = head(hidden(inputs))
+    torch.testing.assert_close(outputs, exact, atol=near, rtol=near)
+    for ours, theirs in zip(gradients, torch.autograd.grad((exact * pull).sum(), parameters), strict=True):
+        assert (ours - theirs).norm() <= near * theirs.norm()
 
 
-def test_a_stack_of_other_layers_is_refused():
+def test_hidden_layers_of_another_kind_are_refused():
     with pytest.raises(ValueError, match="followed by tanh"):
-        tanh_stack(torch.randn(2, 4), nn.Sequential(nn.Linear(4, 4), nn.ReLU()), torch.float32)
+        FastMlp(nn.Sequential(nn.Linear(4, 4), nn.ReLU()), nn.Linear(4, 1), torch.float32)
+
+
+@pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
+@pytest.mark.parametrize("of_entropy", [0.0, 0.3])
+def test_gradients_of_the_action_laws_are_those_of_torch(space, of_entropy):
+    policy = learner(FastPPO, space).policy
+    law, outputs = action_law(policy), torch.randn(16, *space.shape, requires_grad=True)
+    actions, weights = law.sample(outputs).detach(), torch.randn(16)
+    own = [policy.log_std] if space is BOX else []
+    value = (weights * law.log_prob(outputs, actions)).sum() + of_entropy * law.entropy(outputs)
+    expected = torch.autograd.grad(value, [outputs, *own])
+    with torch.no_grad():
+        gradients = [law.backward(outputs, actions, weights, of_entropy), *(each.grad for each in own)]
+    for ours, theirs in zip(gradients, expected, strict=True):
+        torch.testing.assert_close(ours, theirs, atol=1e-5, rtol=1e-5)
 
 
 @pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
@@ -73,7 +86,7 @@ def test_values_and_log_probabilities_are_those_of_the_policy_class(space):
     observations = torch.randn(32, 4)
     with torch.no_grad():
         actions, values, log_probs = fast.policy(observations)
-        torch.testing.assert_close(fast._critic(observations), values.flatten(), atol=1e-5, rtol=1e-5)
+        torch.testing.assert_close(fast._critic(observations), values, atol=1e-5, rtol=1e-5)
         outputs = fast._actor(observations)
         torch.testing.assert_close(
             fast._law.log_prob(outputs, actions.float()), log_probs, atol=1e-5, rtol=1e-5
