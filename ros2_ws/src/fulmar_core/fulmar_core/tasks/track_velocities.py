@@ -86,7 +86,7 @@ class TrackVelocities:
         done = xp.floor((time_s + 1e-6) / self.hold_s)
         last = goal.targets.shape[-2] - 1
         done = xp.astype(xp.clip(done, 0.0, float(last)), goal.done.dtype)
-        return Goal(goal.targets, xp.broadcast_to(done, goal.done.shape), goal.obstacles, goal.block)
+        return Goal(goal.targets, xp.zeros_like(goal.done) + done, goal.obstacles, goal.block)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
