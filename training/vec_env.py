@@ -49,11 +49,8 @@ class BatchVecEnv(VecEnv):
             strength: How much of the scenario counts, from 0 to 1; may be moved later by `set_strength` [-].
         """
         self._robot, self._task, self._reward_scale = robot, task, reward_scale
-        self._new_simulation = lambda seed, strength: BatchSimulation(
-            robot, task, scenario, worlds=worlds, seed=seed, training=training, strength=strength
-        )
-        self._seed = seed
-        self.simulation = self._new_simulation(seed, strength)
+        self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
+        self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
@@ -69,6 +66,26 @@ class BatchVecEnv(VecEnv):
         self._age = np.zeros(worlds, dtype=int)
         self._actions = np.zeros((worlds, count), dtype=np.float32)
 
+    def _new_simulation(self, strength: float) -> BatchSimulation:
+        return BatchSimulation(
+            self._robot,
+            self._task,
+            self._scenario,
+            worlds=self._worlds,
+            seed=self._seed,
+            training=self._training,
+            strength=strength,
+        )
+
+    def state(self) -> dict[str, Any]:
+        """Everything that a step changes, as values that pickle; for an exact resume."""
+        return {"simulation": self.simulation.snapshot(), "age": self._age.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` returned."""
+        self.simulation.restore(state["simulation"])
+        self._age = state["age"].copy()
+
     def set_strength(self, strength: float) -> None:
         """How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-]."""
         self.simulation.strength = strength
@@ -80,7 +97,7 @@ class BatchVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """Begin anew in every world; returns the observations, shape (worlds, n)."""
-        self.simulation = self._new_simulation(self._seed, self.simulation.strength)
+        self.simulation = self._new_simulation(self.simulation.strength)
         self._age = np.random.Generator(np.random.Philox(self._seed)).integers(
             0, self._horizon, self.num_envs
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +22,9 @@ from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.tasks import Task
 
+_MOVING = (
+    "truth", "measured", "goal", "world", "command", "strength", "_repeats", "_steps", "_actuation", "_odometer",
+)  # fmt: skip
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
 
@@ -151,6 +155,15 @@ class BatchSimulation:
         self._steps = self._steps + 1
         self.goal = self.task.advance(self.goal, self.truth, time_s + self.control_dt)
         self._measure(None)
+
+    def snapshot(self) -> dict[str, Any]:
+        """Everything that moves, as a copy of its own that pickles."""
+        return {name: copy.deepcopy(getattr(self, name)) for name in _MOVING}
+
+    def restore(self, snapshot: dict[str, Any]) -> None:
+        """Go on from a snapshot of a simulation that was built alike."""
+        for name in _MOVING:
+            setattr(self, name, copy.deepcopy(snapshot[name]))
 
     def _draw(self, numbers: np.ndarray, repeats: np.ndarray) -> Episode:
         return draw_episodes(

@@ -36,7 +36,8 @@ class PoseReward:
     heading: float  # times exp(-|e| / 0.25 rad): same
     far: float  # times exp(-d / 2 m): leads in from metres away
     joint: float  # times exp(-d / 0.1 m - |e| / 0.15 rad): asks for both at once
-    facing: float  # times (1 + cos e) / 2: no plateau at a quarter turn
+    joint_far: float  # times exp(-d / 1 m - |e| / 1 rad): RoboRAN tasks_cfg/go_to_pose_cfg.py
+    facing: float  # times exp(-d / 1 m) (1 + cos e) / 2: no plateau at a quarter turn, once there
     approach: float  # times metres come nearer
     turn: float  # times radians come nearer
 
@@ -89,7 +90,8 @@ class GoToPose:
             + w.heading * xp.exp(-e / 0.25)
             + w.far * xp.exp(-d / 2.0)
             + w.joint * xp.exp(-d / 0.1 - e / 0.15)
-            + w.facing * 0.5 * (1.0 + xp.cos(e))
+            + w.joint_far * xp.exp(-d - e)
+            + w.facing * xp.exp(-d) * 0.5 * (1.0 + xp.cos(e))
             + w.approach * (old.position - d)
             + w.turn * (xp.abs(old.heading) - e)
         )
