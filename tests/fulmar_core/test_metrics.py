@@ -8,28 +8,54 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.metrics import Trajectories, TrajectoryLog, episode_metrics, join, successes, summary
-from fulmar_core.state import planar_pose, planar_state
+from fulmar_core.figures import FIGURES
+from fulmar_core.goal import goal_at, stack_goals
+from fulmar_core.metrics import (
+    Judge,
+    Trajectories,
+    TrajectoryLog,
+    episode_metrics,
+    first_steps,
+    join,
+    successes,
+    summary,
+)
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
 POSE, POSITION = load_task("go_to_pose"), load_task("go_to_position")
+VELOCITIES, WAYPOINTS = load_task("track_velocities"), load_task("go_through_positions")
+AROUND = load_task("go_to_position_with_obstacles")
+PLATFORM = load_robot("floating_platform")
 DT = 0.2
 STEPS = 50
 WINDOW = 20  # 4 s
+NAN = float("nan")
 
 
-def trajectories(position=0.0, degrees=0.0, **others) -> Trajectories:
-    def rows(value):
-        return np.broadcast_to(np.atleast_2d(np.asarray(value, dtype=float)), (1, STEPS)).copy()
+def rows(value):
+    return np.broadcast_to(np.atleast_2d(np.asarray(value, dtype=float)), (1, STEPS)).copy()
 
+
+def trajectories(position=0.0, degrees=0.0, shares=0.0, **others) -> Trajectories:
+    """One episode of 10 s; what is not named is zero, or NaN where the tasks of poses do not ask."""
+    columns = {name: rows(others.get(name, 0.0)) for name in ("x", "y", "yaw", "speed", "yaw_rate", "goals")}
+    errors = {name: rows(others.get(name, NAN)) for name in ("velocity_error", "yaw_rate_error")}
+    events = {name: rows(others.get(name, 0.0)) != 0.0 for name in ("touching", "outside")}
     return Trajectories(
-        rows(position),
-        np.deg2rad(rows(degrees)),
-        rows(others.get("speed", 0.0)),
-        rows(others.get("yaw_rate", 0.0)),
-        rows(others.get("in_use", 0.0)),
+        **columns,
+        **errors,
+        **events,
+        position_error=rows(position),
+        heading_error=np.deg2rad(rows(degrees)),
+        shares=np.broadcast_to(np.asarray(shares, dtype=float), (1, STEPS, 2)),
         control_dt=DT,
     )
+
+
+def tracking(velocity=0.0, degrees_s=0.0, goals=0.0) -> Trajectories:
+    return trajectories(NAN, NAN, velocity_error=velocity, yaw_rate_error=np.deg2rad(degrees_s), goals=goals)
 
 
 def first(n, high, low):
@@ -54,7 +80,8 @@ def test_ot_is_the_share_of_steps_within_so_many_degrees_either_way(limit, share
 
 
 def test_alv_aav_and_aas_are_means_of_speed_turn_rate_and_use():
-    run = trajectories(speed=first(25, 0.2, 0.1), yaw_rate=first(25, -0.4, 0.2), in_use=first(10, 0.5, 0.0))
+    shares = np.stack((first(10, -0.3, 0.0), np.zeros(STEPS)), axis=-1)
+    run = trajectories(speed=first(25, 0.2, 0.1), yaw_rate=first(25, -0.4, 0.2), shares=shares)
     assert figure(run, "ALV_m_s") == pytest.approx(0.15)
     assert figure(run, "AAV_rad_s") == pytest.approx(0.3)
     assert figure(run, "AAS") == pytest.approx(0.1)
@@ -68,13 +95,13 @@ def test_final_errors_are_those_of_the_last_step():
 
 @pytest.mark.parametrize(("outside", "success"), [(STEPS - WINDOW, True), (STEPS - WINDOW + 1, False)])
 def test_success_is_the_whole_closing_window_inside_and_nothing_before_it(outside, success):
-    assert successes(trajectories(first(outside, 1.0, 0.04)), POSE).tolist() == [success]
-    assert successes(trajectories(0.0, first(outside, 90.0, 4.9)), POSE).tolist() == [success]
+    assert successes(trajectories(first(outside, 1.0, 0.09)), POSE).tolist() == [success]
+    assert successes(trajectories(0.0, first(outside, 90.0, 9.9)), POSE).tolist() == [success]
 
 
 def test_one_step_outside_in_the_window_is_no_success():
     position = np.zeros(STEPS)
-    position[-WINDOW // 2] = 0.051
+    position[-WINDOW // 2] = 0.101
     assert not successes(trajectories(position), POSE)[0]
 
 
@@ -120,22 +147,133 @@ def test_the_summary_has_mean_median_and_p95_of_every_figure_and_is_strict_json(
     json.dumps(statistics, allow_nan=False)
 
 
-def test_the_log_notes_errors_speed_turn_rate_and_valves_of_each_step():
-    log = TrajectoryLog(DT)
-    goal = planar_pose(np.zeros(2), np.zeros(2), np.zeros(2))
-    log.add(
-        planar_state(np.array([3.0, 1.0]), np.array([4.0, 0.0]), np.array([0.5, -0.5]), vx=0.6, vy=0.8),
-        goal,
-        np.zeros((2, 8)),
+def test_touching_anything_once_is_no_success_however_it_ends():
+    touched = np.zeros(STEPS)
+    touched[3] = 1.0
+    run = trajectories(0.01, NAN, touching=touched)
+    assert not successes(run, AROUND)[0]
+    assert figure(run, "collided", AROUND) == 1.0
+    assert successes(trajectories(0.01, NAN), AROUND)[0]
+
+
+def test_where_targets_are_counted_success_is_having_reached_enough_of_them():
+    enough = trajectories(2.0, NAN, goals=first(30, 0.0, WAYPOINTS.required))
+    too_few = trajectories(0.0, NAN, goals=WAYPOINTS.required - 1)
+    assert successes(join([enough, too_few]), WAYPOINTS).tolist() == [True, False]
+    assert figure(enough, "goals_reached", WAYPOINTS) == WAYPOINTS.required
+    assert figure(enough, "time_to_first_goal_s", WAYPOINTS) == pytest.approx(31 * DT)
+    assert "final_position_error_m" not in episode_metrics(enough, WAYPOINTS)
+
+
+def test_first_inside_does_not_mind_going_out_again():
+    position = first(10, 1.0, 0.0)
+    position[30] = 1.0
+    assert figure(trajectories(position), "first_inside_s") == pytest.approx(11 * DT)
+    assert np.isnan(figure(trajectories(1.0), "first_inside_s"))
+
+
+def test_velocity_errors_are_means_over_the_whole_episode():
+    run = tracking(first(25, 0.4, 0.0), first(25, -20.0, 0.0))
+    assert figure(run, "velocity_error_m_s", VELOCITIES) == pytest.approx(0.2)
+    assert figure(run, "yaw_rate_error_deg_s", VELOCITIES) == pytest.approx(10.0)
+    assert "time_to_target_s" not in episode_metrics(run, VELOCITIES)
+
+
+def test_settling_is_timed_for_each_target_and_a_target_never_held_counts_whole():
+    goals = np.where(np.arange(STEPS) < 25, 0.0, 1.0)
+    error = np.zeros(STEPS)
+    error[[0, 1, 2, 3, 25, 49]] = 1.0  # the first is held from its fifth step on, the second is not
+    run = tracking(error, goals=goals)
+    assert figure(run, "settling_time_s", VELOCITIES) == pytest.approx(0.5 * (4 + 25) * DT)
+    assert figure(run, "targets_held_percent", VELOCITIES) == 50.0
+
+
+def test_a_target_that_has_no_time_for_the_window_does_not_count():
+    goals = np.where(np.arange(STEPS) < STEPS - WINDOW + 1, 0.0, 1.0)
+    run = tracking(first(10, 1.0, 0.0), goals=goals)
+    assert figure(run, "settling_time_s", VELOCITIES) == pytest.approx(10 * DT)
+    assert figure(run, "targets_held_percent", VELOCITIES) == 100.0
+
+
+def test_settling_of_many_episodes_is_that_of_each():
+    rng = np.random.default_rng(1)
+    runs = [
+        tracking(rng.uniform(0.0, 0.25, STEPS).cumsum() % 0.21, goals=np.arange(STEPS) // length)
+        for length in (10, 20, 24, 25)
+    ]
+    together = episode_metrics(join(runs), VELOCITIES)
+    for name in ("settling_time_s", "targets_held_percent"):
+        np.testing.assert_array_equal(together[name], [figure(run, name, VELOCITIES) for run in runs])
+
+
+def test_control_variation_sums_changes_over_actuators_and_deviation_is_their_spread():
+    shares = np.zeros((STEPS, 2))
+    shares[::2, 0], shares[:, 1] = 1.0, 0.5
+    run = trajectories(shares=shares)
+    assert figure(run, "control_variation") == pytest.approx((STEPS + 0.5) / STEPS)
+    assert figure(run, "control_deviation") == pytest.approx(0.25), "0.5 and 0, on average"
+
+
+def test_success_by_the_words_of_the_thesis_looks_at_the_last_step_or_at_means():
+    late = trajectories(first(STEPS - 1, 1.0, 0.0))
+    assert figure(late, "thesis_success") == 1.0
+    assert not successes(late, POSE)[0]
+    assert figure(tracking(first(25, 0.38, 0.0)), "thesis_success", VELOCITIES) == 1.0
+    assert figure(tracking(first(25, 0.42, 0.0)), "thesis_success", VELOCITIES) == 0.0
+    assert figure(trajectories(1.0, NAN, goals=1.0), "thesis_success", WAYPOINTS) == 1.0
+
+
+def test_the_beginning_of_episodes_is_judged_like_episodes():
+    run = trajectories(first(10, 1.0, 0.0), goals=np.arange(STEPS) // 5, shares=1.0)
+    cut = first_steps(run, 10)
+    assert cut.shares.shape == (1, 10, 2)
+    assert figure(cut, "goals_reached", WAYPOINTS) == 1.0
+    assert np.isnan(figure(cut, "time_to_target_s"))
+
+
+@pytest.mark.parametrize("task", [POSE, POSITION, VELOCITIES, WAYPOINTS, AROUND], ids=lambda task: task.name)
+def test_every_figure_has_its_meaning_written_down(task):
+    run = tracking() if task is VELOCITIES else trajectories(0.0, 0.0 if task is POSE else NAN)
+    assert set(episode_metrics(run, task)) <= set(FIGURES)
+
+
+def states(x, y, yaw, *, vx=0.0, vy=0.0, yaw_rate=0.0) -> PlanarState:
+    return PlanarState(
+        *(
+            np.full(2, value) if np.ndim(value) == 0 else np.array(value)
+            for value in (x, y, yaw, vx, vy, yaw_rate)
+        )
     )
-    log.add(
-        planar_state(np.zeros(2), np.zeros(2), np.zeros(2), yaw_rate=-0.2),
-        goal,
-        np.array([[1.0] * 4 + [0.0] * 4] * 2),
-    )
+
+
+def test_the_log_notes_errors_motion_and_shares_of_each_step():
+    log = TrajectoryLog(PLATFORM, POSE, DT)
+    goal = stack_goals([goal_at((0.0, 0.0, 0.0))] * 2)
+    log.add(states([3.0, 1.0], [4.0, 0.0], [0.5, -0.5], vx=0.6, vy=0.8), goal, np.zeros((2, 8)))
+    log.add(states(0.0, 0.0, 0.0, yaw_rate=-0.2), goal, np.array([[1.0] * 4 + [0.0] * 4] * 2))
     run = log.trajectories()
-    np.testing.assert_allclose(run.position_error, [[5.0, 0.0], [1.0, 0.0]], atol=1e-12)
-    np.testing.assert_allclose(run.heading_error, [[-0.5, 0.0], [0.5, 0.0]], atol=1e-12)
-    np.testing.assert_allclose(run.speed, [[1.0, 0.0]] * 2, atol=1e-12)
-    np.testing.assert_allclose(run.yaw_rate, [[0.0, -0.2]] * 2, atol=1e-12)
-    np.testing.assert_allclose(run.actuators_in_use, [[0.0, 0.5]] * 2, atol=1e-12)
+    np.testing.assert_allclose(run.position_error, [[5.0, 0.0], [1.0, 0.0]], atol=1e-6)
+    np.testing.assert_allclose(run.heading_error, [[-0.5, 0.0], [0.5, 0.0]], atol=1e-6)
+    np.testing.assert_allclose(run.speed, [[1.0, 0.0]] * 2, atol=1e-6)
+    np.testing.assert_allclose(run.yaw_rate, [[0.0, -0.2]] * 2, atol=1e-6)
+    np.testing.assert_allclose(run.actuators_in_use, [[0.0, 0.5]] * 2, atol=1e-6)
+    np.testing.assert_allclose(run.variation, [[0.0, 4.0]] * 2, atol=1e-6)
+    assert np.isnan(run.velocity_error).all()
+    assert run.x.dtype == run.shares.dtype == np.float32
+
+
+def test_the_log_of_one_episode_has_the_axis_of_episodes_too():
+    log = TrajectoryLog(PLATFORM, POSITION, DT)
+    log.add(states(9.0, 0.0, 0.0)[0], goal_at((0.0, 0.0, 0.0)), np.zeros(8))
+    run = log.trajectories()
+    assert (run.x.shape, run.shares.shape, run.outside.shape) == ((1, 1), (1, 1, 8), (1, 1))
+    assert run.outside.tolist() == [[True]], "beyond the geofence of 8 m"
+
+
+def test_the_judge_counts_waypoints_by_the_tolerance_and_not_by_the_reach_of_controllers():
+    goal = goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
+    judge = Judge(WAYPOINTS, goal, DT)
+    between = 0.5 * (WAYPOINTS.reach + WAYPOINTS.tolerance.position)
+    state = states(between, 0.0, 0.0)[0]
+    assert WAYPOINTS.advance(goal, state, np.asarray(0.0)).done == 0.0
+    assert judge.see(state).done == 1.0

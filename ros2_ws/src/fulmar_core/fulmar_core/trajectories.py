@@ -1,0 +1,148 @@
+"""What happened in some episodes, step by step, and who counts their targets."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.goal import Goal
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """What happened after each control step of some episodes of equal length; NaN where a task does not ask."""
+
+    x: np.ndarray  # (episodes, steps) [m]
+    y: np.ndarray  # (episodes, steps) [m]
+    yaw: np.ndarray  # (episodes, steps) any multiple of a turn added [rad]
+    position_error: np.ndarray  # (episodes, steps) [m]
+    heading_error: np.ndarray  # (episodes, steps) [rad]
+    velocity_error: np.ndarray  # (episodes, steps) [m/s]
+    yaw_rate_error: np.ndarray  # (episodes, steps) [rad/s]
+    speed: np.ndarray  # (episodes, steps) [m/s]
+    yaw_rate: np.ndarray  # (episodes, steps) [rad/s]
+    shares: np.ndarray  # (episodes, steps, actuators) command as a share of the largest one, signed [-]
+    goals: np.ndarray  # (episodes, steps) targets reached, or over, so far
+    touching: np.ndarray  # (episodes, steps) whether the robot is at an obstacle
+    outside: np.ndarray  # (episodes, steps) whether it is beyond the geofence
+    control_dt: float  # [s]
+
+    @property
+    def actuators_in_use(self) -> np.ndarray:
+        """Share of actuators with a command other than zero, shape (episodes, steps) [-]."""
+        return np.asarray(np.mean(self.shares != 0.0, axis=-1))
+
+    @property
+    def effort(self) -> np.ndarray:
+        """Mean share of full command, shape (episodes, steps) [-]."""
+        return np.asarray(np.mean(np.abs(self.shares), axis=-1))
+
+    @property
+    def variation(self) -> np.ndarray:
+        """Sum over the actuators of how much their share changed, from rest on, shape (episodes, steps) [-]."""
+        before = np.concatenate((np.zeros_like(self.shares[:, :1]), self.shares[:, :-1]), axis=1)
+        return np.asarray(np.sum(np.abs(self.shares - before), axis=-1))
+
+
+COLUMNS = tuple(field.name for field in dataclasses.fields(Trajectories) if field.name != "control_dt")
+
+
+class TrajectoryLog:
+    """Collects steps of one episode or of a batch, as float32: thousands of episodes fit into memory."""
+
+    def __init__(self, robot: Robot, task: Task, control_dt: float) -> None:
+        """Begin empty; `control_dt` in seconds."""
+        self._robot, self._task, self._control_dt = robot, task, control_dt
+        self._columns: dict[str, list[np.ndarray]] = {name: [] for name in COLUMNS}
+
+    def add(self, truth: PlanarState, goal: Goal, command: np.ndarray) -> None:
+        """Note one control step.
+
+        Args:
+            truth: True state after the step, shapes () or (episodes,).
+            goal: Goal that the judge counts at that time, same leading shape.
+            command: What was applied, shape (n,) or (episodes, n).
+        """
+        values = _step_columns(self._robot, self._task, truth, goal)
+        values["shares"] = np.asarray(command) / self._robot.actuators.scale
+        shape = np.shape(truth.x)
+        for name, column in self._columns.items():
+            value = np.asarray(values[name])
+            dtype = bool if value.dtype == bool else np.float32
+            kept = np.empty(value.shape if name == "shares" else shape, dtype)
+            kept[...] = value
+            column.append(kept)
+
+    def trajectories(self) -> Trajectories:
+        """Everything noted so far; the log is empty afterwards."""
+        arrays = {}
+        for name in COLUMNS:
+            steps = np.stack(self._columns.pop(name), axis=-2 if name == "shares" else -1)
+            arrays[name] = steps[None] if steps.ndim == (2 if name == "shares" else 1) else steps
+        self._columns = {name: [] for name in COLUMNS}
+        return Trajectories(**arrays, control_dt=self._control_dt)
+
+
+def _step_columns(robot: Robot, task: Task, state: PlanarState, goal: Goal) -> dict[str, np.ndarray]:
+    errors, touching = task.errors(state, goal), task.collides(state, goal, robot)
+    unasked, none = np.asarray(np.nan), np.asarray(False)
+    far = none if errors.position is None else np.asarray(errors.position > robot.limits.geofence)
+    return {
+        "x": state.x,
+        "y": state.y,
+        "yaw": state.yaw,
+        "position_error": unasked if errors.position is None else errors.position,
+        "heading_error": unasked if errors.heading is None else errors.heading,
+        "velocity_error": unasked if errors.velocity is None else errors.velocity,
+        "yaw_rate_error": unasked if errors.yaw_rate is None else errors.yaw_rate,
+        "speed": state.speed,
+        "yaw_rate": state.yaw_rate,
+        "goals": goal.done,
+        "touching": none if touching is None else touching,
+        "outside": far,
+    }
+
+
+class Judge:
+    """Counts targets by the task's own tolerance, whatever the controller takes for reached."""
+
+    def __init__(self, task: Task, goal: Goal, control_dt: float) -> None:
+        """Begin an episode, or a batch of them."""
+        self._task, self._dt, self._steps = task, control_dt, 0
+        self.goal = goal
+
+    def see(self, truth: PlanarState) -> Goal:
+        """The goal after one more control step, by the true state at its end."""
+        self._steps += 1
+        counted = getattr(self._task, "counted", None)
+        if counted is not None:
+            self.goal = counted(self.goal, truth, self._task.tolerance.position)
+        else:
+            time_s = np.asarray(self._steps * self._dt)
+            self.goal = self._task.advance(self.goal, truth, time_s)
+        return self.goal
+
+
+def join(runs: list[Trajectories]) -> Trajectories:
+    """One set of trajectories out of several of equal length and rate."""
+    if len(runs) == 1:
+        return runs[0]
+    arrays = {name: np.concatenate([getattr(run, name) for run in runs]) for name in COLUMNS}
+    return Trajectories(**arrays, control_dt=runs[0].control_dt)
+
+
+def select(run: Trajectories, episodes: np.ndarray) -> Trajectories:
+    """Some episodes of a set, in the order of their indices."""
+    arrays = {name: getattr(run, name)[episodes] for name in COLUMNS}
+    return Trajectories(**arrays, control_dt=run.control_dt)
+
+
+def first_steps(run: Trajectories, steps: int) -> Trajectories:
+    """The beginning of every episode: so many control steps, or all there are."""
+    arrays = {name: getattr(run, name)[:, :steps] for name in COLUMNS}
+    return Trajectories(**arrays, control_dt=run.control_dt)
