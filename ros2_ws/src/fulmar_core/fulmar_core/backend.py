@@ -23,6 +23,7 @@ class Sample:
     odometry: RigidBodyState  # measured, without a batch axis
     imu: ImuSample | None  # None: the robot has no inertial unit
     truth: RigidBodyState | None  # None: not a simulator
+    block: np.ndarray | None = None  # (2,) where the thing to push is, in the world; None: there is none [m]
 
 
 class Backend(Protocol):

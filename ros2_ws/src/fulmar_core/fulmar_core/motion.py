@@ -27,7 +27,7 @@ def actuation_of(robot: Robot, safe: Array) -> ActuationState:
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
         response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
-    return ActuationState(response, binary=robot.actuators.binary, safe=safe)
+    return ActuationState(response, binary=robot.actuators.binary, scale=robot.actuators.scale, safe=safe)
 
 
 def may_be_late(robot: Robot, scenario: Scenario) -> bool:

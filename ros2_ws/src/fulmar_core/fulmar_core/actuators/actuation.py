@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from array_api_compat import array_namespace, device
 
 from fulmar_core.actuators.response import Response
@@ -12,15 +13,17 @@ from fulmar_core.rotation import Array
 class ActuationState:
     """What the actuators of a batch of worlds do now; actuators first, worlds last."""
 
-    def __init__(self, response: Response, *, binary: bool, safe: Array) -> None:
+    def __init__(self, response: Response, *, binary: bool, scale: np.ndarray, safe: Array) -> None:
         """Begin in the safe state.
 
         Args:
             response: Delay, slew and lag.
             binary: On/off actuators: errors act on what they do, not on the command.
+            scale: Largest command of each actuator, shape (n,).
             safe: Safe command of every world, shape (n, worlds), of the floating type to compute in.
         """
         self._response, self._binary = response, binary
+        self._scale = array_namespace(safe).asarray(scale, dtype=safe.dtype, device=device(safe))[:, None]
         self._before, self._wanted, self.applied = safe, safe, safe
         self.gain = array_namespace(safe).ones_like(safe)
         self._since_s = 0.0
@@ -58,7 +61,7 @@ class ActuationState:
             self._wanted = command * world.alive
             self.gain = world.gain * (1.0 + world.action_noise * noise)
         else:
-            self._wanted = (command + world.action_noise * noise) * world.alive
+            self._wanted = (command + world.action_noise * self._scale * noise) * world.alive
         self._since_s = 0.0
         self._late = self._response.delay_s + world.action_delay
 

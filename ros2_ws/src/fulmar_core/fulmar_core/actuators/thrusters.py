@@ -136,6 +136,8 @@ class Thrusters:
             Force ahead [N], to the left [N], and yaw moment [N·m], shapes (...,).
         """
         xp = array_namespace(applied)
+        if self.continuous:
+            applied = xp.clip(applied, 0.0, 1.0)  # whatever errors add, a valve does not suck
         thrust = applied * gain * self.thrust
         if self.shared_pressure:
             thrust = thrust / xp.clip(xp.sum(applied, axis=0), 1.0, None)

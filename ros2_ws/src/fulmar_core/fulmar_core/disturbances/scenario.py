@@ -53,7 +53,7 @@ class Kick:
 class Actuation:
     """What may be wrong with the actuators."""
 
-    noise: float = 0.0  # largest relative error at each control step, uniform [-]
+    noise: float = 0.0  # largest error at each control step, uniform, as a share of full command [-]
     gain: Range = (1.0, 1.0)  # each actuator's own factor, for a whole episode [-]
     delay_s: float = 0.0  # largest delay of commands [s]
     failures: int = 0  # most actuators that stay closed or still for a whole episode
@@ -143,7 +143,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     sensor_delay, dropout = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
     low, high = faults.gain
     gain = 1.0 + strength * (low + (high - low) * gain_share - 1.0)
-    measured = strength if scenario.sensor_noise else 0.0
+    own = 1.0 if scenario.sensor_noise else 0.0  # what the robot's YAML says of its sensors
     zero = xp.zeros_like(mass)
     return World(
         mass=mass,
@@ -166,9 +166,9 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
         kick=strength * force * kick.force * kick_size,
         kick_period=kick_period,
         kick_direction=kick_direction,
-        noise=zero + (sensing.noise if scenario.sensor_noise else 0.0),
-        sensor_bias=(measured * sensing.bias * bias).T,
-        sensor_scale=(measured * sensing.bias * scale).T,
+        noise=zero + own * (1.0 + strength * (sensing.noise - 1.0)),
+        sensor_bias=(own * (1.0 + strength * (sensing.bias - 1.0)) * bias).T,
+        sensor_scale=(own * (1.0 + strength * (sensing.bias - 1.0)) * scale).T,
         sensor_delay=strength * sensing.delay_s * sensor_delay,
         dropout=strength * sensing.dropout * dropout,
     )
