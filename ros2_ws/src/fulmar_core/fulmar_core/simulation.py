@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace, is_numpy_namespace
+from array_api_compat import is_numpy_namespace
 
 from fulmar_core.counter_rng import uniform_from, words, world_keys
 from fulmar_core.disturbances.scenario import Scenario
@@ -47,6 +47,7 @@ class BatchSimulation:
         *,
         worlds: int,
         seed: int,
+        first: int = 0,
         control_hz: float | None = None,
         training: bool = False,
         strength: float = 1.0,
@@ -61,7 +62,8 @@ class BatchSimulation:
             task: Says where episodes start.
             scenario: Says what may differ from world to world.
             worlds: Number of worlds, >= 1.
-            seed: World w draws its episodes from (seed, w).
+            seed: World w draws its episodes from (seed, first + w).
+            first: Number of the first world, >= 0.
             control_hz: Command rate; the robot's own by default [Hz].
             training: Start episodes where learning starts.
             strength: How much of the scenario counts [-].
@@ -71,10 +73,11 @@ class BatchSimulation:
         """
         self.robot, self.task, self.scenario, self.seed = robot, task, scenario, seed
         self.worlds, self.training, self.strength = worlds, training, strength
+        self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
         self.observer = Observer(robot, task)
         self._xp, self._device, self._dtype = xp, device, dtype or xp.float32
-        self._numbers = self._whole(np.arange(worlds))
+        self._numbers = self._whole(first + np.arange(worlds))
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
         self._delayed, self._off_centre = may_be_late(robot, scenario), may_be_off_centre(robot, scenario)
@@ -90,7 +93,7 @@ class BatchSimulation:
         self._safe = self._real(safe)
         self._actuation = actuation_of(robot, self._safe)
         self.command: Array = self._safe.T
-        self._begin(self._draw(np.arange(worlds), np.zeros(worlds, dtype=int)))
+        self._begin(self._draw(first + np.arange(worlds), np.zeros(worlds, dtype=int)))
 
     @property
     def control_dt(self) -> float:
@@ -113,7 +116,7 @@ class BatchSimulation:
         index = self._whole(which)
         self._repeats[index] = self._repeats[index] + 1
         repeats = np.asarray(self._repeats[index].tolist()) if self._on_torch else self._repeats[which]
-        drawn = self._draw(which, repeats)
+        drawn = self._draw(self._first + which, repeats)
         self._steps[index] = 0
         for name in COLUMNS:
             getattr(self.truth, name)[index] = self._real(getattr(drawn.start, name))
