@@ -5,46 +5,53 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.backend import Sample
-from fulmar_core.disturbances.scenario import World
-from fulmar_core.dynamics.rigid_body import Disturbance, MassProperties, step
+from fulmar_core.episode import Episode
+from fulmar_core.motion import move
+from fulmar_core.planar import PlanarState, rigid_of
 from fulmar_core.robot import Robot
-from fulmar_core.state import RigidBodyState, planar_state
+from sim_nodes.one_world import OneWorld
 
 
 class MockBackend:
     """One robot in the core's dynamics, measured without noise, without an inertial unit."""
 
     def __init__(self, robot: Robot) -> None:
-        """Begin at rest at the origin with the nominal body."""
+        """Prepare for `reset`."""
         self.robot = robot
-        self._state = planar_state(0.0, 0.0, 0.0)
-        self._body = MassProperties(np.array([robot.body.mass]), np.array(robot.body.inertia))
-        self._disturbance = Disturbance(np.zeros(3), np.zeros(3))
+        self._world = OneWorld(robot, noisy=False)
 
-    def reset(self, start: RigidBodyState, world: World, *, seed: int, number: int = 0) -> Sample:
-        """Begin anew; see `Backend.reset`. Nothing here is random."""
-        self._state = start
-        self._body = MassProperties(np.array([world.mass]), np.array(world.inertia))
-        self._disturbance = Disturbance(np.array(world.force_in_world), np.array(world.torque_in_world))
-        return Sample(self._state, None, self._state)
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
+        """Begin anew; see `Backend.reset`."""
+        start = episode.start
+        self._state = PlanarState(
+            *(np.array([getattr(start, name)], dtype=float) for name in PlanarState.__slots__)
+        )
+        sample = self._sample()
+        self._world.reset(episode, sample.odometry, seed=seed, number=number)
+        return sample
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Apply a command; see `Backend.step`."""
-        force, torque = self.robot.actuators.wrench_in_body(np.asarray(command, dtype=float))
-        self._state = step(
+        world = self._world
+        world.begin(np.asarray(command, dtype=float), ticks, rigid_of(self._state[0]))
+        self._state = move(
+            self.robot,
             self._state,
-            force,
-            torque,
-            body=self._body,
-            disturbance=self._disturbance,
-            planar=self.robot.body.planar,
-            dt=self.robot.timing.physics_dt,
+            world.actuation,
+            world.world,
+            world.outside,
             substeps=ticks,
+            delayed=world.delayed,
+            off_centre=bool(world.world.com_x[0] or world.world.com_y[0]),
         )
-        return Sample(self._state, None, self._state)
+        return self._sample()
 
     def make_safe(self) -> None:
         """Nothing to do: a command acts only during a step."""
 
     def close(self) -> None:
         """Nothing to release."""
+
+    def _sample(self) -> Sample:
+        truth = rigid_of(self._state[0])
+        return Sample(truth, None, truth)

@@ -1,4 +1,4 @@
-"""MuJoCo as a backend: it integrates the bodies, the core supplies forces, noise and names."""
+"""MuJoCo as a backend: it integrates the bodies, the core supplies commands, pushes, noise and names."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import mujoco
 import numpy as np
 
 from fulmar_core.backend import Sample
-from fulmar_core.disturbances.scenario import World
-from fulmar_core.episode import NOISE, episode_rng
+from fulmar_core.counter_rng import NOISE
+from fulmar_core.episode import Episode
 from fulmar_core.errors import SafetyError
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample, measure_imu
-from fulmar_core.sensors.odometry import measure_odometry
 from fulmar_core.state import RigidBodyState
-from sim_nodes.mujoco_model import BODY, build_model
+from sim_nodes.mujoco_model import Scene
+from sim_nodes.mujoco_model.obstacles import radii_for
+from sim_nodes.one_world import OneWorld
+
+SENSORS = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), ("accelerometer", 3))
 
 
 class MujocoBackend:
@@ -27,40 +30,35 @@ class MujocoBackend:
             sensor_noise: Whether odometry and inertial unit have the noise of the robot's YAML.
         """
         self.robot = robot
-        self.model = build_model(robot)
-        self.data = mujoco.MjData(self.model)
         self._noisy = sensor_noise
-        self._rng = episode_rng(0, 0, stream=NOISE)
-        self._body = self.model.body(BODY).id
-        self._height = float(self.model.body(BODY).pos[2])
-        self._at = {
-            name: slice(int(self.model.sensor(name).adr[0]), int(self.model.sensor(name).adr[0] + width))
-            for name, width in (
-                ("position", 3),
-                ("attitude", 4),
-                ("velocity", 3),
-                ("gyroscope", 3),
-                ("accelerometer", 3),
-            )
-        }
+        self._rng = np.random.default_rng()
+        self._world = OneWorld(robot, noisy=sensor_noise)
+        self._enter(Scene(robot))
 
-    def reset(self, start: RigidBodyState, world: World, *, seed: int, number: int = 0) -> Sample:
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model; another one after a reset with other obstacles."""
+        return self._scene.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """Its state."""
+        return self._scene.data
+
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Begin anew; see `Backend.reset`."""
-        self._rng = episode_rng(seed, number, stream=NOISE)
-        self.model.body_mass[self._body] = world.mass
-        self.model.body_inertia[self._body] = world.inertia
-        mujoco.mj_setConst(self.model, self.data)
-        mujoco.mj_resetData(self.model, self.data)
-        x, y, z, w = start.quat_xyzw
-        omega = start.angular_velocity_in_body
-        if self.robot.body.planar:
-            self.data.qpos[:] = (*start.position_in_world[:2], float(start.yaw))
-            self.data.qvel[:] = (*start.velocity_in_world[:2], omega[2])
-        else:
-            self.data.qpos[:] = (*start.position_in_world, w, x, y, z)
-            self.data.qvel[:] = (*start.velocity_in_world, *omega)
-        self.data.xfrc_applied[self._body] = (*world.force_in_world, *world.torque_in_world)
-        return self._sample()
+        obstacles = np.asarray(episode.goal.obstacles, dtype=float)
+        if not self._scene.has_room_for(obstacles):
+            self._enter(Scene(self.robot, radii_for(obstacles)))
+        scene, machine = self._scene, self._scene.machine
+        machine.take_world(scene.model, episode.world)
+        mujoco.mj_setConst(scene.model, scene.data)
+        mujoco.mj_resetData(scene.model, scene.data)
+        machine.place(scene.model, scene.data, episode.start)
+        scene.place_obstacles(obstacles)
+        self._rng = np.random.default_rng((seed, number, NOISE))
+        truth, imu = self._read()
+        return self._sample(truth, imu, self._world.reset(episode, truth, seed=seed, number=number))
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Apply a command; see `Backend.step`.
@@ -68,37 +66,47 @@ class MujocoBackend:
         Raises:
             SafetyError: If the simulation left the finite numbers, with the state it had.
         """
-        self.data.ctrl[:] = self.robot.actuators.thrusts(np.asarray(command, dtype=float))
-        mujoco.mj_step(self.model, self.data, ticks)
-        if not np.isfinite(self.data.qpos).all():
-            raise SafetyError(
-                f"MuJoCo's state is not finite at t = {self.data.time:.2f} s: {self.data.qpos}."
-            )
-        return self._sample()
+        model, data, machine, world = self.model, self.data, self._scene.machine, self._world
+        world.begin(np.asarray(command, dtype=float), ticks, self._truth)
+        outside = tuple(float(part[0]) for part in world.outside)
+        dt = self.robot.timing.physics_dt
+        for _ in range(ticks):
+            applied = world.actuation.advance(dt, delayed=world.delayed)
+            machine.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
+            mujoco.mj_step(model, data, machine.steps_per_tick)
+        if not np.isfinite(data.qpos).all():
+            raise SafetyError(f"MuJoCo's state is not finite at t = {data.time:.2f} s: {data.qpos}.")
+        truth, imu = self._read()
+        return self._sample(truth, imu, world.measure(truth))
 
     def make_safe(self) -> None:
-        """Close the valves."""
+        """Bring the actuators to rest."""
         self.data.ctrl[:] = 0.0
 
     def close(self) -> None:
-        """Close the valves; MuJoCo itself needs no closing."""
+        """Bring the actuators to rest; MuJoCo itself needs no closing."""
         self.make_safe()
 
-    def _sample(self) -> Sample:
+    def _enter(self, scene: Scene) -> None:
+        self._scene = scene
+        self._at = {
+            name: slice(int(scene.model.sensor(name).adr[0]), int(scene.model.sensor(name).adr[0]) + width)
+            for name, width in SENSORS
+        }
+
+    def _read(self) -> tuple[RigidBodyState, ImuSample]:
+        """True state and reading of the inertial unit."""
         # mj_step leaves the sensors as they were before its last integration step.
         mujoco.mj_forward(self.model, self.data)
         read = {name: np.array(self.data.sensordata[at]) for name, at in self._at.items()}
         position = read["position"]
-        if self.robot.body.planar:
-            position[2] -= self._height
+        position[2] -= self._scene.machine.rest_height
         w, x, y, z = read["attitude"]
         truth = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
-        imu = ImuSample(read["accelerometer"], read["gyroscope"])
-        if not self._noisy:
-            return Sample(truth, imu, truth)
-        sensors = self.robot.sensors
-        return Sample(
-            measure_odometry(truth, sensors.odometry, self._rng),
-            measure_imu(imu, sensors.imu, self._rng),
-            truth,
-        )
+        return truth, ImuSample(read["accelerometer"], read["gyroscope"])
+
+    def _sample(self, truth: RigidBodyState, imu: ImuSample, odometry: RigidBodyState) -> Sample:
+        self._truth = truth
+        if self._noisy:
+            imu = measure_imu(imu, self.robot.sensors.imu, self._rng)
+        return Sample(odometry, imu, truth)

@@ -23,6 +23,7 @@ class Sample:
     odometry: RigidBodyState  # measured, without a batch axis
     imu: ImuSample | None  # None: the robot has no inertial unit
     truth: RigidBodyState | None  # None: not a simulator
+    block: np.ndarray | None = None  # (2,) where the thing to push is [m]; None: there is none
     block: np.ndarray | None = None  # (2,) where the thing to push is, in the world; None: there is none [m]
 
 
@@ -47,6 +48,8 @@ class Backend(Protocol):
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Apply a command for some physics steps.
+
+        Several at once are a control step. One at a time, a command that stays the same goes on as it was.
 
         Args:
             command: Within the actuators' limits, shape (n,).

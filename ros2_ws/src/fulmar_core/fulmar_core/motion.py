@@ -66,8 +66,25 @@ def control_step(
     Returns:
         State after `substeps` physics steps.
     """
+    outside = outside_wrench(state, world, time_s, substeps * robot.timing.physics_dt)
+    return move(
+        robot, state, actuation, world, outside, substeps=substeps, delayed=delayed, off_centre=off_centre
+    )
+
+
+def move(
+    robot: Robot,
+    state: PlanarState,
+    actuation: ActuationState,
+    world: World,
+    outside: Wrench,
+    *,
+    substeps: int,
+    delayed: bool,
+    off_centre: bool,
+) -> PlanarState:
+    """Move under a push that stays the same; arguments as in `control_step`."""
     dt = robot.timing.physics_dt
-    outside = outside_wrench(state, world, time_s, substeps * dt)
     if isinstance(robot.actuators, Rolling):
         for _ in range(substeps):
             target = actuation.advance(dt, delayed=delayed)

@@ -1,18 +1,19 @@
-"""Forces of still water on a hull at its surface, in the plane (Fossen, "Handbook of Marine Craft", 2011, §6.5 and §8.1).
+"""Forces of still water on a hull at its surface (Fossen, "Handbook of Marine Craft", 2011, §4.2, §6.3 to §6.5, §8.1).
 
-Heave, roll and pitch belong to the simulator that has them; their numbers stand here all the same, one definition for
-every user.
+The core's own dynamics move in the plane; simulators that also heave, roll and pitch take the six-dimensional functions.
+A six-vector is [surge, sway, heave, roll, pitch, yaw] in the body's frame: velocities [m/s, rad/s] or forces [N, N·m].
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from array_api_compat import array_namespace
+from array_api_compat import array_namespace, device
 
-from fulmar_core.rotation import Array
+from fulmar_core.rotation import Array, cross
 
 Six = tuple[float, float, float, float, float, float]
+GRAVITY = 9.81  # [m/s²]
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,25 @@ class Hydrostatics:
             raise ValueError("water_density, waterplane_area and draught must be greater than 0.")
         if min(self.metacentric_height_roll, self.metacentric_height_pitch) <= 0.0:
             raise ValueError("metacentric heights must be greater than 0: the hull would capsize.")
+
+    def wrench(self, rise: Array, up_in_body: Array, weight: Array) -> tuple[Array, Array]:
+        """Buoyancy of a hull with vertical walls, and what rights it.
+
+        Args:
+            rise: Height above where the hull floats at rest, shape (...,) [m].
+            up_in_body: The world's z axis in the body's frame, shape (..., 3).
+            weight: What floats, shape (...,) [N].
+
+        Returns:
+            Force along the world's z axis, shape (...,) [N], never downwards; moment about the centre of mass in the
+            body's frame, shape (..., 3) [N·m].
+        """
+        xp = array_namespace(rise)
+        force = xp.clip(weight - self.water_density * GRAVITY * self.waterplane_area * rise, 0.0, None)
+        # sin(roll) cos(pitch) is the y part of the upward axis, -sin(pitch) its x part.
+        roll = -weight * self.metacentric_height_roll * up_in_body[..., 1]
+        pitch = weight * self.metacentric_height_pitch * up_in_body[..., 0]
+        return force, xp.stack((roll, pitch, xp.zeros_like(roll)), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -65,6 +85,48 @@ class Hydrodynamics:
             -(dv + qv * xp.abs(v)) * v,
             -(dr + qr * xp.abs(r)) * r,
         )
+
+    def damping(self, velocity: Array) -> Array:
+        """Drag of the water.
+
+        Args:
+            velocity: Of the centre of mass through the water, shape (..., 6).
+
+        Returns:
+            Force and moment, shape (..., 6).
+        """
+        xp = array_namespace(velocity)
+        kind = {"dtype": velocity.dtype, "device": device(velocity)}
+        linear = xp.asarray(self.linear_damping, **kind)
+        quadratic = xp.asarray(self.quadratic_damping, **kind)
+        return -(linear + quadratic * xp.abs(velocity)) * velocity
+
+    def with_added_mass(self, wrench: Array, velocity: Array, mass: Array, inertia: Array) -> Array:
+        """Wrench under which a body without added mass moves as one with it does.
+
+        With M the body's own mass and A the added one, both diagonal, the hull obeys (Fossen, eq. 6.10 and 6.43)
+        (M + A) v' + C_M(v) v + C_A(v) v = wrench. A simulator that knows M alone needs M v' + C_M(v) v.
+
+        Args:
+            wrench: Everything else that acts on the centre of mass, shape (..., 6).
+            velocity: Of the centre of mass, shape (..., 6).
+            mass: Of the body, shape (..., 1) [kg].
+            inertia: Its principal moments, shape (..., 3) [kg·m²].
+
+        Returns:
+            Shape (..., 6).
+        """
+        if max(self.added_mass) == 0.0:
+            return wrench
+        xp = array_namespace(wrench)
+        added = xp.asarray(self.added_mass, dtype=wrench.dtype, device=device(wrench))
+        own = xp.concat((xp.broadcast_to(mass, inertia.shape), inertia), axis=-1)
+        v, omega = velocity[..., :3], velocity[..., 3:]
+        of_body = xp.concat((mass * cross(omega, v), cross(omega, inertia * omega)), axis=-1)
+        momentum = added * velocity
+        p, h = momentum[..., :3], momentum[..., 3:]
+        of_water = xp.concat((cross(omega, p), cross(v, p) + cross(omega, h)), axis=-1)
+        return own * (wrench - of_body - of_water) / (own + added) + of_body
 
     @property
     def planar_added_mass(self) -> tuple[float, float, float]:

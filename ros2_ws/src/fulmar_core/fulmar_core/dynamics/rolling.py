@@ -12,10 +12,10 @@ from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.free_body import Wrench
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
-GRAVITY = 9.81  # [m/s²]
 SERVO_S = 0.05  # time constant of a wheel's speed servo where the drive names none [s]
 
 

@@ -1,0 +1,137 @@
+"""Bodies that float on air, in space or on water, pushed at some places: thrusters and propellers."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.disturbances.world import World
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot
+from sim_nodes.mujoco_model.surroundings import BODY, GRAVITY, add_hull
+from sim_nodes.mujoco_model.water import Water
+
+
+class Floater:
+    """One body under forces at fixed places.
+
+    A planar robot gets two slides and a hinge and stands on a floor under gravity, which holds it up but pushes nowhere.
+    A robot with hydrodynamics swims. Any other robot floats free without gravity. One actuator for each nozzle or propeller
+    pushes at its place along its direction, and takes newtons.
+    """
+
+    steps_per_tick = 1
+
+    def __init__(self, robot: Robot) -> None:
+        """Prepare for `add`."""
+        self._robot, self._actuators = robot, robot.actuators
+        self._body = 0
+        self._water = None if robot.hydrodynamics is None else Water(robot.hydrodynamics)
+        self._swims = self._water is not None
+        self._planar = robot.body.planar
+        self._world: World | None = None
+
+    @property
+    def rest_height(self) -> float:
+        """The floor is at z = 0, and so is still water."""
+        return 0.5 * self._robot.body.height if self._planar and not self._swims else 0.0
+
+    def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
+        """Add the body; see `Machine.add`."""
+        robot = self._robot
+        spec.option.gravity = [0.0, 0.0, -GRAVITY if self._planar or self._swims else 0.0]
+        body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, self.rest_height])
+        if self._planar:
+            body.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0])
+            body.add_joint(name="y", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0])
+            body.add_joint(name="yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+        else:
+            body.add_freejoint(name="free")
+        body.explicitinertial = True
+        # Else MuJoCo takes the body's own place for that of its centre of mass.
+        body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        body.mass, body.inertia = robot.body.mass, list(robot.body.inertia)
+        low = -0.5 * robot.body.height
+        if robot.hydrodynamics is not None:
+            low = -robot.hydrodynamics.hydrostatics.draught
+        add_hull(
+            body,
+            footprint=robot.body.footprint,
+            radius=robot.body.radius,
+            low=low,
+            high=low + robot.body.height,
+        )
+        for name, position, direction in self._pushes():
+            _add_push(spec, body, name, position, direction)
+        return body
+
+    def bind(self, model: mujoco.MjModel) -> None:
+        """Look up the body."""
+        self._body = model.body(BODY).id
+
+    def take_world(self, model: mujoco.MjModel, world: World) -> None:
+        """Take mass, inertia and centre of mass; the whole inertia grows and shrinks with that about z."""
+        nominal = np.array(self._robot.body.inertia)
+        model.body_mass[self._body] = world.mass
+        model.body_inertia[self._body] = nominal * (world.yaw_inertia / nominal[2])
+        model.body_ipos[self._body] = (world.com_x, world.com_y, 0.0)
+        self._world = world
+        if self._water is not None:
+            self._water.take_world(world, model.body_inertia[self._body])
+
+    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
+        """Put the body where it starts, upright and at rest height."""
+        if self._planar:
+            data.qpos[:3] = start.x, start.y, start.yaw
+            data.qvel[:3] = start.vx, start.vy, start.yaw_rate
+        else:
+            half = 0.5 * float(start.yaw)
+            data.qpos[:7] = start.x, start.y, self.rest_height, np.cos(half), 0.0, 0.0, np.sin(half)
+            data.qvel[:6] = start.vx, start.vy, 0.0, 0.0, 0.0, start.yaw_rate
+
+    def drive(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        applied: np.ndarray,
+        gain: np.ndarray,
+        outside: tuple[float, float, float],
+    ) -> None:
+        """Set thrusts, the push of the surroundings and the forces of the water; see `Machine.drive`."""
+        actuators = self._actuators
+        if isinstance(actuators, Thrusters):
+            data.ctrl[:] = actuators.thrusts(applied) * gain
+        else:
+            data.ctrl[:] = actuators.thrust(applied) * gain
+        fx, fy, torque = outside
+        wrench = (fx, fy, 0.0, 0.0, 0.0, torque)
+        if self._water is not None:
+            wrench = self._water.wrench(model, data, self._body, wrench)
+        data.xfrc_applied[self._body] = wrench
+
+    def _pushes(self) -> list[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
+        """Name, place and direction of everything that pushes."""
+        if isinstance(self._actuators, Thrusters):
+            return [(nozzle.name, nozzle.position, nozzle.direction) for nozzle in self._actuators.nozzles]
+        return [(each.name, each.position, (1.0, 0.0, 0.0)) for each in self._actuators.propellers]
+
+
+def _add_push(
+    spec: mujoco.MjSpec,
+    body: mujoco.MjsBody,
+    name: str,
+    position: tuple[float, float, float],
+    direction: tuple[float, float, float],
+) -> None:
+    length = sum(part * part for part in direction) ** 0.5
+    body.add_site(name=name, pos=list(position), size=[0.02, 0.02, 0.02], rgba=[0.9, 0.4, 0.2, 1])
+    spec.add_actuator(
+        name=name,
+        trntype=mujoco.mjtTrn.mjTRN_SITE,
+        target=name,
+        gear=[*(part / length for part in direction), 0.0, 0.0, 0.0],
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_NONE,
+        dyntype=mujoco.mjtDyn.mjDYN_NONE,
+    )

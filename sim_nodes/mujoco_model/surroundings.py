@@ -1,0 +1,78 @@
+"""What every model has: the floor, light, a camera, and the sensors on the body."""
+
+from __future__ import annotations
+
+import mujoco
+
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
+
+BODY, IMU_SITE = "base_link", "imu_link"
+FLOOR_BIT, THING_BIT = 1, 2  # what touches the floor, and what touches one another above it
+
+HULL_COLOUR = [0.25, 0.45, 0.7, 1.0]
+DARK = [0.15, 0.15, 0.17, 1.0]
+
+
+def add_surroundings(spec: mujoco.MjSpec, colour: list[float]) -> None:
+    """Add a floor at z = 0, a sun and a camera above.
+
+    Args:
+        spec: Model under construction.
+        colour: Of the floor, or of the water; red, green, blue, opacity.
+    """
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[10, 10, 0.1],
+        rgba=colour,
+        contype=0,
+        conaffinity=FLOOR_BIT,
+    )
+    spec.worldbody.add_light(name="sun", pos=[0, 0, 6], dir=[0, 0, -1])
+    spec.worldbody.add_camera(name="above", pos=[0, 0, 9], fovy=50)
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960
+
+
+def add_sensors(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
+    """Add an inertial unit at the body's origin, and sensors of the truth."""
+    body.add_site(name=IMU_SITE, pos=[0.0, 0.0, 0.0])
+    on_body = {"objtype": mujoco.mjtObj.mjOBJ_XBODY, "objname": BODY}
+    on_site = {"objtype": mujoco.mjtObj.mjOBJ_SITE, "objname": IMU_SITE}
+    spec.add_sensor(name="position", type=mujoco.mjtSensor.mjSENS_FRAMEPOS, **on_body)
+    spec.add_sensor(name="attitude", type=mujoco.mjtSensor.mjSENS_FRAMEQUAT, **on_body)
+    spec.add_sensor(name="velocity", type=mujoco.mjtSensor.mjSENS_FRAMELINVEL, **on_body)
+    spec.add_sensor(name="gyroscope", type=mujoco.mjtSensor.mjSENS_GYRO, **on_site)
+    spec.add_sensor(name="accelerometer", type=mujoco.mjtSensor.mjSENS_ACCELEROMETER, **on_site)
+
+
+def add_hull(
+    body: mujoco.MjsBody,
+    *,
+    footprint: tuple[float, float] | None,
+    radius: float,
+    low: float,
+    high: float,
+    ahead: float = 0.0,
+) -> None:
+    """Add the outline that touches obstacles and blocks; it weighs nothing and never touches the floor.
+
+    Args:
+        body: The body.
+        footprint: Length and width of a box; None for a cylinder [m].
+        radius: Of the cylinder [m].
+        low: Bottom, in the body's frame [m].
+        high: Top [m].
+        ahead: Of the outline's centre, ahead of the body's origin [m].
+    """
+    half = 0.5 * (high - low)
+    box = footprint is not None
+    body.add_geom(
+        name="hull",
+        type=mujoco.mjtGeom.mjGEOM_BOX if box else mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[0.5 * footprint[0], 0.5 * footprint[1], half] if box else [radius, half, 0.0],
+        pos=[ahead, 0.0, 0.5 * (low + high)],
+        rgba=HULL_COLOUR,
+        mass=0.0,
+        contype=THING_BIT,
+        conaffinity=THING_BIT,
+    )

@@ -1,0 +1,144 @@
+"""One episode between command and actuator, and between truth and measurement: the core's code on a batch of one.
+
+Whoever integrates the bodies, failures, noise, delays, pushes and sensors are those of the core's batch.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fulmar_core.counter_rng import uniform_from, words, world_keys
+from fulmar_core.disturbances.outside import outside_wrench
+from fulmar_core.disturbances.world import FIELDS, World
+from fulmar_core.episode import Episode
+from fulmar_core.motion import actuation_of
+from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import from_yaw, multiply
+from fulmar_core.sensors.odometer import Odometer
+from fulmar_core.simulation import ACTUATOR_NOISE
+from fulmar_core.state import RigidBodyState
+
+
+class OneWorld:
+    """Actuators, surroundings and odometry of one episode after another.
+
+    Attributes:
+        world: What was drawn for the episode, as a batch of one.
+        actuation: What the actuators do.
+        outside: Push of the surroundings in the current control step: force along x and y [N], yaw moment [N·m], shapes (1,).
+        delayed: Whether commands act late.
+    """
+
+    def __init__(self, robot: Robot, *, noisy: bool) -> None:
+        """Prepare for `reset`.
+
+        Args:
+            robot: The robot.
+            noisy: Whether the odometry is as the robot's YAML says, or perfect.
+        """
+        self._robot, self._noisy = robot, noisy
+        self._safe = np.array(robot.actuators.safe_command)[:, None]
+
+    def reset(self, episode: Episode, truth: RigidBodyState, *, seed: int, number: int) -> RigidBodyState:
+        """Begin anew.
+
+        Args:
+            episode: Without a batch axis.
+            truth: Where the robot is.
+            seed: Of the noise.
+            number: Of the episode.
+
+        Returns:
+            First measurement.
+        """
+        drawn = episode.world
+        self.world = World(*(np.asarray(getattr(drawn, name), dtype=float)[..., None] for name in FIELDS))
+        self.actuation = actuation_of(self._robot, self._safe)
+        self.delayed = bool(self._robot.actuators.response.delay_s + self.world.action_delay[0] > 0.0)
+        self.outside = tuple(np.zeros(1) for _ in range(3))
+        self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
+        self._ticks = 0
+        self._begun = 0  # control steps
+        self._left = 0  # ticks until the next one begins at the latest
+        self._command: np.ndarray | None = None
+        self._measured = 0
+        self._first = truth
+        self._start_odometer(self._robot.timing.substeps(self._robot.timing.control_hz))
+        return self._measure(truth)
+
+    def begin(self, command: np.ndarray, ticks: int, truth: RigidBodyState) -> None:
+        """Take a command for some physics ticks.
+
+        Several ticks are a control step of their own. With one tick at a time, a control step begins with each new command,
+        and with an old one after the robot's own control period.
+
+        Args:
+            command: Within the actuators' limits, shape (n,).
+            ticks: >= 1.
+            truth: Where the robot is.
+        """
+        nominal = self._robot.timing.substeps(self._robot.timing.control_hz)
+        if self._measured == 1 and ticks != self._period:
+            self._start_odometer(ticks)
+            self._measured = 0
+            self._measure(self._first)
+        changed = self._command is None or not np.array_equal(command, self._command)
+        if ticks > 1 or changed or self._left <= 0:
+            self._command = np.array(command, dtype=float)
+            self.actuation.begin(self._command[:, None], self.world, self._noise())
+            span = (ticks if ticks > 1 else nominal) * self._robot.timing.physics_dt
+            time_s = np.array([self._ticks * self._robot.timing.physics_dt])
+            self.outside = outside_wrench(_batch_of_one(planar_of(truth)), self.world, time_s, span)
+            self._begun += 1
+            self._left = nominal
+        self._left -= ticks
+        self._ticks += ticks
+
+    def measure(self, truth: RigidBodyState) -> RigidBodyState:
+        """What the odometry reports now; called once for each `begin`, at its end."""
+        return self._measure(truth)
+
+    def _noise(self) -> np.ndarray | None:
+        if not self.world.action_noise[0]:
+            return None
+        keys = world_keys(self._seed, self._numbers, self._repeats, ACTUATOR_NOISE)
+        bits = words(keys, np.array([self._begun]), len(self._safe))
+        return 2.0 * uniform_from(bits, np.float64) - 1.0
+
+    def _start_odometer(self, ticks: int) -> None:
+        self._period = ticks
+        self._odometer = Odometer(
+            self._robot.sensors.odometry,
+            seed=self._seed,
+            period=ticks * self._robot.timing.physics_dt,
+            max_delay_s=float(self.world.sensor_delay[0]),
+            noisy=self._noisy,
+        )
+
+    def _measure(self, truth: RigidBodyState) -> RigidBodyState:
+        if not self._noisy:
+            return truth
+        true = planar_of(truth)
+        steps = np.array([self._measured])
+        self._measured += 1
+        batch = self._odometer.measure(
+            _batch_of_one(true), self.world, self._numbers, self._repeats, steps
+        )
+        return _tilted(batch[0], truth, true)
+
+
+def _batch_of_one(state: PlanarState) -> PlanarState:
+    return PlanarState(*(np.reshape(getattr(state, name), (1,)) for name in PlanarState.__slots__))
+
+
+def _tilted(measured: PlanarState, truth: RigidBodyState, true: PlanarState) -> RigidBodyState:
+    """A planar measurement with the true height, roll and pitch."""
+    position, velocity = truth.position_in_world, truth.velocity_in_world
+    omega = truth.angular_velocity_in_body
+    return RigidBodyState(
+        np.array([measured.x, measured.y, position[2]]),
+        multiply(from_yaw(measured.yaw - true.yaw), truth.quat_xyzw),
+        np.array([measured.vx, measured.vy, velocity[2]]),
+        np.array([omega[0], omega[1], measured.yaw_rate]),
+    )
