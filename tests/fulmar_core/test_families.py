@@ -1,4 +1,4 @@
-"""What commands mean, family by family: propellers, two driven wheels, steered wheels; thrusters have their own file."""
+"""What commands mean: propellers, two driven wheels, steered wheels; thrusters have their own file."""
 
 from __future__ import annotations
 

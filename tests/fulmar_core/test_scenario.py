@@ -1,77 +1,241 @@
-"""Disturbances, drawn once an episode."""
+"""Disturbances, drawn once an episode: each entry of a scenario says what it changes, and changes nothing else."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import draw_world, load_scenario
+from fulmar_core.counter_rng import WORLD, Draws
+from fulmar_core.disturbances.scenario import (
+    Actuation,
+    Kick,
+    Push,
+    Scenario,
+    Sensing,
+    Wave,
+    draw_world,
+    load_scenario,
+)
+from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.errors import UnknownNameError
+from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 
-ROBOT = load_robot("floating_platform")
+ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+PLATFORM, BOAT = ROBOTS["floating_platform"], ROBOTS["kingfisher"]
+COUNT = 2000
+STILL = Scenario("nothing happens", sensor_noise=False, body="nominal")
+SEEING = replace(STILL, sensor_noise=True)
+ALL = Scenario(
+    "everything happens", sensor_noise=True, body="uncertain",
+    push=Push(0.2, 0.1), wave=Wave(0.1, 0.05), kick=Kick(0.3),
+    actuation=Actuation(0.05, (0.8, 1.1), 0.04, 2, 0.5), sensing=Sensing(2.0, 2.0, 0.1, 0.2),
+)  # fmt: skip
+
+# What is changed, by which entry, of which scenario, and which part of a world may differ for it.
+ENTRIES = {
+    "body": (STILL, {"body": "uncertain"}, {"mass", "yaw_inertia", "com_x", "com_y", "drag"}),
+    "sensor_noise": (STILL, {"sensor_noise": True}, {"noise", "sensor_bias", "sensor_scale"}),
+    "push.force": (STILL, {"push": Push(force=0.1)}, {"force_x", "force_y"}),
+    "push.torque": (STILL, {"push": Push(torque=0.1)}, {"torque"}),
+    "push.least": (
+        replace(STILL, push=Push(0.1, 0.1)),
+        {"push": Push(0.1, 0.1, least=0.9)},
+        {"force_x", "force_y", "torque"},
+    ),
+    "wave.force": (STILL, {"wave": Wave(force=0.1)}, {"wave_force"}),
+    "wave.torque": (STILL, {"wave": Wave(torque=0.1)}, {"wave_torque"}),
+    "wave.wave_number": (STILL, {"wave": Wave(wave_number=(5.0, 6.0))}, {"wave_number"}),
+    "kick.force": (STILL, {"kick": Kick(force=0.1)}, {"kick"}),
+    "kick.every_s": (STILL, {"kick": Kick(every_s=(8.0, 9.0))}, {"kick_period"}),
+    "actuation.noise": (STILL, {"actuation": Actuation(noise=0.1)}, {"action_noise"}),
+    "actuation.gain": (STILL, {"actuation": Actuation(gain=(0.8, 0.9))}, {"gain"}),
+    "actuation.delay_s": (STILL, {"actuation": Actuation(delay_s=0.1)}, {"action_delay"}),
+    "actuation.failures": (
+        replace(STILL, actuation=Actuation(failure_chance=1.0)),
+        {"actuation": Actuation(failures=1, failure_chance=1.0)},
+        {"alive"},
+    ),
+    "actuation.failure_chance": (
+        replace(STILL, actuation=Actuation(failures=1)),
+        {"actuation": Actuation(failures=1, failure_chance=0.9)},
+        {"alive"},
+    ),
+    "sensing.noise": (SEEING, {"sensing": Sensing(noise=2.0)}, {"noise"}),
+    "sensing.bias": (SEEING, {"sensing": Sensing(bias=2.0)}, {"sensor_bias", "sensor_scale"}),
+    "sensing.delay_s": (SEEING, {"sensing": Sensing(delay_s=0.1)}, {"sensor_delay"}),
+    "sensing.dropout": (SEEING, {"sensing": Sensing(dropout=0.1)}, {"dropout"}),
+}  # fmt: skip
+PARTS = {"push": Push, "wave": Wave, "kick": Kick, "actuation": Actuation, "sensing": Sensing}
 
 
-def worlds(scenario, count=500):
-    return [draw_world(ROBOT, scenario, np.random.default_rng(i)) for i in range(count)]
+def worlds(scenario, robot=PLATFORM, *, count=COUNT, strength=1.0, seed=7):
+    draws = Draws(seed, np.arange(count), np.zeros(count), WORLD)
+    return draw_world(robot, scenario, draws, strength=strength)
 
 
-def test_the_ideal_world_is_the_nominal_body_in_stillness():
-    world = worlds(load_scenario("ideal"), 1)[0]
-    assert (world.mass, world.inertia) == (ROBOT.body.mass, ROBOT.body.inertia)
-    assert np.abs([*world.force_in_world, *world.torque_in_world]).max() == 0.0
+def fills(values, low, high):
+    """All within a span, and up to 2 % of both its ends."""
+    margin = 0.02 * (high - low)
+    assert low - 1e-12 <= np.min(values) < low + margin
+    assert high - margin < np.max(values) <= high + 1e-12
 
 
-def test_an_uncertain_body_covers_its_whole_span_and_never_leaves_it():
-    drawn = worlds(load_scenario("uncertain"))
-    for values, (low, high) in (
-        (np.array([w.mass for w in drawn]), ROBOT.uncertainty.mass),
-        (np.array([w.inertia[2] for w in drawn]), ROBOT.uncertainty.yaw_inertia),
-    ):
-        assert low <= values.min() < low + 0.02 * (high - low)  # 500 draws miss 2 % with a chance of 4e-5
-        assert high - 0.02 * (high - low) < values.max() <= high
+def test_the_table_of_this_file_has_every_entry_of_a_scenario():
+    names = {field.name for field in fields(Scenario)} - {"title"}
+    every = {f"{name}.{part.name}" for name in PARTS for part in fields(PARTS[name])} | (names - set(PARTS))
+    assert every == set(ENTRIES)
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+@pytest.mark.parametrize("robot", [PLATFORM, BOAT], ids=lambda robot: robot.name)
+def test_an_entry_changes_what_it_says_and_nothing_else(robot, entry):
+    without, change, meant = ENTRIES[entry]
+    before, after = worlds(without, robot), worlds(replace(without, **change), robot)
+    differing = {name for name in FIELDS if not np.array_equal(getattr(before, name), getattr(after, name))}
+    if robot is PLATFORM:
+        meant = meant - {"drag"}  # nothing drags on air
+    assert differing == meant
+
+
+@pytest.mark.parametrize(
+    "scenario", [*map(load_scenario, config_names("scenarios")), ALL], ids=lambda s: s.title[:20]
+)
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+def test_at_strength_0_a_scenario_is_the_nominal_robot_in_a_still_world(robot, scenario):
+    calm = worlds(SEEING if scenario.sensor_noise else STILL, robot, count=50)
+    weak = worlds(scenario, robot, count=50, strength=0.0)
+    idle = {"wave_number", "kick_period"}  # of waves and kicks without force
+    for name in set(FIELDS) - idle:
+        np.testing.assert_array_equal(getattr(weak, name), getattr(calm, name), err_msg=name)
+
+
+def test_half_the_strength_is_half_of_the_way():
+    calm, half, full = (worlds(ALL, BOAT, count=100, strength=s) for s in (0.0, 0.5, 1.0))
+    for name in set(FIELDS) - {"alive"}:
+        middle = 0.5 * (getattr(calm, name) + getattr(full, name))
+        np.testing.assert_allclose(getattr(half, name), middle, rtol=1e-9, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+def test_the_ideal_world_is_the_nominal_body_in_stillness(robot):
+    world = worlds(load_scenario("ideal"), robot, count=5)
+    assert np.all(world.mass == robot.body.mass)
+    assert np.all(world.yaw_inertia == robot.body.inertia[2])
+    assert np.all(world.gain == 1.0)
+    assert np.all(world.alive == 1.0)
+    for name in ("force_x", "force_y", "torque", "wave_force", "wave_torque", "kick", "noise", "dropout"):
+        assert not getattr(world, name).any(), name
+
+
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+def test_an_uncertain_body_covers_its_whole_span_and_never_leaves_it(robot):
+    world, spans = worlds(ALL, robot), robot.uncertainty
+    fills(world.mass, *spans.mass)
+    fills(world.yaw_inertia, *spans.yaw_inertia)
+    if spans.drag[0] < spans.drag[1]:
+        fills(world.drag, *spans.drag)
+    if spans.center_of_mass:
+        fills(np.hypot(world.com_x, world.com_y), 0.0, spans.center_of_mass)
 
 
 def test_mass_and_inertia_are_drawn_apart():
-    drawn = worlds(load_scenario("uncertain"))
-    correlation = np.corrcoef([w.mass for w in drawn], [w.inertia[2] for w in drawn])[0, 1]
-    assert abs(correlation) < 0.18  # four sigma of 500 independent pairs
+    world = worlds(ALL)
+    assert abs(np.corrcoef(world.mass, world.yaw_inertia)[0, 1]) < 4.0 / np.sqrt(COUNT)
 
 
-def test_forces_point_everywhere_in_the_plane_and_stay_below_the_limit():
-    scenario = load_scenario("uncertain")
-    drawn = worlds(scenario)
-    force = np.array([w.force_in_world for w in drawn])
-    size = np.linalg.norm(force, axis=1)
-    assert 0.9 * scenario.max_force < size.max() <= scenario.max_force
-    assert not force[:, 2].any()
-    assert {(x > 0, y > 0) for x, y, _ in force} == {(a, b) for a in (True, False) for b in (True, False)}
+def test_pushes_point_everywhere_and_are_shares_of_what_the_robot_can_do_itself():
+    for robot in (PLATFORM, BOAT):
+        world = worlds(replace(STILL, push=Push(0.2, 0.1, least=0.25)), robot)
+        size = np.hypot(world.force_x, world.force_y)
+        fills(size, 0.25 * 0.2 * robot.performance.force, 0.2 * robot.performance.force)
+        quadrants = {(x > 0, y > 0) for x, y in zip(world.force_x, world.force_y, strict=True)}
+        assert len(quadrants) == 4
+        fills(np.abs(world.torque), 0.25 * 0.1 * robot.performance.torque, 0.1 * robot.performance.torque)
+        assert 0.4 < np.mean(world.torque > 0.0) < 0.6
 
 
-def test_torques_have_both_signs_about_z_only():
-    scenario = load_scenario("uncertain")
-    torque = np.array([w.torque_in_world for w in worlds(scenario)])
-    assert not torque[:, :2].any()
-    assert -scenario.max_torque <= torque[:, 2].min() < -0.9 * scenario.max_torque
-    assert 0.9 * scenario.max_torque < torque[:, 2].max() <= scenario.max_torque
+def test_waves_and_kicks_are_shares_of_what_the_robot_can_do_itself():
+    world = worlds(ALL, BOAT)
+    fills(world.wave_force, 0.0, 0.1 * 39.0)
+    fills(world.wave_torque, 0.0, 0.05 * 8.9)
+    fills(world.wave_number, 0.25, 3.0)
+    fills(world.kick, 0.0, 0.3 * 39.0)
+    fills(world.kick_period, 4.0, 6.0)
 
 
-def test_every_scenario_takes_the_same_number_of_draws():
-    after = []
-    for name in ("ideal", "nominal", "uncertain"):
-        rng = np.random.default_rng(7)
-        draw_world(ROBOT, load_scenario(name), rng)
-        after.append(rng.uniform())
-    assert len(set(after)) == 1
+def test_each_actuator_has_a_gain_of_its_own_within_the_span():
+    gain = worlds(ALL).gain
+    assert gain.shape == (8, COUNT)
+    for row in gain:
+        fills(row, 0.8, 1.1)
+    assert abs(np.corrcoef(gain[0], gain[1])[0, 1]) < 4.0 / np.sqrt(COUNT)
 
 
-def test_negative_magnitudes_are_refused():
-    with pytest.raises(ValueError, match="must not be negative"):
-        replace(load_scenario("ideal"), max_force=-1.0)
-    with pytest.raises(ValueError, match="must not be negative"):
-        replace(load_scenario("ideal"), max_torque=-1.0)
+@pytest.mark.parametrize("most", [0, 1, 3])
+def test_no_more_actuators_fail_than_may_and_each_candidate_with_its_chance(most):
+    alive = worlds(replace(STILL, actuation=Actuation(failures=most, failure_chance=0.5))).alive
+    failed = 8.0 - alive.sum(axis=0)
+    assert failed.max() == most
+    assert failed.mean() == pytest.approx(0.5 * most, abs=4 * np.sqrt(most * 0.25 / COUNT) + 1e-12)
+    if most:  # any of them
+        np.testing.assert_allclose(1.0 - alive.mean(axis=1), most * 0.5 / 8, atol=0.035)
+
+
+def test_a_robot_with_fewer_actuators_than_may_fail_can_lose_all():
+    alive = worlds(replace(STILL, actuation=Actuation(failures=5, failure_chance=1.0)), BOAT).alive
+    assert not alive.any()
+
+
+def test_delays_and_losses_lie_between_nothing_and_the_most():
+    world = worlds(ALL)
+    fills(world.action_delay, 0.0, 0.04)
+    fills(world.action_noise, 0.0, 0.05)
+    fills(world.sensor_delay, 0.0, 0.1)
+    fills(world.dropout, 0.0, 0.2)
+
+
+def test_biases_have_a_standard_deviation_of_one_times_their_factor():
+    world = worlds(ALL)
+    for rows in (world.sensor_bias, world.sensor_scale):
+        assert rows.shape == (6, COUNT)
+        np.testing.assert_allclose(rows.std(axis=1), 2.0, rtol=0.08)
+        np.testing.assert_allclose(rows.mean(axis=1), 0.0, atol=4 * 2.0 / np.sqrt(COUNT))
+
+
+def test_a_world_of_a_batch_is_picked_written_and_cast_whole():
+    many, other = worlds(ALL, count=4), worlds(ALL, count=1, seed=8)
+    one = many[2]
+    assert (one.gain.shape, one.mass) == ((8,), many.mass[2])
+    many.write([1], other)
+    assert many.mass[1] == other.mass[0]
+    assert many.gain[:, 1].tolist() == other.gain[:, 0].tolist()
+    assert many.mass[2] == one.mass
+    assert {getattr(many.astype(np.float32), name).dtype for name in FIELDS} == {np.dtype(np.float32)}
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda: Push(force=-1.0), "must not be negative"),
+        (lambda: Push(torque=-1.0), "must not be negative"),
+        (lambda: Push(least=1.5), "must lie in"),
+        (lambda: Actuation(noise=-1.0), "must not be negative"),
+        (lambda: Actuation(gain=(1.0, 0.5)), "low <= high"),
+        (lambda: Actuation(failure_chance=1.5), "at most 1"),
+        (lambda: Wave(force=-1.0), "must not be negative"),
+        (lambda: Wave(wave_number=(2.0, 1.0)), "low <= high"),
+        (lambda: Kick(force=-1.0), "must not be negative"),
+        (lambda: Kick(every_s=(0.0, 1.0)), "greater than 0"),
+        (lambda: Sensing(noise=-1.0), "must not be negative"),
+        (lambda: Sensing(dropout=1.5), "at most 1"),
+    ],
+)
+def test_entries_without_meaning_are_refused(build, words):
+    with pytest.raises(ValueError, match=words):
+        build()
 
 
 def test_an_unknown_scenario_gets_the_nearest_name():

@@ -102,3 +102,51 @@ def test_banks_without_thrust_or_with_one_name_twice_are_refused():
 def test_a_nozzle_that_points_nowhere_is_refused():
     with pytest.raises(ValueError, match="nozzle 'a': 'direction' must not be zero"):
         Nozzle("a", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+DEGREES = load_robot("modular_freeflyer").actuators
+
+
+@settings(derandomize=True, deadline=None)
+@given(command=commands)
+def test_in_the_plane_a_batch_is_pushed_as_the_wrench_in_space_says(command):
+    force, torque = THRUSTERS.wrench_in_body(command)
+    planar = THRUSTERS.planar_wrench(command[:, None], np.ones((VALVES, 1)))
+    np.testing.assert_allclose(np.concatenate(planar), [force[0], force[1], torque[2]], rtol=0, atol=1e-12)
+
+
+def test_a_weak_valve_gives_its_part_of_its_share():
+    command = np.array([1.0, 0, 0, 0, 0, 0, 0, 1])[:, None]
+    both, one = (
+        THRUSTERS.planar_wrench(command * part, np.ones((VALVES, 1))) for part in (1.0, np.eye(VALVES)[:, :1])
+    )
+    gain = np.ones((VALVES, 1))
+    gain[0] = 0.8
+    weak = THRUSTERS.planar_wrench(command, gain)
+    for ours, two, single in zip(weak, both, one, strict=True):
+        np.testing.assert_allclose(ours, two - 0.2 * 0.5 * single, rtol=0, atol=1e-12)
+
+
+def test_valves_that_open_by_degrees_are_neither_closed_nor_open_between():
+    assert not DEGREES.binary
+    assert DEGREES.limited(np.array([-1.0, 0.2, 0.7, 3.0])).tolist() == [0.0, 0.2, 0.7, 1.0]
+
+
+def test_openings_that_add_up_to_less_than_one_do_not_share():
+    half = np.zeros((VALVES, 1))
+    half[0] = 0.5
+    ahead, left, _ = DEGREES.planar_wrench(half, np.ones_like(half))
+    assert np.hypot(ahead, left)[0] == pytest.approx(0.5 * DEGREES.thrust)
+    half[7] = 1.5 / 2  # 0.5 and 0.75 open: 1.25 on the line
+    ahead, left, _ = DEGREES.planar_wrench(half, np.ones_like(half))
+    np.testing.assert_allclose(
+        [ahead[0], left[0]],
+        (0.5 / 1.25) * DEGREES.wrench_per_newton[0, :2] + (0.75 / 1.25) * DEGREES.wrench_per_newton[7, :2],
+        rtol=0,
+        atol=1e-12,
+    )
+
+
+def test_whatever_errors_add_no_valve_sucks():
+    command = np.full((VALVES, 1), -0.05)
+    assert not np.any(DEGREES.planar_wrench(command, np.ones_like(command)))

@@ -40,6 +40,13 @@ class Wave:
     torque: float = 0.0  # same [-]
     wave_number: Range = (0.25, 3.0)  # [rad/m]
 
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if min(self.force, self.torque, self.wave_number[0]) < 0.0:
+            raise ValueError("force, torque and wave_number must not be negative.")
+        if self.wave_number[0] > self.wave_number[1]:
+            raise ValueError("'wave_number' must be [low, high] with low <= high.")
+
 
 @dataclass(frozen=True)
 class Kick:
@@ -47,6 +54,13 @@ class Kick:
 
     force: float = 0.0  # largest, share of the robot's own [-]
     every_s: Range = (4.0, 6.0)  # [s]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if self.force < 0.0:
+            raise ValueError("'force' must not be negative.")
+        if not 0.0 < self.every_s[0] <= self.every_s[1]:
+            raise ValueError("'every_s' must be [low, high] with low <= high, and greater than 0.")
 
 
 @dataclass(frozen=True)
@@ -75,6 +89,11 @@ class Sensing:
     bias: float = 1.0  # factor on the robot's own biases [-]
     delay_s: float = 0.0  # largest delay beyond the robot's own [s]
     dropout: float = 0.0  # largest chance that a measurement is lost [-]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:
+            raise ValueError("noise, bias, delay and dropout must not be negative, 'dropout' at most 1.")
 
 
 @dataclass(frozen=True)
