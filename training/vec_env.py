@@ -122,8 +122,10 @@ class BatchVecEnv(VecEnv):
             ended_early = errors.position > self._robot.limits.geofence
         touching = self._task.collides(after, goal, self._robot)
         if touching is not None:
-            reward = reward - self._task.collision_cost * touching  # type: ignore[union-attr]
             ended_early = ended_early | touching
+        penalty = getattr(self._task, "penalty", None)  # tasks where nothing is in the way have none
+        if penalty is not None:
+            reward = reward - penalty(after, goal, self._robot)
         timed_out = (self._age >= self._horizon) & ~ended_early
         done = ended_early | timed_out
         observations = np.asarray(simulation.observe())

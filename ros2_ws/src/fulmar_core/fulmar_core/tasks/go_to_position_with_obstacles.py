@@ -6,13 +6,15 @@ import functools
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from array_api_compat import array_namespace
+
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.go_to_position import GoToPosition, PositionReward
-from fulmar_core.tasks.obstacles import Obstacles, touches
+from fulmar_core.tasks.obstacles import TOUCH, Obstacles, clearance
 from fulmar_core.tasks.terms import Errors, Start, Tolerance, pose_errors
 
 
@@ -30,6 +32,7 @@ class GoToPositionWithObstacles:
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PositionReward
     collision_cost: float  # of touching, which ends an episode of training
+    nearness_cost: float  # times exp(-clearance / 0.15 m), so that keeping off is learned before the first touch
 
     goal_topic: ClassVar[str] = "goal_point"
 
@@ -69,4 +72,11 @@ class GoToPositionWithObstacles:
 
     def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
         """Whether the robot is at an obstacle."""
-        return touches(state, goal.obstacles, robot)
+        return clearance(state, goal.obstacles, robot) < TOUCH
+
+    def penalty(self, state: PlanarState, goal: Goal, robot: Robot) -> Array:
+        """What being near an obstacle costs a learner; see `TaskProtocol.penalty`."""
+        gap = clearance(state, goal.obstacles, robot)
+        xp = array_namespace(gap)
+        touching = xp.astype(gap < TOUCH, gap.dtype)
+        return self.collision_cost * touching + self.nearness_cost * xp.exp(-xp.clip(gap, 0.0, 9.0) / 0.15)

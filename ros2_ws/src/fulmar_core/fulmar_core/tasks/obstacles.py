@@ -14,6 +14,8 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
 CANDIDATES = 8  # places tried for each obstacle; one that fits nowhere is left out
+FAR = 1e3  # where an obstacle is that is not there [m]
+SIGHT = 3.0  # vectors to obstacles are not told longer than this [m]
 TOUCH = 0.01  # nearer than this counts as touching; contacts of simulators are as soft [m]
 
 
@@ -32,7 +34,8 @@ class Obstacles:
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the observation terms."""
-        return tuple(f"obstacle_{i + 1}_{axis}_in_body" for i in range(self.seen) for axis in "xy")
+        parts = ("x_in_body", "y_in_body", "closeness")
+        return tuple(f"obstacle_{i + 1}_{part}" for i in range(self.seen) for part in parts)
 
     def draw(self, draws: Draws, robot: Robot, start: PlanarState, target: np.ndarray) -> np.ndarray:
         """Draw obstacles between and around start and goal.
@@ -67,51 +70,56 @@ class Obstacles:
         return placed
 
     def observe(self, state: PlanarState, obstacles: Array) -> tuple[Array, ...]:
-        """Directions of the nearest obstacles in the body's frame, longer the nearer they are.
+        """Where the nearest obstacles are, seen from the body.
 
         Args:
             state: Measured state.
             obstacles: Shape (..., m, 3).
 
         Returns:
-            `2 seen` terms of shape (...,): unit vectors times exp(-gap / 1 m), zero where there is none.
+            `3 seen` terms of shape (...,): the vector to the centre, no longer than `SIGHT` [m], and exp(-gap / 0.5 m)
+            [-]. One that is not there lies at the end of sight behind the robot, with a closeness of 0.
         """
         xp = array_namespace(state.x)
         x, y, gap = _relative(state, obstacles)
         missing = self.seen - obstacles.shape[-2]
         if missing > 0:
             pad = xp.zeros((*x.shape[:-1], missing), dtype=x.dtype)
-            x, y, gap = (xp.concat((a, pad + b), axis=-1) for a, b in ((x, 0.0), (y, 0.0), (gap, 1e3)))
+            x, y, gap = (xp.concat((a, pad + b), axis=-1) for a, b in ((x, -FAR), (y, 0.0), (gap, FAR)))
         order = xp.argsort(gap, axis=-1)[..., : self.seen]
         x, y, gap = (xp.take_along_axis(a, order, axis=-1) for a in (x, y, gap))
-        distance = xp.clip(xp.sqrt(x * x + y * y), 1e-3, None)
-        size = xp.exp(-xp.clip(gap, 0.0, 50.0)) / distance
-        columns = (x * size, y * size)
-        return tuple(columns[axis][..., i] for i in range(self.seen) for axis in (0, 1))
+        there = gap < FAR
+        shrink = SIGHT / xp.clip(xp.sqrt(x * x + y * y), SIGHT, None)
+        columns = (
+            xp.where(there, x * shrink, xp.full_like(x, -SIGHT)),
+            xp.where(there, y * shrink, xp.zeros_like(y)),
+            xp.exp(-xp.clip(gap, -1.0, 50.0) / 0.5),
+        )
+        return tuple(column[..., i] for i in range(self.seen) for column in columns)
 
 
-def touches(state: PlanarState, obstacles: Array, robot: Robot) -> Array:
-    """Whether the robot's outline is at an obstacle.
+def clearance(state: PlanarState, obstacles: Array, robot: Robot) -> Array:
+    """How far the robot's outline is from the nearest obstacle.
 
     Args:
         state: True state, shapes (...,).
-        obstacles: Shape (..., m, 3).
+        obstacles: Shape (..., m, 3), m >= 1.
         robot: Its outline: a box, or a disc.
 
     Returns:
-        Truth values, shape (...,).
+        Distance, negative inside, 1 km or so where there is none, shape (...,) [m].
     """
     xp = array_namespace(state.x)
-    x, y, _ = _relative(state, obstacles)
-    radius = obstacles[..., 2]
+    x, y, gap = _relative(state, obstacles)
     if robot.body.footprint is None:
-        gap = xp.sqrt(x * x + y * y) - robot.body.radius - radius
+        gap = gap - robot.body.radius
     else:
         length, width = robot.body.footprint
         dx = xp.clip(xp.abs(x) - 0.5 * length, 0.0, None)
         dy = xp.clip(xp.abs(y) - 0.5 * width, 0.0, None)
-        gap = xp.sqrt(dx * dx + dy * dy) - radius
-    return xp.any((gap < TOUCH) & (radius > 0.0), axis=-1)
+        there = obstacles[..., 2] > 0.0
+        gap = xp.where(there, xp.sqrt(dx * dx + dy * dy) - obstacles[..., 2], gap)
+    return xp.min(gap, axis=-1)
 
 
 def _relative(state: PlanarState, obstacles: Array) -> tuple[Array, Array, Array]:
@@ -121,4 +129,4 @@ def _relative(state: PlanarState, obstacles: Array) -> tuple[Array, Array, Array
     dy = obstacles[..., 1] - state.y[..., None]
     x, y = to_body(state.yaw[..., None], dx, dy)
     gap = xp.sqrt(dx * dx + dy * dy) - obstacles[..., 2]
-    return x, y, xp.where(obstacles[..., 2] > 0.0, gap, xp.full_like(gap, 1e3))
+    return x, y, xp.where(obstacles[..., 2] > 0.0, gap, xp.full_like(gap, FAR))
