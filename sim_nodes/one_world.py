@@ -26,7 +26,7 @@ class OneWorld:
     Attributes:
         world: What was drawn for the episode, as a batch of one.
         actuation: What the actuators do.
-        outside: Push of the surroundings in the current control step: force along x and y [N], yaw moment [N·m], shapes (1,).
+        outside: Push of the surroundings in this control step: force along x and y [N], yaw moment [N·m], shapes (1,).
         delayed: Whether commands act late.
     """
 
@@ -70,8 +70,8 @@ class OneWorld:
     def begin(self, command: np.ndarray, ticks: int, truth: RigidBodyState) -> None:
         """Take a command for some physics ticks.
 
-        Several ticks are a control step of their own. With one tick at a time, a control step begins with each new command,
-        and with an old one after the robot's own control period.
+        Several ticks are a control step of their own. With one tick at a time, a control step begins with each new
+        command, and with an old one after the robot's own control period.
 
         Args:
             command: Within the actuators' limits, shape (n,).
@@ -122,9 +122,7 @@ class OneWorld:
         true = planar_of(truth)
         steps = np.array([self._measured])
         self._measured += 1
-        batch = self._odometer.measure(
-            _batch_of_one(true), self.world, self._numbers, self._repeats, steps
-        )
+        batch = self._odometer.measure(_batch_of_one(true), self.world, self._numbers, self._repeats, steps)
         return _tilted(batch[0], truth, true)
 
 

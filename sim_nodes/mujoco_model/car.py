@@ -102,8 +102,8 @@ class Car:
             steering: Of the middle front wheel, left positive [rad].
 
         Returns:
-            Angles of the left and the right front wheel [rad], then speeds of rear left, rear right, front left and front
-            right [rad/s].
+            Angles of the left and the right front wheel [rad], then speeds of rear left, rear right, front left and
+            front right [rad/s].
         """
         curvature = math.tan(steering) / self._car.wheelbase
         # Share of the speed with which each side moves ahead.

@@ -12,11 +12,13 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.wheels import STEP_S, Chassis, add_wheel_servo
 
-WEIGHT_TO_CASTER = 0.25  # how far the weight lies from the axle towards a single caster, which has to carry some [-]
+WEIGHT_TO_CASTER = (
+    0.25  # how far the weight lies from the axle towards a single caster, which has to carry some [-]
+)
 
 
 class DifferentialBase:
-    """A differential drive whose wheels follow their speeds with the lag of the YAML, as hard as `wheel_force` allows."""
+    """Wheels that follow their speeds with the lag of the YAML, as hard as `wheel_force` allows."""
 
     def __init__(self, robot: Robot) -> None:
         """Prepare for `add`."""

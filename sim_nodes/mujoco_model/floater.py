@@ -7,18 +7,22 @@ import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.disturbances.world import World
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from sim_nodes.mujoco_model.surroundings import BODY, GRAVITY, add_hull
+from sim_nodes.mujoco_model.surroundings import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
+
+# MuJoCo compiles a body whose centre of mass is its origin in a way that lets nobody move it later [m].
+OFF_CENTRE = 1e-5
 
 
 class Floater:
     """One body under forces at fixed places.
 
-    A planar robot gets two slides and a hinge and stands on a floor under gravity, which holds it up but pushes nowhere.
-    A robot with hydrodynamics swims. Any other robot floats free without gravity. One actuator for each nozzle or propeller
-    pushes at its place along its direction, and takes newtons.
+    A planar robot gets two slides and a hinge and stands on a floor under gravity, which holds it up but pushes
+    nowhere. A robot with hydrodynamics swims. Any other robot floats free without gravity. One actuator for each
+    nozzle or propeller pushes at its place along its direction, and takes newtons.
     """
 
     steps_per_tick = 1
@@ -49,8 +53,7 @@ class Floater:
         else:
             body.add_freejoint(name="free")
         body.explicitinertial = True
-        # Else MuJoCo takes the body's own place for that of its centre of mass.
-        body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
         body.mass, body.inertia = robot.body.mass, list(robot.body.inertia)
         low = -0.5 * robot.body.height
         if robot.hydrodynamics is not None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import mujoco
 
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-
 BODY, IMU_SITE = "base_link", "imu_link"
 FLOOR_BIT, THING_BIT = 1, 2  # what touches the floor, and what touches one another above it
 

@@ -9,16 +9,21 @@ import mujoco
 import numpy as np
 
 from fulmar_core.disturbances.world import World
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from sim_nodes.mujoco_model.surroundings import BODY, DARK, FLOOR_BIT, GRAVITY, add_hull
+from sim_nodes.mujoco_model.surroundings import BODY, DARK, FLOOR_BIT, add_hull
 
 STEP_S = 0.004  # contacts and wheel servos need finer steps than the robots' physics ticks [s]
 # Our values: no YAML says how heavy a wheel is or how high the weight lies.
 WHEEL_SHARE = 0.03  # of the robot's mass, for each wheel [-]
-WEIGHT_HEIGHT = 1.0 / 3.0  # of the robot's height, where its centre of mass is, but at least as high as the axles [-]
+WEIGHT_HEIGHT = (
+    1.0 / 3.0
+)  # of the robot's height, where its centre of mass is, but at least as high as the axles [-]
 CLEARANCE = 0.4  # of the chassis above the floor, in wheel radii [-]
-TIGHT_S = 0.01  # part of the servos' lag that a push from outside feels; the rest is in how they take commands [s]
+TIGHT_S = (
+    0.01  # part of the servos' lag that a push from outside feels; the rest is in how they take commands [s]
+)
 CONTACT_S = 0.01  # time constant of the floor contact [s]
 SETTLE_S = 1.0  # time in which a model comes to rest after its compilation [s]
 

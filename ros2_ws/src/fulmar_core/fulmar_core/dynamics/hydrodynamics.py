@@ -1,7 +1,7 @@
 """Forces of still water on a hull at its surface (Fossen, "Handbook of Marine Craft", 2011, §4.2, §6.3 to §6.5, §8.1).
 
-The core's own dynamics move in the plane; simulators that also heave, roll and pitch take the six-dimensional functions.
-A six-vector is [surge, sway, heave, roll, pitch, yaw] in the body's frame: velocities [m/s, rad/s] or forces [N, N·m].
+The core's own dynamics move in the plane; simulators that also heave, roll and pitch take the functions of six-vectors:
+[surge, sway, heave, roll, pitch, yaw] in the body's frame: velocities [m/s, rad/s] or forces [N, N·m].
 """
 
 from __future__ import annotations
