@@ -51,9 +51,8 @@ def test_a_wave_comes_again_after_its_length():
 
 
 def test_a_kick_lasts_one_control_step_and_comes_once_a_period_but_not_at_the_start():
-    kicks = []
-    for step in range(100):
-        kicks.append(felt(time_s=step * DT, kick=0.5, kick_period=4.3, kick_direction=np.pi / 2))
+    kick = {"kick": 0.5, "kick_period": 4.3, "kick_direction": np.pi / 2}
+    kicks = [felt(time_s=step * DT, **kick) for step in range(100)]
     assert np.array(kicks)[:, 0] == pytest.approx(0.0, abs=1e-12)
     when = np.flatnonzero(np.array(kicks)[:, 1] > 0.0) * DT
     np.testing.assert_allclose(when, np.ceil(np.arange(1, 5) * 4.3 / DT) * DT, atol=1e-9)

@@ -10,6 +10,7 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_directory
 from fulmar_core.robot import Limits, Timing, Uncertainty, load_robot
 from fulmar_core.sensors.imu import ImuSpec
+from fulmar_core.sensors.odometer import Channel
 
 ROBOT = load_robot("floating_platform")
 
@@ -62,7 +63,28 @@ def test_limits_and_noises_have_to_mean_something():
     with pytest.raises(ValueError, match="must not be negative"):
         ImuSpec(-1.0, 0.0)
     with pytest.raises(ValueError, match="must not be negative"):
-        replace(ROBOT.sensors.odometry, velocity_std=(0.0, -0.1, 0.0))
+        Channel(std=-0.1)
+    with pytest.raises(ValueError, match="must not be negative"):
+        replace(ROBOT.sensors.odometry, rate_hz=-1.0)
+
+
+def test_a_machine_that_cannot_move_is_refused():
+    with pytest.raises(ValueError, match="must be greater than 0"):
+        replace(ROBOT.performance, speed=0.0)
+    with pytest.raises(ValueError, match="must not be negative"):
+        replace(ROBOT.performance, lateral_speed=-0.1)
+
+
+def test_a_body_whose_centre_of_mass_or_drag_is_impossible_is_refused():
+    with pytest.raises(ValueError, match="'center_of_mass' must not be negative"):
+        replace(ROBOT.uncertainty, center_of_mass=-0.1)
+    with pytest.raises(ValueError, match="'drag' must be"):
+        replace(ROBOT.uncertainty, drag=(1.1, 0.9))
+
+
+def test_wheels_do_not_swim():
+    with pytest.raises(ValueError, match="exclude one another"):
+        replace(load_robot("turtlebot2"), hydrodynamics=load_robot("kingfisher").hydrodynamics)
 
 
 def test_an_unknown_robot_gets_the_nearest_name():

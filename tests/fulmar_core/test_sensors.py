@@ -2,72 +2,182 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from fulmar_core.counter_rng import WORLD, Draws
+from fulmar_core.disturbances.scenario import draw_world, load_scenario
+from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import load_robot
-from fulmar_core.rotation import multiply
 from fulmar_core.sensors.imu import ImuSample, ImuSpec, measure_imu
-from fulmar_core.sensors.odometry import measure_odometry
-from fulmar_core.state import planar_state
+from fulmar_core.sensors.odometer import Channel, Odometer, OdometrySpec
 
-ODOMETRY = load_robot("floating_platform").sensors.odometry
-SILENT = replace(
-    ODOMETRY, **{f"{n}_std": (0.0,) * 3 for n in ("position", "rotation", "velocity", "angular_velocity")}
-)
-CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
-WORLDS = 20_000  # the sample deviation is then within 0.5 % of the true one (one sigma); we allow 3 %
+MANY = 20_000  # the sample deviation is then within 0.5 % of the true one (one sigma); we allow 3 %
+ROBOT = load_robot("floating_platform")
+VALUES = (1.0, -2.0, 0.5, 0.2, -0.1, 0.3)
+DT = 0.1
 
 
-def crowd():
-    zeros = np.zeros(WORLDS)
-    return planar_state(zeros, zeros, zeros + 1.0, vx=zeros + 0.2, yaw_rate=zeros + 0.1)
+def worlds(count, **values):
+    draws = Draws(0, np.arange(count), np.zeros(count), WORLD)
+    world = draw_world(ROBOT, load_scenario("nominal"), draws)
+    shapes = {name: getattr(world, name).shape for name in values}
+    return replace(world, **{name: np.broadcast_to(value, shapes[name]) for name, value in values.items()})
 
 
-def test_without_noise_the_odometry_is_the_truth():
-    truth = crowd()
-    measured = measure_odometry(truth, SILENT, np.random.default_rng(0))
-    np.testing.assert_array_equal(measured.position_in_world, truth.position_in_world)
-    np.testing.assert_allclose(measured.quat_xyzw, truth.quat_xyzw, rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(measured.velocity_in_world, truth.velocity_in_world)
-    np.testing.assert_array_equal(measured.angular_velocity_in_body, truth.angular_velocity_in_body)
+def alike(**channel):
+    """The same channel for every column."""
+    return OdometrySpec(*(Channel(**channel) for _ in range(4)))
 
 
-@pytest.mark.parametrize("part", ["position", "velocity", "angular_velocity", "rotation"])
-def test_the_noise_has_no_bias_and_the_deviation_of_the_yaml(part):
-    spec = replace(SILENT, **{f"{part}_std": (0.01, 0.02, 0.03)})
-    truth = crowd()
-    measured = measure_odometry(truth, spec, np.random.default_rng(1))
-    name = {"position": "position_in_world", "velocity": "velocity_in_world"}.get(
-        part, "angular_velocity_in_body"
+class Bench:
+    """An odometer that sees the same truth again and again, or one that grows with each step."""
+
+    def __init__(self, spec, count, *, world=None, max_delay_s=0.0, noisy=True, seed=3):
+        self.world = worlds(count) if world is None else world
+        self.odometer = Odometer(spec, seed=seed, period=DT, max_delay_s=max_delay_s, noisy=noisy)
+        self.numbers, self.repeats, self.steps = np.arange(count), np.zeros(count, int), np.zeros(count, int)
+
+    def measure(self, *, growing=False, only=None):
+        if only is not None:
+            self.repeats[only] += 1
+            self.steps[only] = 0
+        values = [np.full(len(self.numbers), value) for value in VALUES]
+        if growing:
+            values = [column + self.steps for column in values]
+        measured = self.odometer.measure(
+            PlanarState(*values), self.world, self.numbers, self.repeats, self.steps, only=only
+        )
+        if only is None:
+            self.steps = self.steps + 1
+        return np.stack([getattr(measured, name) for name in COLUMNS])
+
+
+def first(spec, count=MANY, **kwargs):
+    return Bench(spec, count, **kwargs).measure() - np.array(VALUES)[:, None]
+
+
+def test_without_errors_the_odometry_is_the_truth():
+    assert not first(OdometrySpec()).any()
+    assert not first(alike(std=0.1), noisy=False).any()
+
+
+def test_each_column_has_the_noise_of_its_channel_and_no_mean():
+    deviations = (0.01, 0.02, 0.03, 0.04)
+    error = first(OdometrySpec(*(Channel(std=value) for value in deviations)))
+    of_columns = [0.01, 0.01, 0.02, 0.03, 0.03, 0.04]
+    np.testing.assert_allclose(error.std(axis=1), of_columns, rtol=0.03)
+    np.testing.assert_allclose(error.mean(axis=1), 0.0, atol=4 * 0.04 / np.sqrt(MANY))
+    assert np.abs(np.corrcoef(error) - np.eye(6)).max() < 4.5 / np.sqrt(MANY)
+
+
+def test_a_world_s_noise_is_a_factor_on_that_of_the_robot():
+    error = first(alike(std=0.01), world=worlds(MANY, noise=3.0))
+    np.testing.assert_allclose(error.std(axis=1), 0.03, rtol=0.03)
+
+
+def test_noise_is_new_with_each_measurement_and_bias_stays():
+    bench = Bench(alike(std=0.01), MANY)
+    one, two = bench.measure(), bench.measure()
+    assert np.abs([np.corrcoef(a, b)[0, 1] for a, b in zip(one, two, strict=True)]).max() < 4.5 / np.sqrt(
+        MANY
     )
-    if part == "rotation":  # twice the vector part is the rotation vector, to 1e-5 for angles this small
-        error = 2.0 * multiply(truth.quat_xyzw * CONJUGATE, measured.quat_xyzw)[:, :3]
-    else:
-        error = getattr(measured, name) - getattr(truth, name)
-    np.testing.assert_allclose(error.std(axis=0), [0.01, 0.02, 0.03], rtol=0.03)
-    np.testing.assert_allclose(error.mean(axis=0), 0.0, atol=4 * 0.03 / np.sqrt(WORLDS))
+    bench = Bench(alike(bias_std=0.01), 500)
+    np.testing.assert_array_equal(bench.measure(), bench.measure())
 
 
-def test_the_platform_s_odometry_leaves_the_plane_untouched():
-    measured = measure_odometry(crowd(), ODOMETRY, np.random.default_rng(2))
-    assert not measured.position_in_world[:, 2].any()
-    assert not measured.quat_xyzw[:, :2].any()
+def test_biases_and_scale_errors_are_those_of_the_world_in_the_channel_s_own_deviations():
+    bias = np.random.default_rng(1).normal(size=(6, 50))
+    error = first(alike(bias_std=0.02), 50, world=worlds(50, sensor_bias=bias))
+    np.testing.assert_allclose(error, 0.02 * bias, rtol=0, atol=1e-12)
+    error = first(alike(scale_std=0.02), 50, world=worlds(50, sensor_scale=bias))
+    np.testing.assert_allclose(error, 0.02 * bias * np.array(VALUES)[:, None], rtol=0, atol=1e-12)
 
 
-def test_measured_quaternions_have_length_one():
-    measured = measure_odometry(crowd(), ODOMETRY, np.random.default_rng(3))
-    np.testing.assert_allclose(np.linalg.norm(measured.quat_xyzw, axis=1), 1.0, rtol=0, atol=1e-9)
+def test_readings_are_cut_at_the_limit_and_0_is_no_limit():
+    spec = OdometrySpec(position=Channel(limit=1.5), velocity=Channel(limit=0.15))
+    measured = Bench(spec, 3).measure()[:, 0]
+    assert measured.tolist() == [1.0, -1.5, 0.5, 0.15, -0.1, 0.3]
 
 
-def test_the_same_generator_gives_the_same_noise_and_the_type_is_kept():
-    truth = crowd().astype(np.float32)
-    first, second = (measure_odometry(truth, ODOMETRY, np.random.default_rng(4)) for _ in range(2))
-    np.testing.assert_array_equal(first.position_in_world, second.position_in_world)
-    assert first.position_in_world.dtype == np.float32
-    assert not np.array_equal(first.position_in_world, truth.position_in_world)
+def test_readings_are_whole_quanta_and_0_is_none():
+    spec = OdometrySpec(position=Channel(quantum=0.3), yaw_rate=Channel(quantum=0.25))
+    measured = Bench(spec, 3).measure()[:, 0]
+    assert measured.tolist() == pytest.approx([0.9, -2.1, 0.5, 0.2, -0.1, 0.25])
+
+
+@pytest.mark.parametrize("behind", [0, 1, 3])
+def test_a_delayed_reading_is_that_of_some_measurements_ago_and_before_the_first_one_the_first(behind):
+    bench = Bench(replace(OdometrySpec(), delay_s=behind * DT), 4)
+    seen = [bench.measure(growing=True)[0, 0] - VALUES[0] for _ in range(6)]
+    assert seen == pytest.approx(np.maximum(0.0, np.arange(6) - behind))
+
+
+def test_each_world_has_its_own_delay_on_top():
+    bench = Bench(OdometrySpec(), 3, world=worlds(3, sensor_delay=[0.0, 0.1, 0.2]), max_delay_s=0.2)
+    for _ in range(5):
+        seen = bench.measure(growing=True)
+    np.testing.assert_allclose(seen[0] - VALUES[0], [4.0, 3.0, 2.0], rtol=0, atol=1e-12)
+
+
+def test_between_two_readings_of_a_slow_sensor_the_last_one_stays():
+    bench = Bench(replace(OdometrySpec(), rate_hz=1.0 / (3 * DT)), 2)
+    seen = [bench.measure(growing=True)[0, 0] - VALUES[0] for _ in range(8)]
+    assert seen == pytest.approx([0, 0, 0, 3, 3, 3, 6, 6])
+
+
+def test_a_lost_measurement_leaves_the_last_one_and_the_first_is_never_lost():
+    bench = Bench(OdometrySpec(), MANY, world=worlds(MANY, dropout=0.25))
+    assert not (bench.measure(growing=True)[0] - VALUES[0]).any()
+    seen = bench.measure(growing=True)[0] - VALUES[0]
+    assert set(np.unique(np.round(seen, 9))) == {0.0, 1.0}
+    assert np.mean(seen < 0.5) == pytest.approx(0.25, abs=4 * np.sqrt(0.25 * 0.75 / MANY))
+
+
+def everything():
+    channel = Channel(0.01, 0.02, 0.03, 2.5, 0.001)
+    return OdometrySpec(channel, channel, channel, channel, rate_hz=5.0, delay_s=0.1)
+
+
+def restless(count):
+    return worlds(count, sensor_delay=np.linspace(0.0, 0.3, count), dropout=0.2)
+
+
+def test_worlds_that_begin_anew_forget_their_past_and_leave_the_others_as_they_were():
+    bench, same = (Bench(everything(), 6, world=restless(6), max_delay_s=0.3) for _ in range(2))
+    for each in (bench, same):
+        for _ in range(5):
+            before = each.measure(growing=True)
+    again = bench.measure(growing=True, only=np.array([1, 4]))
+    np.testing.assert_array_equal(again[:, [0, 2, 3, 5]], before[:, [0, 2, 3, 5]])
+    assert np.abs(again[0, [1, 4]] - VALUES[0]).max() < 0.5  # nothing of the five steps before
+    bench.steps[[1, 4]] = 1
+    for _ in range(4):
+        mine, theirs = bench.measure(growing=True), same.measure(growing=True)
+        np.testing.assert_array_equal(mine[:, [0, 2, 3, 5]], theirs[:, [0, 2, 3, 5]])
+
+
+def test_a_world_is_measured_alike_in_a_batch_of_any_size():
+    many, few = Bench(everything(), 40, world=restless(40), max_delay_s=0.3), None
+    few = Bench(everything(), 7, world=restless(40)[np.arange(7)], max_delay_s=0.3)
+    for _ in range(8):
+        np.testing.assert_array_equal(many.measure(growing=True)[:, :7], few.measure(growing=True))
+
+
+def test_another_seed_or_episode_gives_other_noise():
+    one = Bench(alike(std=0.1), 4)
+    first_episode, second_episode = one.measure(), one.measure(only=np.arange(4))
+    assert not np.any(first_episode == second_episode)
+    assert not np.any(Bench(alike(std=0.1), 4, seed=4).measure() == first_episode)
+
+
+def test_channels_and_rates_without_meaning_are_refused():
+    with pytest.raises(ValueError, match="must not be negative"):
+        Channel(quantum=-1.0)
+    with pytest.raises(ValueError, match="must not be negative"):
+        OdometrySpec(delay_s=-0.1)
 
 
 def test_the_inertial_unit_adds_its_two_noises_to_the_truth():
@@ -86,7 +196,3 @@ def test_an_inertial_unit_without_noise_tells_the_truth():
     measured = measure_imu(truth, ImuSpec(0.0, 0.0), np.random.default_rng(6))
     assert measured.specific_force.tolist() == [1.0, 2.0, 3.0]
     assert measured.angular_velocity.tolist() == [4.0, 5.0, 6.0]
-
-
-def test_the_odometry_has_no_rate_of_its_own_that_changes_nothing():
-    assert "rate_hz" not in {field.name for field in fields(ODOMETRY)}
