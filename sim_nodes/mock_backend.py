@@ -41,7 +41,7 @@ class MockBackend:
             world.world,
             world.outside,
             substeps=ticks,
-            delayed=world.delayed,
+            latest_s=world.latest_s,
             off_centre=bool(world.world.com_x[0] or world.world.com_y[0]),
         )
         return self._sample()

@@ -71,7 +71,7 @@ class MujocoBackend:
         outside = tuple(float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
         for _ in range(ticks):
-            applied = world.actuation.advance(dt, delayed=world.delayed)
+            applied = world.actuation.advance(dt, latest_s=world.latest_s)
             machine.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
             mujoco.mj_step(model, data, machine.steps_per_tick)
         if not np.isfinite(data.qpos).all():

@@ -27,7 +27,7 @@ class OneWorld:
         world: What was drawn for the episode, as a batch of one.
         actuation: What the actuators do.
         outside: Push of the surroundings in this control step: force along x and y [N], yaw moment [N·m], shapes (1,).
-        delayed: Whether commands act late.
+        latest_s: How late commands act [s].
     """
 
     def __init__(self, robot: Robot, *, noisy: bool) -> None:
@@ -55,7 +55,7 @@ class OneWorld:
         drawn = episode.world
         self.world = World(*(np.asarray(getattr(drawn, name), dtype=float)[..., None] for name in FIELDS))
         self.actuation = actuation_of(self._robot, self._safe)
-        self.delayed = bool(self._robot.actuators.response.delay_s + self.world.action_delay[0] > 0.0)
+        self.latest_s = float(self._robot.actuators.response.delay_s + self.world.action_delay[0])
         self.outside = tuple(np.zeros(1) for _ in range(3))
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
         self._ticks = 0

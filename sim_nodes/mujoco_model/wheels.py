@@ -64,7 +64,6 @@ class Chassis:
         """Add the body and its outline, and set what contact with the floor needs."""
         spec.option.gravity = [0.0, 0.0, -GRAVITY]
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stiff servos on light wheels
         spec.option.impratio = 10.0  # friction holds as firmly as the floor carries
         body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, self.radius])
         body.add_freejoint(name="free")

@@ -28,9 +28,9 @@ def full(value=1.0):
     return np.full((2, WORLDS), value)
 
 
-def course(state, steps, *, delayed=False):
+def course(state, steps, *, latest_s=0.0):
     """What the first actuator of the first world does at each of some steps."""
-    return [float(state.advance(DT, delayed=delayed)[0, 0]) for _ in range(steps)]
+    return [float(state.advance(DT, latest_s=latest_s)[0, 0]) for _ in range(steps)]
 
 
 def test_without_a_response_of_its_own_an_actuator_does_at_once_what_it_is_told():
@@ -42,22 +42,22 @@ def test_without_a_response_of_its_own_an_actuator_does_at_once_what_it_is_told(
 def test_before_the_delay_is_over_the_command_before_goes_on():
     state = actuation(delay_s=0.04)
     state.begin(full(0.3), NOMINAL, None)
-    assert course(state, 4, delayed=True) == [0.0, 0.0, 0.3, 0.3]
+    assert course(state, 4, latest_s=1.0) == [0.0, 0.0, 0.3, 0.3]
     state.begin(full(0.7), NOMINAL, None)
-    assert course(state, 4, delayed=True) == [0.3, 0.3, 0.7, 0.7]
+    assert course(state, 4, latest_s=1.0) == [0.3, 0.3, 0.7, 0.7]
 
 
 def test_a_world_s_own_delay_comes_on_top():
     state = actuation(delay_s=0.02)
     state.begin(full(), replace(NOMINAL, action_delay=np.array([0.0, 0.02, 0.04])), None)
-    seen = np.array([state.advance(DT, delayed=True)[0] for _ in range(4)])
+    seen = np.array([state.advance(DT, latest_s=1.0)[0] for _ in range(4)])
     assert seen.sum(axis=0).tolist() == [3.0, 2.0, 1.0]
 
 
 def test_slew_bounds_how_fast_an_actuator_changes_each_with_its_own_rate():
     state = actuation(slew=(5.0, 10.0))
     state.begin(full(), NOMINAL, None)
-    seen = np.array([state.advance(DT, delayed=False)[:, 0] for _ in range(12)])
+    seen = np.array([state.advance(DT, latest_s=0.0)[:, 0] for _ in range(12)])
     np.testing.assert_allclose(seen[:, 0], np.minimum(1.0, 0.1 * np.arange(1, 13)), atol=1e-12)
     np.testing.assert_allclose(seen[:, 1], np.minimum(1.0, 0.2 * np.arange(1, 13)), atol=1e-12)
 
@@ -71,7 +71,7 @@ def test_a_lag_takes_the_same_share_of_the_way_at_every_step():
 def test_an_actuator_that_failed_stays_as_if_it_were_safe():
     state = actuation()
     state.begin(full(), replace(NOMINAL, alive=np.array([[0.0, 1.0, 1.0], [1.0, 1.0, 0.0]])), full())
-    assert state.advance(DT, delayed=False).tolist() == [[0.0, 1.0, 1.0], [1.0, 1.0, 0.0]]
+    assert state.advance(DT, latest_s=0.0).tolist() == [[0.0, 1.0, 1.0], [1.0, 1.0, 0.0]]
 
 
 @pytest.mark.parametrize("scale", [(1.0, 1.0), (0.45, 4.0)])
@@ -79,7 +79,7 @@ def test_errors_of_continuous_actuators_are_shares_of_full_command(scale):
     state = actuation(scale=scale)
     noisy = replace(NOMINAL, action_noise=np.full(WORLDS, 0.05))
     state.begin(full(0.2), noisy, np.array([[-1.0, 0.0, 1.0]] * 2))
-    error = state.advance(DT, delayed=False) - 0.2
+    error = state.advance(DT, latest_s=0.0) - 0.2
     np.testing.assert_allclose(error, 0.05 * np.outer(scale, [-1.0, 0.0, 1.0]), atol=1e-12)
 
 
@@ -87,14 +87,14 @@ def test_errors_of_valves_are_in_their_thrust_and_not_in_whether_they_open():
     state = actuation(binary=True)
     noisy = replace(NOMINAL, action_noise=np.full(WORLDS, 0.05))
     state.begin(full(), noisy, np.array([[-1.0, 0.0, 1.0]] * 2))
-    assert state.advance(DT, delayed=False).tolist() == full().tolist()
+    assert state.advance(DT, latest_s=0.0).tolist() == full().tolist()
     np.testing.assert_allclose(state.gain, [[0.95, 1.0, 1.05]] * 2, atol=1e-12)
 
 
 def test_worlds_brought_back_are_safe_and_the_others_go_on():
     state = actuation(slew=(5.0, 5.0))
     state.begin(full(), NOMINAL, None)
-    state.advance(DT, delayed=False)
+    state.advance(DT, latest_s=0.0)
     kept = state.applied
     state.reset(np.array([1]), np.zeros((2, 1)))
     assert state.applied[0].tolist() == pytest.approx([0.1, 0.0, 0.1])

@@ -20,6 +20,8 @@ MASK = 0xFFFFFFFF
 GOLDEN = 0x9E3779B9  # 2³² / golden ratio: neighbouring counters become far apart
 OTHER = 0x85EBCA6B  # an odd number that shares nothing with it
 
+BLOCK = 64  # numbers of a world that `Draws` makes at once
+
 Keys = tuple[Array, Array]  # two words for each world, shapes (n,)
 
 
@@ -93,7 +95,8 @@ class Draws:
     def __init__(self, seed: int, numbers: Array, repeats: Array, stream: int = START) -> None:
         """Prepare the worlds; arguments as in `world_keys`."""
         self._keys = world_keys(seed, numbers, repeats, stream)
-        self._drawn = 0
+        self._blocks, self._used = 0, BLOCK
+        self._pool: Array = None
         self.worlds = int(self._keys[0].shape[0])
 
     @classmethod
@@ -122,10 +125,17 @@ class Draws:
 
     def _unit(self, shape: tuple[int, ...]) -> Array:
         count = math.prod(shape)
-        bits = words(self._keys, self._drawn, count)
-        self._drawn += 1
-        xp = array_namespace(bits)
-        return xp.reshape(uniform_from(bits, xp.float64).T, (self.worlds, *shape))
+        if self._used + count > (BLOCK if self._pool is None else self._pool.shape[0]):
+            self._refill(max(BLOCK, count))
+        unit = self._pool[self._used : self._used + count]
+        self._used += count
+        return array_namespace(unit).reshape(unit.T, (self.worlds, *shape))
+
+    def _refill(self, count: int) -> None:
+        """Hash many counters at once: for a few worlds the calls cost more than the numbers."""
+        bits = words(self._keys, self._blocks, count)
+        self._pool = uniform_from(bits, array_namespace(bits).float64)
+        self._blocks, self._used = self._blocks + 1, 0
 
 
 def _counter(values: Array) -> Array:

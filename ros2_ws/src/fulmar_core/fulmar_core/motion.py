@@ -30,9 +30,9 @@ def actuation_of(robot: Robot, safe: Array) -> ActuationState:
     return ActuationState(response, binary=robot.actuators.binary, scale=robot.actuators.scale, safe=safe)
 
 
-def may_be_late(robot: Robot, scenario: Scenario) -> bool:
-    """Whether commands act late in any world."""
-    return robot.actuators.response.delay_s > 0.0 or scenario.actuation.delay_s > 0.0
+def longest_delay(robot: Robot, scenario: Scenario) -> float:
+    """Until the latest command of any world acts [s]."""
+    return robot.actuators.response.delay_s + scenario.actuation.delay_s
 
 
 def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:
@@ -48,7 +48,7 @@ def control_step(
     *,
     time_s: Array,
     substeps: int,
-    delayed: bool,
+    latest_s: float,
     off_centre: bool,
 ) -> PlanarState:
     """Move through one control step; the actuators have their command already.
@@ -60,7 +60,7 @@ def control_step(
         world: Bodies and surroundings.
         time_s: Time in each episode [s].
         substeps: Integration steps.
-        delayed: As of `may_be_late`.
+        latest_s: As of `longest_delay` [s].
         off_centre: As of `may_be_off_centre`.
 
     Returns:
@@ -68,7 +68,7 @@ def control_step(
     """
     outside = outside_wrench(state, world, time_s, substeps * robot.timing.physics_dt)
     return move(
-        robot, state, actuation, world, outside, substeps=substeps, delayed=delayed, off_centre=off_centre
+        robot, state, actuation, world, outside, substeps=substeps, latest_s=latest_s, off_centre=off_centre
     )
 
 
@@ -80,23 +80,24 @@ def move(
     outside: Wrench,
     *,
     substeps: int,
-    delayed: bool,
+    latest_s: float,
     off_centre: bool,
 ) -> PlanarState:
     """Move under a push that stays the same; arguments as in `control_step`."""
     dt = robot.timing.physics_dt
     if isinstance(robot.actuators, Rolling):
         for _ in range(substeps):
-            target = actuation.advance(dt, delayed=delayed)
+            target = actuation.advance(dt, latest_s=latest_s)
             state = rolling_step(state, target, actuation.gain, outside, world, robot.actuators, dt)
         return state
-    steady = not (delayed or robot.actuators.response.remembers)
     if off_centre:
         state = _moved(state, world, 1.0)
     push: Wrench | None = None
+    doing: Array = None
     for _ in range(substeps):
-        applied = actuation.advance(dt, delayed=delayed)
-        if push is None or not steady:
+        applied = actuation.advance(dt, latest_s=latest_s)
+        if push is None or applied is not doing:
+            doing = applied
             push = robot.actuators.planar_wrench(applied, actuation.gain)
             if off_centre:
                 ahead, left, moment = push

@@ -14,7 +14,7 @@ from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.episode import Episode, draw_episodes
 from fulmar_core.goal import Goal
-from fulmar_core.motion import actuation_of, control_step, may_be_late, may_be_off_centre
+from fulmar_core.motion import actuation_of, control_step, longest_delay, may_be_off_centre
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
@@ -80,7 +80,8 @@ class BatchSimulation:
         self._numbers = self._whole(first + np.arange(worlds))
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
-        self._delayed, self._off_centre = may_be_late(robot, scenario), may_be_off_centre(robot, scenario)
+        self._latest_s = longest_delay(robot, scenario)
+        self._off_centre = may_be_off_centre(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0
         self._odometer = Odometer(
             robot.sensors.odometry,
@@ -152,7 +153,7 @@ class BatchSimulation:
             self.world,
             time_s=time_s,
             substeps=self.substeps,
-            delayed=self._delayed,
+            latest_s=self._latest_s,
             off_centre=self._off_centre,
         )
         self._steps = self._steps + 1

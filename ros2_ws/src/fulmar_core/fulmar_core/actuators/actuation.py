@@ -65,22 +65,22 @@ class ActuationState:
         self._since_s = 0.0
         self._late = self._response.delay_s + world.action_delay
 
-    def advance(self, dt: float, *, delayed: bool) -> Array:
+    def advance(self, dt: float, *, latest_s: float) -> Array:
         """Let time pass.
 
         Args:
             dt: For how long [s].
-            delayed: Whether any world has a delay; saves the work where none has.
+            latest_s: Longest delay of any world; saves the work after it [s].
 
         Returns:
             What each actuator does during that time, shape (n, worlds).
         """
         target = self._wanted
         xp = array_namespace(target)
-        if delayed:
+        if self._since_s + 0.5 * dt < latest_s:
             assert self._late is not None
             target = xp.where(self._since_s + 0.5 * dt < self._late, self._before, target)
-            self._since_s += dt
+        self._since_s += dt
         if self._slew is not None:
             most = self._slew * dt
             target = self.applied + xp.clip(target - self.applied, -most, most)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from array_api_compat import array_namespace, device
@@ -77,14 +78,10 @@ class Propellers:
             Same shape [N].
         """
         xp = array_namespace(command)
-        table = xp.asarray(self.curve, dtype=command.dtype, device=device(command))
-        last = len(self.curve) - 1
-        place = (xp.clip(command, -1.0, 1.0) + 1.0) * (0.5 * last)
-        below = xp.clip(xp.floor(place), 0.0, last - 1.0)
-        i = xp.astype(below, xp.int64)
-        low = xp.reshape(xp.take(table, xp.reshape(i, (-1,))), i.shape)
-        high = xp.reshape(xp.take(table, xp.reshape(i + 1, (-1,))), i.shape)
-        return low + (high - low) * (place - below)
+        start, rise = _table(self.curve, xp, command.dtype, device(command))
+        place = xp.clip((command + 1.0) * (0.5 * (len(self.curve) - 1)), 0.0, len(self.curve) - 1.0)
+        i = xp.astype(place, xp.int64)
+        return start[i] + rise[i] * (place - xp.astype(i, command.dtype))
 
     def planar_wrench(self, applied: Array, gain: Array) -> tuple[Array, Array, Array]:
         """Force and moment in the body's plane.
@@ -102,3 +99,10 @@ class Propellers:
         arms = self.lever_arms
         moment = sum(float(arms[i]) * thrust[i] for i in range(len(arms)))
         return ahead, xp.zeros_like(ahead), moment
+
+
+@functools.lru_cache(maxsize=16)
+def _table(curve: tuple[float, ...], xp: Any, dtype: Any, where: Any) -> tuple[Array, Array]:
+    """Thrust at each point of a curve, and what it rises by to the next, both of the curve's length."""
+    rise = (*(high - low for low, high in itertools.pairwise(curve)), 0.0)
+    return xp.asarray(curve, dtype=dtype, device=where), xp.asarray(rise, dtype=dtype, device=where)
