@@ -10,7 +10,15 @@ import numpy as np
 import onnxruntime
 
 from fulmar_core.errors import BundleError
-from fulmar_core.policy_bundle import GOLDEN, NETWORK, Passport, check_fit, read_golden, read_passport
+from fulmar_core.policy_bundle import (
+    GOLDEN,
+    NETWORK,
+    Golden,
+    Passport,
+    check_fit,
+    read_golden,
+    read_passport,
+)
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
@@ -43,16 +51,28 @@ class Policy:
         check_fit(self.passport, robot, task, self.control_hz, where=str(folder))
         self.observation_names = self.passport.observation_names
         self._session = _open(folder)
+        self._memory: np.ndarray | None = None
         _check_shapes(self._session, self.passport, folder)
         _check_golden(self._session, self.passport, folder)
 
     def reset(self) -> None:
-        """Nothing to forget: the network has no memory."""
+        """Forget what was seen, if the network remembers anything."""
+        self._memory = None
 
     def act(self, observation: Array) -> Array:
-        """Choose actuators; shapes as in `Controller.act`."""
+        """Choose actuators; shapes as in `Controller.act`.
+
+        A network with memory remembers every row by itself, until `reset` or another number of rows.
+        """
         batch = np.atleast_2d(np.asarray(observation, dtype=np.float32))
-        (command,) = self._session.run(["command"], {"observation": batch})
+        if self.passport.memory:
+            if self._memory is None or len(self._memory) != len(batch):
+                self._memory = np.zeros((len(batch), self.passport.memory), dtype=np.float32)
+            command, self._memory = self._session.run(
+                ["command", "next_memory"], {"observation": batch, "memory": self._memory}
+            )
+        else:
+            (command,) = self._session.run(["command"], {"observation": batch})
         return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
 
     def metadata(self) -> dict[str, Any]:
@@ -78,32 +98,68 @@ def _open(folder: Path) -> onnxruntime.InferenceSession:
 def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:
     inputs = {node.name: node for node in session.get_inputs()}
     outputs = {node.name: node for node in session.get_outputs()}
-    wanted = (
+    wanted = [
         (inputs, "observation", len(passport.observation_names)),
         (outputs, "command", len(passport.actuator_names)),
         (outputs, "logits", len(passport.actuator_names)),
-    )
+    ]
+    takes = ["observation"]
+    if passport.memory:
+        wanted += [(inputs, "memory", passport.memory), (outputs, "next_memory", passport.memory)]
+        takes.append("memory")
     for found, name, width in wanted:
         if name not in found:
             raise BundleError(f"{folder / NETWORK}: has no tensor '{name}', only {', '.join(found)}.")
         shape, kind = found[name].shape, found[name].type
         if len(shape) != 2 or isinstance(shape[0], int) or shape[1] != width:
             raise BundleError(
-                f"{folder / NETWORK}: '{name}' has shape {shape}, the passport's names need (any number, {width})."
+                f"{folder / NETWORK}: '{name}' has shape {shape}, the passport needs (any number, {width})."
             )
         if kind != "tensor(float)":
             raise BundleError(f"{folder / NETWORK}: '{name}' is a {kind}, it must be a tensor(float).")
-    if len(inputs) > 1:
-        raise BundleError(f"{folder / NETWORK}: takes {', '.join(inputs)}; it must take 'observation' alone.")
+    if len(inputs) > len(takes):
+        alone = " and ".join(f"'{name}'" for name in takes)
+        raise BundleError(f"{folder / NETWORK}: takes {', '.join(inputs)}; it must take {alone} alone.")
 
 
 def _check_golden(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:
     golden = read_golden(folder)
+    _check_golden_shapes(golden, passport, folder)
+    feed = {"observation": golden.observations}
+    names = ["command", "logits"]
+    if passport.memory:
+        feed["memory"] = golden.memories
+        names.append("next_memory")
+    try:
+        command, logits, *memories = session.run(names, feed)
+    except Exception as error:
+        reason = str(error).splitlines()[0]
+        raise BundleError(f"{folder / NETWORK}: cannot be run: {reason}. Export the policy again.") from error
+    pairs = [(logits, golden.logits), *((found, golden.next_memories) for found in memories)]
+    worst = float(np.max([np.max(np.abs(found - expected)) for found, expected in pairs]))
+    if not worst <= GOLDEN_TOLERANCE:
+        raise BundleError(
+            f"policy '{folder}' differs from its golden vectors by {worst:.2g} (at most {GOLDEN_TOLERANCE:g}). "
+            "This machine computes something else than the one that exported it."
+        )
+    if passport.action == "on_off":
+        clear = np.abs(golden.logits) > GOLDEN_TOLERANCE  # a logit of nearly zero may round either way
+        same = np.array_equal(command[clear], golden.commands[clear])
+    else:
+        away = np.abs(command - golden.commands) / np.asarray(passport.command_scale)
+        same = bool(np.all(away <= GOLDEN_TOLERANCE))
+    if not same:
+        raise BundleError(f"policy '{folder}' gives other commands than its golden vectors. Export it again.")
+
+
+def _check_golden_shapes(golden: Golden, passport: Passport, folder: Path) -> None:
     count = len(golden.observations) if golden.observations.ndim else 0
     for name, width in (
         ("observations", len(passport.observation_names)),
+        ("memories", passport.memory),
         ("commands", len(passport.actuator_names)),
         ("logits", len(passport.actuator_names)),
+        ("next_memories", passport.memory),
     ):
         found = getattr(golden, name)
         if count == 0 or found.shape != (count, width) or found.dtype != np.float32:
@@ -111,17 +167,3 @@ def _check_golden(session: onnxruntime.InferenceSession, passport: Passport, fol
                 f"{folder / GOLDEN}: '{name}' is {found.dtype} of shape {found.shape}, it must be float32 of shape "
                 f"({count or 'at least 1'}, {width}). Export the policy again."
             )
-    try:
-        command, logits = session.run(["command", "logits"], {"observation": golden.observations})
-    except Exception as error:
-        reason = str(error).splitlines()[0]
-        raise BundleError(f"{folder / NETWORK}: cannot be run: {reason}. Export the policy again.") from error
-    worst = float(np.max(np.abs(logits - golden.logits)))
-    if not worst <= GOLDEN_TOLERANCE:
-        raise BundleError(
-            f"policy '{folder}' differs from its golden vectors by {worst:.2g} (at most {GOLDEN_TOLERANCE:g}). "
-            "This machine computes something else than the one that exported it."
-        )
-    clear = np.abs(golden.logits) > GOLDEN_TOLERANCE  # a logit of nearly zero may round either way
-    if not np.array_equal(command[clear], golden.commands[clear]):
-        raise BundleError(f"policy '{folder}' gives other commands than its golden vectors. Export it again.")

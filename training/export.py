@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from pathlib import Path
 from typing import Any
@@ -14,14 +13,16 @@ import torch
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
-from fulmar_core.policy_bundle import FORMAT, Golden, Passport, write_bundle
+from fulmar_core.observation import Observer
+from fulmar_core.policy_bundle import FORMAT, Golden, Passport, action_of, write_bundle
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from training.network import DeployedNetwork, load_network
-from training.train import NETWORK_FILE, RUN_FILE
+from training.run_folder import NETWORK_FILE, read_run_record
 
 GOLDEN_VECTORS = 64
+GOLDEN_STEPS = 5  # commands between the two moments that golden vectors are taken at
 OPSET = 18
 
 
@@ -40,19 +41,25 @@ def export(run: Path, out: Path) -> Passport:
     """
     record = read_run_record(run)
     robot, task = load_robot(record["robot"]), load_task(record["task"])
-    network = load_network(run / NETWORK_FILE)
-    if network.observation_count != len(task.observation_names):
+    network, names = load_network(run / NETWORK_FILE), Observer(robot, task).names
+    plan = network.plan
+    if plan.inputs != len(names):
         raise ConfigError(
-            f"{run}: the network takes {network.observation_count} terms, task '{task.name}' now has "
-            f"{len(task.observation_names)}. Train again."
+            f"{run}: the network takes {plan.inputs} terms, '{robot.name}' and '{task.name}' now have {len(names)}. "
+            "Train again."
         )
+    if plan.on_off != robot.actuators.binary or plan.outputs != len(robot.actuators.names):
+        raise ConfigError(f"{run}: the actuators of '{robot.name}' have changed since. Train again.")
     passport = Passport(
         format=FORMAT,
         robot=robot.name,
         task=task.name,
         control_hz=float(record["control_hz"]),
-        observation_names=task.observation_names,
+        observation_names=names,
         actuator_names=robot.actuators.names,
+        action=action_of(robot),
+        command_scale=plan.command_scale,
+        memory=plan.memory,
         network_sha256="",
         golden_sha256="",
         training={
@@ -62,41 +69,6 @@ def export(run: Path, out: Path) -> Passport:
         | _verdict(record),
     )
     return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
-
-
-def read_run_record(run: Path) -> dict[str, Any]:
-    """What `train` wrote about a run.
-
-    Raises:
-        ConfigError: If `run` is no finished run folder.
-    """
-    path = run / RUN_FILE
-    if not path.is_file() or not (run / NETWORK_FILE).is_file():
-        raise ConfigError(
-            f"{run}: no finished training run ({RUN_FILE} or {NETWORK_FILE} is missing). Run `fulmar train`."
-        )
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ConfigError(f"{path}: not valid JSON: {error}. Train again.") from error
-    needed = (
-        "robot",
-        "task",
-        "control_hz",
-        "command",
-        "seed",
-        "steps",
-        "wall_s",
-        "settings",
-        "best",
-        "versions",
-    )
-    missing = [key for key in needed if not isinstance(record, dict) or key not in record]
-    if missing:
-        raise ConfigError(
-            f"{path}: lacks '{missing[0]}', so it is not what `fulmar train` left. Train again."
-        )
-    return dict(record)
 
 
 def _verdict(record: dict[str, Any]) -> dict[str, Any]:
@@ -110,14 +82,16 @@ def _verdict(record: dict[str, Any]) -> dict[str, Any]:
 
 
 def _to_onnx(network: DeployedNetwork) -> bytes:
-    example = torch.zeros(2, network.observation_count)
+    memory = network.plan.memory
+    example = [torch.zeros(2, network.plan.inputs), *([torch.zeros(2, memory)] if memory else [])]
+    worlds = torch.export.Dim("worlds")
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of optional packages that nobody needs
     program = torch.onnx.export(
         network,
-        (example,),
-        input_names=["observation"],
-        output_names=["command", "logits"],
-        dynamic_shapes=({0: torch.export.Dim("worlds")},),
+        tuple(example),
+        input_names=["observation", *(["memory"] if memory else [])],
+        output_names=["command", "logits", *(["next_memory"] if memory else [])],
+        dynamic_shapes=tuple({0: worlds} for _ in example),
         opset_version=OPSET,
         dynamo=True,
         verbose=False,
@@ -145,14 +119,16 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
 
 
 def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
-    """Observations from the start of held-out episodes and a second later, with what the network makes of them."""
+    """What the network makes of held-out episodes at their start, and a few commands later."""
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
     )
-    observations = [task.observe(simulation.measured, simulation.goal)]
-    for _ in range(5):
-        command, _ = network.infer(task.observe(simulation.measured, simulation.goal))
+    memory = np.zeros((GOLDEN_VECTORS // 2, network.plan.memory), dtype=np.float32)
+    moments = []
+    for _ in range(GOLDEN_STEPS + 1):
+        seen = np.asarray(simulation.observe(), dtype=np.float32)
+        command, logits, after = network.infer(seen, memory)
+        moments.append((seen, memory, command, logits, after))
         simulation.step(command)
-    observations.append(task.observe(simulation.measured, simulation.goal))
-    batch = np.concatenate(observations).astype(np.float32)
-    return Golden(batch, *network.infer(batch))
+        memory = after
+    return Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))

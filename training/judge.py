@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import JUDGE_SEED
 from fulmar_core.metrics import summary
+from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import load_task
 from sim_nodes.mujoco_backend import MujocoBackend
-from training.export import read_run_record
 from training.network import NetworkController, load_network
-from training.train import NETWORK_FILE, RUN_FILE
+from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
 
 
 def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> dict[str, Any]:
@@ -32,7 +31,7 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
     record = read_run_record(run)
     robot, task, world = load_robot(record["robot"]), load_task(record["task"]), load_scenario(scenario)
     controller = NetworkController(
-        load_network(run / NETWORK_FILE), task.observation_names, record["control_hz"]
+        load_network(run / NETWORK_FILE), Observer(robot, task).names, record["control_hz"]
     )
     trajectories = roll_out_in_backends(
         controller,
@@ -44,5 +43,5 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
     )
     figures: dict[str, Any] = summary(trajectories, task)
     record["mujoco"] = {"scenario": scenario, "seed": JUDGE_SEED, **figures}
-    (run / RUN_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    write_run_record(run, record)
     return figures

@@ -5,111 +5,133 @@ from __future__ import annotations
 import itertools
 import pickle
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
-from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.rotation import Array
 
 
-class DeployedNetwork(nn.Module):
-    """Observation in, logits and on/off command out; what `export` writes to ONNX."""
+@dataclass(frozen=True)
+class NetworkPlan:
+    """Everything about a deployed network but its numbers."""
 
-    def __init__(self, sizes: Sequence[int], *, limit: float) -> None:
-        """Build an untrained network of tanh layers.
-
-        Args:
-            sizes: Number of observation terms, of units of each hidden layer, and of actuators.
-            limit: Normalised observations are cut to this.
-        """
-        super().__init__()
-        self.limit = limit
-        self.register_buffer("mean", torch.zeros(sizes[0]))
-        self.register_buffer("scale", torch.ones(sizes[0]))
-        layers: list[nn.Module] = []
-        for inputs, outputs in itertools.pairwise(sizes):
-            layers += [nn.Linear(inputs, outputs), nn.Tanh()]
-        self.layers = nn.Sequential(*layers[:-1])
-        self.eval()
+    inputs: int  # observation terms
+    hidden: tuple[int, ...]  # sizes of the hidden layers
+    outputs: int  # actuators
+    activation: Literal["tanh", "relu"]
+    decision: Literal["threshold", "clamp", "squash"]  # how raw outputs become shares of full command
+    command_scale: tuple[float, ...]  # full command of each actuator, in its own unit
+    limit: float  # normalised observations are cut to this
+    memory: int = 0  # numbers that an LSTM before the hidden layers carries over; 0: there is none
 
     @property
-    def observation_count(self) -> int:
-        """Number of terms it takes."""
-        return int(self.mean.shape[0])
+    def on_off(self) -> bool:
+        """Whether its commands are zeros and ones."""
+        return self.decision == "threshold"
+
+
+class DeployedNetwork(nn.Module):
+    """Observation in, command and raw outputs out; what `export` writes to ONNX."""
 
     mean: torch.Tensor
     scale: torch.Tensor
+    command_scale: torch.Tensor
 
-    def forward(self, observation: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Choose the more likely state of each actuator.
+    def __init__(self, plan: NetworkPlan) -> None:
+        """Build an untrained network."""
+        super().__init__()
+        self.plan = plan
+        self.register_buffer("mean", torch.zeros(plan.inputs))
+        self.register_buffer("scale", torch.ones(plan.inputs))
+        self.register_buffer("command_scale", torch.tensor(plan.command_scale, dtype=torch.float32))
+        units = plan.memory // 2
+        self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
+        self.from_memory = nn.Linear(units, 4 * units) if units else None
+        sizes = [units or plan.inputs, *plan.hidden, plan.outputs]
+        layers: list[nn.Module] = []
+        for inputs, outputs in itertools.pairwise(sizes):
+            layers += [nn.Linear(inputs, outputs), nn.Tanh() if plan.activation == "tanh" else nn.ReLU()]
+        self.layers = nn.Sequential(*layers[:-1])
+        self.eval()
+
+    def forward(
+        self, observation: torch.Tensor, memory: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, ...]:
+        """Choose commands.
 
         Args:
             observation: Raw terms, shape (worlds, n).
+            memory: What it returned the time before, zeros at first, shape (worlds, `plan.memory`); only if it has
+                memory.
 
         Returns:
-            Command of zeros and ones, and the logits behind it, both of shape (worlds, m).
+            Commands in the actuators' units and the raw outputs behind them, both of shape (worlds, m), and the next
+            memory if it has any.
         """
-        normal = torch.clamp((observation - self.mean) / self.scale, -self.limit, self.limit)
-        logits = self.layers(normal)
-        return (logits > 0.0).to(torch.float32), logits
+        features = torch.clamp((observation - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
+        if memory is None:
+            raw = self.layers(features)
+            return self._decide(raw), raw
+        memory = self._remember(features, memory)
+        raw = self.layers(memory[:, : self.plan.memory // 2])
+        return self._decide(raw), raw, memory
 
-    def infer(self, observation: Array) -> tuple[np.ndarray, np.ndarray]:
-        """Command and logits as NumPy, shapes as in `forward`."""
+    def _remember(self, features: torch.Tensor, memory: torch.Tensor) -> torch.Tensor:
+        """One step of an LSTM: its output and its cell, side by side (Hochreiter and Schmidhuber 1997)."""
+        assert self.from_input is not None
+        assert self.from_memory is not None
+        output, cell = memory.split(self.plan.memory // 2, dim=1)
+        gates = self.from_input(features) + self.from_memory(output)
+        take, keep, new, show = gates.split(self.plan.memory // 2, dim=1)
+        cell = torch.sigmoid(keep) * cell + torch.sigmoid(take) * torch.tanh(new)
+        return torch.cat((torch.sigmoid(show) * torch.tanh(cell), cell), dim=1)
+
+    def _decide(self, raw: torch.Tensor) -> torch.Tensor:
+        if self.plan.decision == "threshold":
+            return (raw > 0.0).to(torch.float32)  # the more likely state of each
+        share = torch.tanh(raw) if self.plan.decision == "squash" else torch.clamp(raw, -1.0, 1.0)
+        return share * self.command_scale
+
+    def infer(
+        self, observation: Array, memory: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Command, raw outputs and next memory as NumPy.
+
+        Args:
+            observation: Shape (worlds, n).
+            memory: Shape (worlds, `plan.memory`); zeros by default.
+        """
+        seen = torch.as_tensor(np.asarray(observation, dtype=np.float32))
         with torch.inference_mode():
-            command, logits = self(torch.as_tensor(np.asarray(observation, dtype=np.float32)))
-        return command.numpy(), logits.numpy()
-
-
-def deployed_network(learner: PPO, normaliser: VecNormalize) -> DeployedNetwork:
-    """Copy a learner's present weights and statistics.
-
-    Args:
-        learner: A PPO with an MLP policy of tanh layers over on/off actuators.
-        normaliser: Holds the running mean and variance of the observations.
-
-    Returns:
-        A network that shares nothing with the learner.
-    """
-    statistics = normaliser.obs_rms
-    assert not isinstance(statistics, dict)
-    trained = (*learner.policy.mlp_extractor.policy_net, learner.policy.action_net)
-    linear = [layer for layer in trained if isinstance(layer, nn.Linear)]
-    network = DeployedNetwork(
-        [linear[0].in_features, *(layer.out_features for layer in linear)], limit=normaliser.clip_obs
-    )
-    network.mean.copy_(torch.as_tensor(statistics.mean, dtype=torch.float32))
-    network.scale.copy_(torch.as_tensor(np.sqrt(statistics.var + normaliser.epsilon), dtype=torch.float32))
-    twins = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
-    for twin, layer in zip(twins, linear, strict=True):
-        twin.load_state_dict(layer.state_dict())
-    return network
+            if not self.plan.memory:
+                command, raw = self(seen)
+                return command.numpy(), raw.numpy(), np.zeros((len(seen), 0), np.float32)
+            before = torch.zeros(len(seen), self.plan.memory) if memory is None else torch.as_tensor(memory)
+            command, raw, after = self(seen, before)
+        return command.numpy(), raw.numpy(), after.numpy()
 
 
 def save_network(network: DeployedNetwork, path: Path) -> None:
-    """Write weights and statistics."""
-    torch.save({"limit": network.limit, "state": network.state_dict()}, path)
+    """Write plan, weights and statistics."""
+    torch.save({"plan": asdict(network.plan), "state": network.state_dict()}, path)
 
 
 def load_network(path: Path) -> DeployedNetwork:
-    """Read what `save_network` wrote; tensors only, no pickled code.
+    """Read what `save_network` wrote; tensors and numbers only, no pickled code.
 
     Raises:
         ConfigError: If the file holds anything else.
     """
     try:
         content = torch.load(path, weights_only=True)
-        state = content["state"]
-        weights = [value for name, value in state.items() if name.endswith("weight")]
-        network = DeployedNetwork(
-            [weights[0].shape[1], *(w.shape[0] for w in weights)], limit=content["limit"]
-        )
-        network.load_state_dict(state)
+        network = DeployedNetwork(NetworkPlan(**content["plan"]))
+        network.load_state_dict(content["state"])
     except (
         OSError,
         EOFError,
@@ -130,20 +152,23 @@ class NetworkController:
 
     name = "policy"
 
-    def __init__(
-        self, network: DeployedNetwork, observation_names: tuple[str, ...], control_hz: float
-    ) -> None:
+    def __init__(self, network: DeployedNetwork, observation_names: Sequence[str], control_hz: float) -> None:
         """Wrap a network; rate in Hz."""
         self._network = network
-        self.observation_names = observation_names
+        self.observation_names = tuple(observation_names)
         self.control_hz = control_hz
+        self._memory: np.ndarray | None = None
 
     def reset(self) -> None:
-        """Nothing to forget: the network has no memory."""
+        """Forget what was seen."""
+        self._memory = None
 
     def act(self, observation: Array) -> Array:
         """Choose actuators; shapes as in `Controller.act`."""
-        command, _ = self._network.infer(np.atleast_2d(observation))
+        batch = np.atleast_2d(observation)
+        if self._memory is not None and len(self._memory) != len(batch):
+            self._memory = None
+        command, _, self._memory = self._network.infer(batch, self._memory)
         return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
 
     def metadata(self) -> dict[str, Any]:

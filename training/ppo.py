@@ -1,22 +1,24 @@
-"""PPO of Stable-Baselines3, built from our settings, with a learning rate that follows the KL divergence."""
+"""PPO from our settings, with or without memory, and a learning rate that follows the KL divergence."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import torch
+from gymnasium import spaces
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
 from training.fast_ppo import FastPPO
-from training.settings import PpoSettings
+from training.settings import OnPolicy, Ppo, RecurrentPpo
 
 
 class KlAdaptiveRate:
     """Learning rate that falls when updates go too far and rises when they do too little."""
 
-    def __init__(self, settings: PpoSettings) -> None:
+    def __init__(self, settings: OnPolicy) -> None:
         """Begin at the settings' rate."""
         self.rate = settings.learning_rate
         self._low, self._high = settings.learning_rate_range
@@ -52,26 +54,33 @@ class KlFeedback(BaseCallback):
 
 
 def build_ppo(
-    settings: PpoSettings, env: VecEnv, *, seed: int, tensorboard: str | None = None, fast: bool = True
-) -> tuple[PPO, KlFeedback]:
-    """PPO over an environment.
+    settings: Ppo | RecurrentPpo, env: VecEnv, *, seed: int, tensorboard: str | None = None
+) -> PPO | RecurrentPPO:
+    """PPO over an environment; it must learn with `KlFeedback(learner.learning_rate)`.
 
     Args:
         settings: Hyper-parameters.
         env: Environment, usually normalised.
         seed: Seed of weights and action sampling.
         tensorboard: Folder for TensorBoard, or None.
-        fast: Use our faster PPO, instead of Stable-Baselines3's own.
 
     Returns:
-        The learner, and the callback it must learn with.
+        The learner.
     """
-    rate = KlAdaptiveRate(settings)
-    net_arch: dict[str, Any] = {"pi": list(settings.hidden), "vf": list(settings.hidden)}
-    learner = (FastPPO if fast else PPO)(
-        "MlpPolicy",
+    sizes = list(settings.hidden)
+    policy: dict[str, Any] = {"net_arch": {"pi": sizes, "vf": sizes}, "activation_fn": torch.nn.Tanh}
+    if isinstance(env.action_space, spaces.Box):
+        policy["log_std_init"] = settings.log_std
+    kind: type[PPO | RecurrentPPO] = PPO
+    if isinstance(settings, RecurrentPpo):
+        kind = RecurrentPPO
+        policy["lstm_hidden_size"] = settings.memory
+    elif settings.fast:
+        kind = FastPPO
+    return kind(
+        "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy",
         env,
-        learning_rate=rate,
+        learning_rate=KlAdaptiveRate(settings),
         n_steps=settings.steps,
         batch_size=settings.minibatch,
         n_epochs=settings.epochs,
@@ -79,10 +88,9 @@ def build_ppo(
         gae_lambda=settings.gae_lambda,
         clip_range=settings.clip_range,
         max_grad_norm=settings.max_grad_norm,
-        ent_coef=0.0,
-        policy_kwargs={"net_arch": net_arch, "activation_fn": torch.nn.Tanh},
+        ent_coef=settings.entropy,
+        policy_kwargs=policy,
         tensorboard_log=tensorboard,
         seed=seed,
         device="cpu",
     )
-    return learner, KlFeedback(rate)

@@ -1,20 +1,25 @@
-"""What a training run is made with, as read from `configs/training/<robot>_<task>.yaml`."""
+"""What a training run is made with, as read from `configs/training/<robot>_<task>.yaml` or `<family>.yaml`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal
+
+import yaml
 
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
 
 
-@dataclass(frozen=True)
-class PpoSettings:
+@dataclass(frozen=True, kw_only=True)
+class OnPolicy:
     """Hyper-parameters of PPO (Schulman et al., arXiv 1707.06347), in its own terms."""
 
-    worlds: int  # simulated in one batch
     steps: int  # control steps of each world between updates
     minibatch: int
     epochs: int
@@ -25,44 +30,147 @@ class PpoSettings:
     gae_lambda: float
     clip_range: float
     max_grad_norm: float
-    reward_scale: float
     hidden: tuple[int, ...]  # sizes of the hidden layers, of policy and value alike
+    entropy: float = 0.0  # weight of the entropy in the loss
+    log_std: float = 0.0  # logarithm of the first standard deviation of continuous actions
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ppo(OnPolicy):
+    """PPO without memory."""
+
+    kind: Literal["ppo"] = "ppo"
+    fast: bool = True  # our faster computation of it instead of the one of Stable-Baselines3
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecurrentPpo(OnPolicy):
+    """PPO with an LSTM before the hidden layers, of policy and value alike (sb3-contrib)."""
+
+    kind: Literal["recurrent_ppo"] = "recurrent_ppo"
+    memory: int  # units of the LSTM
+
+
+@dataclass(frozen=True, kw_only=True)
+class OffPolicy:
+    """What SAC and TD3 have in common; every step of the batch of worlds is followed by `gradient_steps`."""
+
+    learning_rate: float
+    buffer: int  # transitions remembered
+    minibatch: int
+    first_steps: int  # transitions before learning begins
+    gradient_steps: int
+    tau: float  # how fast the target networks follow [-]
+    gamma: float
+    hidden: tuple[int, ...]  # sizes of the hidden layers
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sac(OffPolicy):
+    """Soft actor-critic (Haarnoja et al., arXiv 1812.05905); its temperature adapts itself."""
+
+    kind: Literal["sac"] = "sac"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Td3(OffPolicy):
+    """Twin delayed DDPG (Fujimoto et al., arXiv 1802.09477)."""
+
+    kind: Literal["td3"] = "td3"
+    action_noise: float  # standard deviation of the exploration, as a share of full command [-]
+
+
+Algorithm = Ppo | RecurrentPpo | Sac | Td3
+
+
+@dataclass(frozen=True)
+class Curriculum:
+    """The scenario grows from a share of its strength to all of it, linearly over part of the run."""
+
+    start: float  # strength at the beginning, 0: nominal [-]
+    until: float  # share of the run after which it is whole [-]
 
     def __post_init__(self) -> None:
-        """Refuse sizes that do not divide."""
-        if (self.worlds * self.steps) % self.minibatch:
-            raise ValueError(
-                f"worlds · steps = {self.worlds * self.steps} must be a multiple of 'minibatch'."
-            )
+        """Refuse shares that are none."""
+        if not (0.0 <= self.start <= 1.0 and 0.0 < self.until <= 1.0):
+            raise ValueError("'start' must lie in [0, 1] and 'until' in (0, 1].")
+
+    def strength(self, progress: float) -> float:
+        """Strength of the scenario, where `progress` is the share of the run that is over [-]."""
+        return min(1.0, self.start + (1.0 - self.start) * progress / self.until)
+
+
+@dataclass(frozen=True)
+class StopAtSuccess:
+    """Ends a run early, once it has learned its task."""
+
+    rate: float  # success rate that is enough [-]
+    checks: int = 2  # in a row
+
+    def __post_init__(self) -> None:
+        """Refuse what would always or never stop."""
+        if not 0.0 < self.rate <= 1.0 or self.checks < 1:
+            raise ValueError("'rate' must lie in (0, 1] and 'checks' be at least 1.")
 
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """Algorithm, scenario and when to stop."""
+    """Algorithm, worlds to learn in, and when to stop."""
 
-    algorithm: Literal["ppo"]
+    algorithm: Algorithm
     scenario: str  # name of the scenario that episodes are drawn from
+    worlds: int  # simulated in one batch
+    reward_scale: float
     time_limit_s: float  # wall-clock of the learning itself [s]
     evaluate_every_s: float  # wall-clock between checks on held-out episodes [s]
-    ppo: PpoSettings
+    checkpoint_every_s: float = 30.0  # wall-clock between checkpoints to resume from [s]
+    threads: int = 1  # of PyTorch; a second one gains little and loses much on a shared machine
+    curriculum: Curriculum | None = None
+    stop_at_success: StopAtSuccess | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that do not divide."""
+        algorithm = self.algorithm
+        if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
+            raise ValueError(
+                f"worlds · steps = {self.worlds * algorithm.steps} must be a multiple of 'minibatch'."
+            )
+        if min(self.worlds, self.threads) < 1 or self.time_limit_s <= 0.0:
+            raise ValueError("'worlds' and 'threads' must be at least 1, 'time_limit_s' greater than 0.")
+
+    def strength(self, progress: float) -> float:
+        """Strength of the scenario when this share of the run is over [-]."""
+        return self.curriculum.strength(progress) if self.curriculum else 1.0
 
 
-def load_training_settings(robot: str, task: str) -> TrainingSettings:
-    """Read `configs/training/<robot>_<task>.yaml`.
+def load_training_settings(robot: Robot, task: Task, name: str | None = None) -> TrainingSettings:
+    """Read the settings for a robot and a task.
 
     Args:
-        robot: Name of the robot.
-        task: Name of the task.
+        robot: The robot.
+        task: The task.
+        name: A file of `configs/training`, or a path to a YAML file; by default `<robot>_<task>`, if there is one,
+            else the one of the robot's family of actuators, such as `thrusters`.
 
     Returns:
         The settings.
 
     Raises:
-        ConfigError: No such file, or a mistake in it.
+        ConfigError: No such file, a mistake in it, or an algorithm that cannot drive this robot.
     """
-    name = f"{robot}_{task}"
-    if name not in config_names("training"):
+    own = f"{robot.name}_{task.name}"
+    name = name or (own if own in config_names("training") else robot.actuators.kind)
+    path = Path(name) if name.endswith((".yaml", ".yml")) else config_path("training", name)
+    settings = load_config(TrainingSettings, path)
+    if robot.actuators.binary and isinstance(settings.algorithm, OffPolicy):
         raise ConfigError(
-            f"no training settings for '{robot}' and '{task}'. Write configs/training/{name}.yaml."
+            f"{path}: {settings.algorithm.kind} needs actuators that move by degrees, those of '{robot.name}' are "
+            "on/off. Use ppo or recurrent_ppo."
         )
-    return load_config(TrainingSettings, config_path("training", name))
+    return settings
+
+
+def write_training_settings(settings: TrainingSettings, path: Path) -> None:
+    """Write settings as a YAML file that `load_training_settings` reads."""
+    plain = json.loads(json.dumps(asdict(settings)))  # tuples become lists
+    path.write_text(yaml.safe_dump(plain, sort_keys=False), encoding="utf-8")

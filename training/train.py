@@ -1,113 +1,44 @@
-"""Learn a controller in the core's batch and leave a run folder that `export` understands.
-
-A run folder holds `run.json` (what was done), `network.pt` (the best weights) and `tensorboard/`, also when a person
-ended the run early.
-"""
+"""Learn a controller in the core's batch and leave a run folder that `export` understands."""
 
 from __future__ import annotations
 
-import json
 import platform
-import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+import signal
+import threading
+import types
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import torch
-from stable_baselines3.common.callbacks import BaseCallback, CallbackList
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import CallbackList
+from stable_baselines3.common.logger import KVWriter, configure
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.episode import HELD_OUT_SEED, JUDGING_SEEDS
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import JUDGING_SEEDS
 from fulmar_core.errors import ConfigError
-from fulmar_core.metrics import summary
 from fulmar_core.robot import Robot
-from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import Task
-from training.network import DeployedNetwork, NetworkController, deployed_network, save_network
-from training.ppo import build_ppo
-from training.progress import LearningBar
-from training.settings import TrainingSettings
+from training.checkpoint import load_checkpoint
+from training.checks import held_out_judge
+from training.learners import build_learner, callbacks_of
+from training.network import save_network
+from training.progress import LearningBar, Watcher
+from training.run_folder import (
+    CHECKPOINT_FILE,
+    NETWORK_FILE,
+    SETTINGS_FILE,
+    TENSORBOARD_FOLDER,
+    write_run_record,
+)
+from training.session import Limits, RunIsOver, Session, Story
+from training.settings import OffPolicy, TrainingSettings, write_training_settings
 from training.vec_env import BatchVecEnv
-
-NETWORK_FILE = "network.pt"
-RUN_FILE = "run.json"
-
-
-Judge = Callable[[DeployedNetwork], tuple[float, float]]  # success rate and score
-
-
-@dataclass(frozen=True)
-class Check:
-    """One look at the learner on held-out episodes, in the batch."""
-
-    wall_s: float
-    steps: int
-    success_rate: float  # mean of the training scenario and the nominal one
-    score: float  # orders checks: success first, then precision, then economy
-
-
-class _TimedLearning(BaseCallback):
-    """Checks the learner now and then, keeps the best network, and stops when time is up."""
-
-    def __init__(
-        self,
-        judge: Judge,
-        settings: TrainingSettings,
-        limit: float,
-    ) -> None:
-        super().__init__()
-        self._judge, self._settings, self._limit = judge, settings, limit
-        self._began = time.monotonic()
-        self._next_check = settings.evaluate_every_s
-        self._bar = LearningBar(limit)
-        self.checks: list[Check] = []
-        self.best: tuple[Check, DeployedNetwork] | None = None
-
-    def _on_training_start(self) -> None:
-        self._bar.__enter__()
-
-    def _on_training_end(self) -> None:
-        self._bar.__exit__(None, None, None)
-
-    def _on_step(self) -> bool:
-        return True
-
-    @property
-    def elapsed_s(self) -> float:
-        """Wall-clock since the beginning [s]."""
-        return time.monotonic() - self._began
-
-    def _on_rollout_end(self) -> None:
-        elapsed = self.elapsed_s
-        self._bar.advance(min(elapsed, self._limit), self.num_timesteps)
-
-    def _on_rollout_start(self) -> None:
-        elapsed = self.elapsed_s
-        if elapsed >= min(self._next_check, self._limit):
-            self._check(elapsed)
-            self._next_check = elapsed + self._settings.evaluate_every_s
-
-    def _check(self, elapsed: float) -> None:
-        normaliser = self.model.get_vec_normalize_env()
-        assert normaliser is not None
-        network = deployed_network(self.model, normaliser)  # type: ignore[arg-type]
-        success, score = self._judge(network)
-        check = Check(elapsed, self.num_timesteps, success, score)
-        if self.best is None or score > self.best[0].score:
-            self.best = check, network  # at once, since a person may interrupt anywhere
-        self.checks.append(check)
-        self._bar.verdict(elapsed, f"success {success:.3f}")
-        self.logger.record("held_out/success_rate", success)
-        self.logger.record("held_out/score", score)
-        if elapsed >= self._limit:
-            raise _TimeIsUp
-
-
-class _TimeIsUp(Exception):  # noqa: N818 - it is the planned end, no error
-    """Ends learning between two updates."""
 
 
 def train(
@@ -118,10 +49,14 @@ def train(
     seed: int,
     out: Path,
     time_limit_s: float | None = None,
+    updates: int | None = None,
+    resume: bool = False,
     command: str = "",
     git_revision: str = "",
+    watcher: Watcher | None = None,
+    curves: KVWriter | None = None,
 ) -> dict[str, Any]:
-    """Learn until the time is up.
+    """Learn until a limit is reached, the task is learned, or a person has seen enough.
 
     Args:
         robot: The robot.
@@ -129,43 +64,62 @@ def train(
         settings: How to learn.
         seed: Seed of everything random, >= 0, and none of `JUDGING_SEEDS`.
         out: Run folder; made if need be.
-        time_limit_s: Wall-clock of learning; the settings' by default [s].
+        time_limit_s: Wall-clock of learning; the settings' by default, none if `updates` are given [s].
+        updates: How many updates to do; as many as there is time for by default.
+        resume: Go on from the checkpoint in `out`, exactly.
         command: Command line that started this, for the record.
         git_revision: Commit of the code, for the record.
+        watcher: Whom to tell how it goes; a progress bar by default.
+        curves: Where curves go beside TensorBoard.
 
     Returns:
         What `run.json` says.
 
     Raises:
-        ConfigError: If the seed is one of those kept for judging.
-        KeyboardInterrupt: A person ended it; the run folder is finished with the best network so far, if there
-            is one yet.
+        ConfigError: If the seed is one of those kept for judging, or there is nothing to resume.
+        KeyboardInterrupt: A person ended it; the run folder is finished with the best network so far.
     """
     if seed < 0 or seed in JUDGING_SEEDS:
         kept = " and ".join(str(kept) for kept in JUDGING_SEEDS)
         raise ConfigError(f"seed {seed} must not be negative, nor {kept}, which are kept for judging.")
-    limit = time_limit_s or settings.time_limit_s
-    torch.set_num_threads(1)  # a second thread gains little here and loses much when the machine is shared
+    if time_limit_s is None and updates is None:
+        time_limit_s = settings.time_limit_s
+    torch.set_num_threads(settings.threads)
     scenario = load_scenario(settings.scenario)
-    out.mkdir(parents=True, exist_ok=True)
-    ppo = settings.ppo
-    worlds = BatchVecEnv(robot, task, scenario, worlds=ppo.worlds, seed=seed, reward_scale=ppo.reward_scale)
-    env = VecNormalize(worlds, norm_reward=False, gamma=ppo.gamma)
-    learner, feedback = build_ppo(ppo, env, seed=seed, tensorboard=str(out / "tensorboard"))
-    learning = _TimedLearning(_judge_of(robot, task, scenario), settings, limit)
-    interrupted: KeyboardInterrupt | None = None
-    try:
-        learner.learn(total_timesteps=10**12, callback=CallbackList([feedback, learning]))
-    except _TimeIsUp:
-        pass
-    except KeyboardInterrupt as error:
-        if learning.best is None:
-            raise
-        interrupted = error
-    finally:
-        learning.on_training_end()
-    assert learning.best is not None
-    best, network = learning.best
+    worlds = BatchVecEnv(
+        robot,
+        task,
+        scenario,
+        worlds=settings.worlds,
+        seed=seed,
+        reward_scale=settings.reward_scale,
+        strength=settings.strength(0.0),
+    )
+    story = Story()
+    if resume:
+        learner, more = load_checkpoint(out / CHECKPOINT_FILE, settings.algorithm, worlds)
+        story = more["story"]
+    else:
+        out.mkdir(parents=True, exist_ok=True)
+        write_training_settings(settings, out / SETTINGS_FILE)
+        env = VecNormalize(worlds, norm_reward=False, gamma=settings.algorithm.gamma)
+        learner = build_learner(settings.algorithm, env, seed=seed)
+    _log_to(learner, out / TENSORBOARD_FOLDER, curves)
+    with _polite_interrupt() as interrupt:
+        session = Session(
+            story,
+            judge=held_out_judge(robot, task, scenario),
+            settings=settings,
+            limits=Limits(time_limit_s, updates),
+            worlds=worlds,
+            command_scale=robot.actuators.scale,
+            watcher=watcher or LearningBar(),
+            checkpoint=out / CHECKPOINT_FILE,
+            asked_to_stop=interrupt.is_set,
+        )
+        interrupted = _learn(learner, session, settings) or interrupt.is_set()
+    assert story.best is not None
+    best, network = story.best
     save_network(network, out / NETWORK_FILE)
     record = {
         "robot": robot.name,
@@ -176,35 +130,60 @@ def train(
         "control_hz": robot.timing.control_hz,
         "settings": asdict(settings),
         "steps": learner.num_timesteps,
-        "wall_s": round(learning.elapsed_s, 1),
-        "interrupted": interrupted is not None,
+        "updates": story.updates,
+        "wall_s": round(story.elapsed_s, 1),
+        "interrupted": interrupted,
         "best": asdict(best),
-        "curve": [asdict(check) for check in learning.checks],
-        "versions": {name: version(name) for name in ("torch", "stable-baselines3", "numpy")}
+        "curve": [asdict(check) for check in story.checks],
+        "versions": {name: version(name) for name in ("torch", "stable-baselines3", "sb3-contrib", "numpy")}
         | {"python": platform.python_version()},
     }
-    (out / RUN_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
-    if interrupted is not None:
-        raise interrupted
+    write_run_record(out, record)
+    if interrupted:
+        raise KeyboardInterrupt
     return record
 
 
-def _judge_of(robot: Robot, task: Task, scenario: Scenario) -> Judge:
-    """Judge in the training scenario and in the nominal one: a network may be good at either alone."""
-    worlds = (scenario, load_scenario("nominal"))
+def _learn(learner: BaseAlgorithm, session: Session, settings: TrainingSettings) -> bool:
+    """Learn until the session ends it; returns whether a person broke it off before it could."""
+    callbacks = CallbackList([*callbacks_of(learner), session])
+    # An off-policy learner counts a single step of all worlds as an iteration.
+    every = 100 if isinstance(settings.algorithm, OffPolicy) else 1
+    try:
+        learner.learn(10**12, callback=callbacks, log_interval=every, reset_num_timesteps=False)
+    except RunIsOver:
+        return False
+    except KeyboardInterrupt:
+        if session.story.best is None:
+            raise
+        return True
+    finally:
+        session.on_training_end()
+    raise AssertionError("learning has no end of its own")
 
-    def judge(network: DeployedNetwork) -> tuple[float, float]:
-        controller = NetworkController(network, task.observation_names, robot.timing.control_hz)
-        figures = [
-            summary(roll_out_in_batch(controller, robot, task, world, episodes=256, seed=HELD_OUT_SEED), task)
-            for world in worlds
-        ]
-        success = _mean(figures, "success_rate")
-        return success, success + 0.5 * _mean(figures, "PT2_percent") / 100.0 - _mean(figures, "AAS")
 
-    return judge
+def _log_to(learner: BaseAlgorithm, folder: Path, curves: KVWriter | None) -> None:
+    logger = configure(str(folder), ["tensorboard"])
+    if curves is not None:
+        logger.output_formats.append(curves)
+    learner.set_logger(logger)
 
 
-def _mean(figures: list[dict[str, Any]], name: str) -> float:
-    values = [each[name]["mean"] if isinstance(each[name], dict) else each[name] for each in figures]
-    return float(sum(values)) / len(values)
+@contextmanager
+def _polite_interrupt() -> Iterator[threading.Event]:
+    """Let the first Ctrl-C ask for an end between two updates, and a second one break off at once."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked
+        return
+
+    def ask(number: int, frame: types.FrameType | None) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -13,6 +13,7 @@ RUN_LOCK, DEV_LOCK = "requirements.lock", "requirements-dev.lock"
 LOCKS = [RUN_LOCK, DEV_LOCK]
 PYTHONS = ["3.11", "3.12", "3.13"]
 RUN_EXTRAS = ["ros", "sim", "policy", "bags", "hardware", "view"]
+DEV_EXTRAS = ["train", "cluster", "wandb"]
 
 
 def entries(text):
@@ -88,7 +89,7 @@ def test_every_pin_is_exact_and_hashed(locks, name):
 @pytest.mark.parametrize("python", PYTHONS)
 @pytest.mark.parametrize(
     ("name", "extras", "groups"),
-    [(RUN_LOCK, RUN_EXTRAS, ["build"]), (DEV_LOCK, [*RUN_EXTRAS, "train"], ["build", "dev"])],
+    [(RUN_LOCK, RUN_EXTRAS, ["build"]), (DEV_LOCK, [*RUN_EXTRAS, *DEV_EXTRAS], ["build", "dev"])],
 )
 def test_the_pins_satisfy_pyproject(project, locks, name, extras, groups, python):
     pinned = versions(locks[name], python)
@@ -101,7 +102,7 @@ def test_the_pins_satisfy_pyproject(project, locks, name, extras, groups, python
 
 
 def test_the_locks_know_every_extra(project):
-    assert set(project["project"]["optional-dependencies"]) == {*RUN_EXTRAS, "train"}
+    assert set(project["project"]["optional-dependencies"]) == {*RUN_EXTRAS, *DEV_EXTRAS}
 
 
 def test_the_run_time_lock_can_build_the_editable_install(project, locks):

@@ -12,6 +12,7 @@ import pytest
 from fulmar_core import policy_bundle
 from fulmar_core.errors import BundleError
 from fulmar_core.policy_bundle import (
+    FORMAT,
     GOLDEN,
     NETWORK,
     PASSPORT,
@@ -26,14 +27,20 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
-VECTORS = Golden(np.ones((2, 10), np.float32), np.zeros((2, 8), np.float32), np.full((2, 8), 0.5, np.float32))
+NONE = np.zeros((2, 0), np.float32)
+VECTORS = Golden(
+    np.ones((2, 10), np.float32), NONE, np.zeros((2, 8), np.float32), np.full((2, 8), 0.5, np.float32), NONE
+)
 BLANK = Passport(
-    1,
+    FORMAT,
     ROBOT.name,
     TASK.name,
     5.0,
     TASK.observation_names,
     ROBOT.actuators.names,
+    "on_off",
+    (1.0,) * 8,
+    0,
     "",
     "",
     {"seed": 1, "best": {"a": 0.5}},
@@ -155,8 +162,14 @@ def test_a_passport_that_is_no_object_is_refused(folder, content):
 
 
 def test_another_format_is_refused(folder):
-    reseal(folder, format=2)
-    with pytest.raises(BundleError, match="has format 2, this Fulmar reads 1"):
+    reseal(folder, format=FORMAT + 1)
+    with pytest.raises(BundleError, match=f"has format {FORMAT + 1}, this Fulmar reads {FORMAT}"):
+        read_passport(folder)
+
+
+def test_a_passport_of_an_older_format_is_told_as_one_and_not_by_what_it_lacks(folder):
+    (folder / PASSPORT).write_text('{"format": 1, "robot": "floating_platform"}')
+    with pytest.raises(BundleError, match=f"has format 1, this Fulmar reads {FORMAT}"):
         read_passport(folder)
 
 
@@ -197,7 +210,7 @@ def test_golden_vectors_that_are_no_archive_are_refused(folder, content):
 def test_golden_vectors_that_lack_an_array_are_refused(folder):
     with (folder / GOLDEN).open("wb") as file:
         np.savez(file, observations=VECTORS.observations)
-    with pytest.raises(BundleError, match="commands"):
+    with pytest.raises(BundleError, match="memories"):
         read_golden(folder)
 
 
@@ -222,3 +235,18 @@ def test_a_passport_made_for_something_else_is_refused(change, words):
     with pytest.raises(BundleError) as caught:
         check_fit(replace(BLANK, **change), ROBOT, TASK, 5.0, where="here")
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"action": "jump"}, "'action' or 'memory' has no meaning"),
+        ({"memory": -1}, "'action' or 'memory' has no meaning"),
+        ({"command_scale": ["much"]}, "'command_scale' must hold numbers"),
+    ],
+)
+def test_a_passport_with_a_value_of_no_meaning_is_refused(folder, changes, words):
+    values = json.loads((folder / PASSPORT).read_text()) | changes
+    (folder / PASSPORT).write_text(json.dumps(values))
+    with pytest.raises(BundleError, match=words):
+        read_passport(folder)

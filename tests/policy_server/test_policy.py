@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -11,11 +12,14 @@ import numpy as np
 import pytest
 
 from fulmar_core.errors import BundleError
+from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import (
+    FORMAT,
     GOLDEN,
     NETWORK,
     PASSPORT,
     Golden,
+    Passport,
     read_golden,
     read_passport,
     write_bundle,
@@ -26,6 +30,7 @@ from policy_server.policy import Policy
 from policy_server.shipped import policies_directory, shipped_policies, shipped_policy
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
+ROLLING, ROLLING_TASK = load_robot("turtlebot2"), load_task("go_to_position")
 CHECKOUT = Path(__file__).resolve().parents[2]
 SHIPPED = policies_directory() / "floating_platform_go_to_pose"
 
@@ -79,8 +84,66 @@ def linear_network(
     graph = helper.make_graph(nodes, "g", takes, gives, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
     observations = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
-    logits = observations @ weights
-    return model.SerializeToString(), Golden(observations, (logits > 0).astype(np.float32), logits)
+    logits, none = observations @ weights, np.zeros((4, 0), np.float32)
+    return model.SerializeToString(), Golden(
+        observations, none, (logits > 0).astype(np.float32), logits, none
+    )
+
+
+def counting_network(*, gives="next_memory", memory=2):
+    """An ONNX model for the turtlebot: its memory counts calls, and its raw outputs are the memory it was given."""
+    onnx = pytest.importorskip("onnx")
+    helper, numpy_helper = onnx.helper, onnx.numpy_helper
+    kind, inputs = onnx.TensorProto.FLOAT, len(Observer(ROLLING, ROLLING_TASK).names)
+    scale = np.asarray(ROLLING.actuators.scale, np.float32)
+    nodes = [
+        helper.make_node("MatMul", ["observation", "nothing"], ["zeros"]),
+        helper.make_node("Add", ["zeros", "memory"], ["logits"]),
+        helper.make_node("Clip", ["logits", "low", "high"], ["share"]),
+        helper.make_node("Mul", ["share", "scale"], ["command"]),
+        helper.make_node("Add", ["memory", "quarter"], [gives]),
+    ]
+    constants = [
+        numpy_helper.from_array(np.zeros((inputs, 2), np.float32), "nothing"),
+        numpy_helper.from_array(np.float32(-1.0), "low"),
+        numpy_helper.from_array(np.float32(1.0), "high"),
+        numpy_helper.from_array(scale, "scale"),
+        numpy_helper.from_array(np.float32(0.25), "quarter"),
+    ]
+    takes = [
+        helper.make_tensor_value_info("observation", kind, ["worlds", inputs]),
+        helper.make_tensor_value_info("memory", kind, ["worlds", memory]),
+    ]
+    tells = [
+        helper.make_tensor_value_info(name, kind, ["worlds", 2]) for name in ("command", "logits", gives)
+    ]
+    graph = helper.make_graph(nodes, "g", takes, tells, constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
+    seen = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
+    before = np.random.default_rng(3).normal(size=(4, 2)).astype(np.float32)
+    command = np.clip(before, -1.0, 1.0) * scale
+    return model.SerializeToString(), Golden(seen, before, command, before, before + np.float32(0.25))
+
+
+@pytest.fixture
+def remembering(tmp_path):
+    """A bundle with memory and continuous commands."""
+    network, golden = counting_network()
+    passport = Passport(
+        FORMAT,
+        ROLLING.name,
+        ROLLING_TASK.name,
+        ROLLING.timing.control_hz,
+        Observer(ROLLING, ROLLING_TASK).names,
+        ROLLING.actuators.names,
+        "continuous",
+        tuple(ROLLING.actuators.scale),
+        2,
+        "",
+        "",
+    )
+    write_bundle(tmp_path / "remembering", network, golden, passport)
+    return tmp_path / "remembering"
 
 
 def test_the_shipped_bundle_is_accepted():
@@ -149,6 +212,8 @@ def test_corrupted_bytes_are_refused(folder, name):
         ({"control_hz": 10.0}, "was trained at 10 Hz, but would run at 5 Hz"),
         ({"observation_names": TASK.observation_names[::-1]}, "observation 1 is"),
         ({"actuator_names": ROBOT.actuators.names[::-1]}, "actuator 1 is"),
+        ({"action": "continuous"}, "gives continuous commands, 'floating_platform' takes on_off"),
+        ({"command_scale": (2.0,) * 8}, "was trained for full commands of [2.0,"),
         ({"format": 0}, "has format 0"),
     ],
 )
@@ -226,7 +291,7 @@ def test_a_network_that_breaks_while_running_is_refused(folder):
         (lambda g: replace(g, logits=g.logits[:1]), "'logits' is float32 of shape (1, 8)"),
         (lambda g: replace(g, commands=g.commands[:, :7]), "'commands' is float32 of shape (64, 7)"),
         (
-            lambda g: Golden(g.observations[:0], g.commands[:0], g.logits[:0]),
+            lambda g: replace(g, observations=g.observations[:0]),
             "must be float32 of shape (at least 1, 10)",
         ),
         (lambda g: replace(g, observations=np.float32(1.0)), "'observations' is float32 of shape ()"),
@@ -247,3 +312,49 @@ def test_rounding_of_another_processor_is_no_reason_to_refuse(folder):
     golden = read_golden(folder)
     reseal(folder, golden=replace(golden, logits=golden.logits + np.float32(5e-5)))
     load(folder)
+
+
+def test_a_continuous_policy_commands_in_the_units_of_the_actuators(remembering):
+    golden = read_golden(remembering)
+    policy = Policy(remembering, ROLLING, ROLLING_TASK)
+    for _ in range(6):
+        command = policy.act(golden.observations)
+    np.testing.assert_allclose(command, np.tile(ROLLING.actuators.scale, (4, 1)), rtol=1e-6)
+
+
+def test_memory_is_carried_from_one_command_to_the_next_and_forgotten_on_reset(remembering):
+    policy = Policy(remembering, ROLLING, ROLLING_TASK)
+    seen, speed = np.zeros(len(policy.observation_names)), ROLLING.actuators.scale[0]
+    told = [float(policy.act(seen)[0]) for _ in range(3)]
+    policy.reset()
+    assert [*told, float(policy.act(seen)[0])] == pytest.approx([0.0, 0.25 * speed, 0.5 * speed, 0.0])
+
+
+def test_every_row_of_a_batch_has_a_memory_of_its_own(remembering):
+    policy = Policy(remembering, ROLLING, ROLLING_TASK)
+    seen = np.zeros((3, len(policy.observation_names)))
+    policy.act(seen)
+    assert policy.act(seen).shape == (3, 2)
+    assert (policy.act(seen[:2]) == 0.0).all()  # another batch is another story
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"memory": 3}, "'memory' has shape ['worlds', 2], the passport needs (any number, 3)"),
+        ({"memory": 0}, "takes observation, memory; it must take 'observation' alone"),
+        ({"action": "on_off"}, "gives on_off commands, 'turtlebot2' takes continuous"),
+    ],
+)
+def test_a_memory_or_a_kind_of_command_that_the_passport_does_not_tell_is_refused(remembering, change, words):
+    reseal(remembering, **change)
+    with pytest.raises(BundleError, match=re.escape(words)):
+        Policy(remembering, ROLLING, ROLLING_TASK)
+
+
+@pytest.mark.parametrize("name", ["memories", "next_memories", "commands"])
+def test_golden_vectors_of_a_network_with_memory_are_compared_too(remembering, name):
+    golden = read_golden(remembering)
+    reseal(remembering, golden=replace(golden, **{name: getattr(golden, name) + np.float32(0.01)}))
+    with pytest.raises(BundleError, match="golden vectors"):
+        Policy(remembering, ROLLING, ROLLING_TASK)

@@ -1,4 +1,4 @@
-"""The learning rate that follows the divergence, and settings that cannot work."""
+"""The learning rate that follows the divergence, and what the settings become."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from fulmar_core.errors import ConfigError
-from training.ppo import KlAdaptiveRate, build_ppo
-from training.settings import load_training_settings
+from training.learners import build_learner
+from training.ppo import KlAdaptiveRate
 
 
 @pytest.fixture
 def settings(small_settings):
-    return replace(small_settings.ppo, learning_rate=1e-3, learning_rate_range=(1e-4, 2e-3), target_kl=0.01)
+    return replace(
+        small_settings.algorithm, learning_rate=1e-3, learning_rate_range=(1e-4, 2e-3), target_kl=0.01
+    )
 
 
 @pytest.mark.parametrize(
@@ -38,12 +39,12 @@ def test_the_optimiser_really_learns_at_the_adapted_rate(learner, small_settings
     ppo, _ = learner
     group = ppo.policy.optimizer.param_groups[0]
     assert group["lr"] == pytest.approx(ppo.learning_rate.rate)
-    assert group["lr"] != small_settings.ppo.learning_rate  # it has moved since the start
+    assert group["lr"] != small_settings.algorithm.learning_rate  # it has moved since the start
 
 
 def test_the_learner_has_the_settings_it_was_given(learner, small_settings):
     ppo, _ = learner
-    s = small_settings.ppo
+    s = small_settings.algorithm
     assert (ppo.n_steps, ppo.batch_size, ppo.n_epochs) == (s.steps, s.minibatch, s.epochs)
     assert (ppo.gamma, ppo.gae_lambda, ppo.max_grad_norm) == (s.gamma, s.gae_lambda, s.max_grad_norm)
     assert [layer.out_features for layer in ppo.policy.mlp_extractor.policy_net[::2]] == list(s.hidden)
@@ -53,16 +54,8 @@ def test_two_learners_of_one_seed_begin_with_the_same_weights(small_settings, le
     import torch
 
     _, env = learner
-    twins = [build_ppo(small_settings.ppo, env, seed=seed)[0].policy.action_net.weight for seed in (5, 5, 6)]
+    twins = [
+        build_learner(small_settings.algorithm, env, seed=seed).policy.action_net.weight for seed in (5, 5, 6)
+    ]
     assert torch.equal(twins[0], twins[1])
     assert not torch.equal(twins[0], twins[2])
-
-
-def test_minibatches_that_do_not_divide_the_batch_are_refused(small_settings):
-    with pytest.raises(ValueError, match=r"512 must be a multiple of 'minibatch'"):
-        replace(small_settings.ppo, minibatch=100)
-
-
-def test_a_robot_without_training_settings_is_told_which_file_to_write():
-    with pytest.raises(ConfigError, match=r"Write configs/training/boat_go_to_pose\.yaml"):
-        load_training_settings("boat", "go_to_pose")

@@ -22,7 +22,9 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "policy": ("onnxruntime",),
     "bags": ("mcap", "rosbags", "mcap_ros2", "zstandard"),
     "view": ("matplotlib",),
-    "train": ("torch", "stable_baselines3", "gymnasium", "onnx", "tensorboard"),
+    "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
+    "cluster": ("ray",),
+    "wandb": ("wandb",),
 }
 
 

@@ -1,7 +1,8 @@
 """A policy with its passport: one folder that says what it is and refuses to be anything else.
 
-    policy.onnx     the network: input `observation`, outputs `command` and `logits`
-    golden.npz      observations, and the commands and logits the network gave for them when it was exported
+    policy.onnx     the network: input `observation`, outputs `command` and `logits`; one with memory also takes
+                    `memory` and gives `next_memory`
+    golden.npz      observations, and what the network gave for them when it was exported
     passport.json   robot, task, rate, names, hashes of the two files, and how it was made
 
 Knows files and hashes, not how to run a network.
@@ -14,19 +15,22 @@ import json
 import zipfile
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from fulmar_core.errors import BundleError, did_you_mean
+from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
-FORMAT = 1
+FORMAT = 2
 NETWORK = "policy.onnx"
 GOLDEN = "golden.npz"
 PASSPORT = "passport.json"
 MAX_BYTES = 50_000_000  # a file beyond this is no policy of ours, and is not read
+
+Action = Literal["on_off", "continuous"]
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,9 @@ class Passport:
     control_hz: float  # the command rate it was trained at [Hz]
     observation_names: tuple[str, ...]  # in the order of the network's input
     actuator_names: tuple[str, ...]  # in the order of the network's output
+    action: Action  # on_off: commands are zeros and ones; continuous: anything up to the scale
+    command_scale: tuple[float, ...]  # full command of each actuator, in its own unit
+    memory: int  # numbers that the network carries from one command to the next; 0: none
     network_sha256: str
     golden_sha256: str
     training: dict[str, Any] = field(default_factory=dict)  # how it was made, for people
@@ -61,8 +68,10 @@ class Golden:
     """Inputs and outputs that a loaded network must reproduce."""
 
     observations: np.ndarray  # (k, n) float32
+    memories: np.ndarray  # (k, `memory`) float32
     commands: np.ndarray  # (k, m) float32
-    logits: np.ndarray  # (k, m) float32
+    logits: np.ndarray  # (k, m) float32, what the network decided the commands by
+    next_memories: np.ndarray  # (k, `memory`) float32
 
 
 def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passport) -> Passport:
@@ -80,7 +89,7 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
     folder.mkdir(parents=True, exist_ok=True)
     (folder / NETWORK).write_bytes(network)
     with (folder / GOLDEN).open("wb") as file:
-        np.savez(file, observations=golden.observations, commands=golden.commands, logits=golden.logits)
+        np.savez(file, **{f.name: getattr(golden, f.name) for f in fields(golden)})
     values = asdict(passport) | {
         "network_sha256": _sha256(folder / NETWORK),
         "golden_sha256": _sha256(folder / GOLDEN),
@@ -117,11 +126,12 @@ def read_passport(folder: Path) -> Passport:
         raise BundleError(
             f"{folder / PASSPORT}: cannot be read: {error}. Export the policy again."
         ) from error
-    passport = _passport_of(values, folder / PASSPORT)
-    if passport.format != FORMAT:
+    found_format = values.get("format", FORMAT) if isinstance(values, dict) else FORMAT
+    if isinstance(found_format, int) and found_format != FORMAT:
         raise BundleError(
-            f"policy '{folder}' has format {passport.format}, this Fulmar reads {FORMAT}. Export it again."
+            f"policy '{folder}' has format {found_format}, this Fulmar reads {FORMAT}. Export it again."
         )
+    passport = _passport_of(values, folder / PASSPORT)
     if passport.sha256 != passport.expected_sha256():
         raise BundleError(
             f"{folder / PASSPORT}: was changed after export (its hash does not match). Export it again."
@@ -144,7 +154,7 @@ def read_golden(folder: Path) -> Golden:
     """
     try:
         with np.load(folder / GOLDEN, allow_pickle=False) as arrays:
-            return Golden(arrays["observations"], arrays["commands"], arrays["logits"])
+            return Golden(**{f.name: arrays[f.name] for f in fields(Golden)})
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise BundleError(f"{folder / GOLDEN}: cannot be read: {error}. Export the policy again.") from error
 
@@ -171,8 +181,24 @@ def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *
             f"policy '{where}' was trained at {passport.control_hz:g} Hz, but would run at {control_hz:g} Hz. "
             f"Train and export it at {control_hz:g} Hz, or run it with control_hz = {passport.control_hz:g}."
         )
-    _check_names("observation", passport.observation_names, task.observation_names, where)
+    _check_names("observation", passport.observation_names, Observer(robot, task).names, where)
     _check_names("actuator", passport.actuator_names, robot.actuators.names, where)
+    action = action_of(robot)
+    if passport.action != action:
+        raise BundleError(
+            f"policy '{where}' gives {passport.action} commands, '{robot.name}' takes {action}."
+        )
+    scale = tuple(float(value) for value in robot.actuators.scale)
+    if passport.command_scale != scale:
+        raise BundleError(
+            f"policy '{where}' was trained for full commands of {list(passport.command_scale)}, those of "
+            f"'{robot.name}' are {list(scale)}. Train and export it again."
+        )
+
+
+def action_of(robot: Robot) -> Action:
+    """What kind of commands a robot takes."""
+    return "on_off" if robot.actuators.binary else "continuous"
 
 
 def _check_names(what: str, found: tuple[str, ...], needed: tuple[str, ...], where: str) -> None:
@@ -201,8 +227,13 @@ def _passport_of(values: Any, path: Path) -> Passport:
             raise BundleError(
                 f"{path}: '{name}' is {values[name]!r}, which is of the wrong type. Export the policy again."
             )
+    if values["action"] not in get_args(Action) or values["memory"] < 0:
+        raise BundleError(f"{path}: 'action' or 'memory' has no meaning. Export the policy again.")
+    if not all(isinstance(value, int | float) for value in values["command_scale"]):
+        raise BundleError(f"{path}: 'command_scale' must hold numbers. Export the policy again.")
     for name in ("observation_names", "actuator_names"):
         values[name] = tuple(map(str, values[name]))
+    values["command_scale"] = tuple(map(float, values["command_scale"]))
     return Passport(**values)
 
 
@@ -213,6 +244,9 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
     "control_hz": (int, float),
     "observation_names": (list, tuple),
     "actuator_names": (list, tuple),
+    "action": str,
+    "command_scale": (list, tuple),
+    "memory": int,
     "network_sha256": str,
     "golden_sha256": str,
     "training": dict,

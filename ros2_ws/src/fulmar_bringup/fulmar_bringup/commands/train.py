@@ -46,7 +46,7 @@ def train(
     from training.train import train as learn
 
     the_robot, the_task = load_robot(robot), load_task(task)
-    settings = load_training_settings(robot, task)
+    settings = load_training_settings(the_robot, the_task)
     out = out or Path("runs") / "train" / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{task}_{seed}"
     if out.is_dir() and any(out.iterdir()):
         raise ConfigError(f"{out} is not empty; nothing recorded is overwritten. Give --out another folder.")

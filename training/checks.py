@@ -1,0 +1,65 @@
+"""Looking at a learner while it learns, on episodes it does not learn from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
+from fulmar_core.episode import HELD_OUT_SEED
+from fulmar_core.metrics import summary
+from fulmar_core.observation import Observer
+from fulmar_core.robot import Robot
+from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.tasks import Task
+from training.network import DeployedNetwork, NetworkController
+
+EPISODES = 256  # of each scenario
+Judge = Callable[[DeployedNetwork], tuple[float, float]]  # success rate and score
+
+# What a figure adds to the score beside success, where a task has it: precision, then economy.
+_WORTH = {
+    "PT2_percent": 0.005,
+    "OT2_percent": 0.001,
+    "goals_reached": 0.05,
+    "velocity_error_m_s": -1.0,
+    "yaw_rate_error_deg_s": -0.02,
+    "effort": -0.5,
+    "control_variation": -0.05,
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """One look at the learner on held-out episodes, in the batch."""
+
+    wall_s: float
+    steps: int
+    success_rate: float  # mean of the training scenario and the nominal one
+    score: float  # orders checks: success first, then precision, then economy
+
+
+def held_out_judge(robot: Robot, task: Task, scenario: Scenario) -> Judge:
+    """Judge in the training scenario and in the nominal one: a network may be good at either alone."""
+    worlds = (scenario, load_scenario("nominal"))
+    names = Observer(robot, task).names
+
+    def judge(network: DeployedNetwork) -> tuple[float, float]:
+        controller = NetworkController(network, names, robot.timing.control_hz)
+        figures = [
+            summary(
+                roll_out_in_batch(controller, robot, task, world, episodes=EPISODES, seed=HELD_OUT_SEED), task
+            )
+            for world in worlds
+        ]
+        success = _mean(figures, "success_rate")
+        worth = (weight * _mean(figures, name) for name, weight in _WORTH.items() if name in figures[0])
+        return success, success + sum(worth)
+
+    return judge
+
+
+def _mean(figures: list[dict[str, Any]], name: str) -> float:
+    values = [each[name]["mean"] if isinstance(each[name], dict) else each[name] for each in figures]
+    return float(sum(value or 0.0 for value in values)) / len(values)

@@ -1,0 +1,65 @@
+"""What lies in a run folder, and how its record is read.
+
+settings.yaml   how it learns
+run.json        what was done; written at the end
+network.pt      the best weights, as a robot would run them
+checkpoint.pkl  everything a run needs to go on exactly where it was
+tensorboard/    curves
+progress.json   how far it is, for whoever watches from outside
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from fulmar_core.errors import ConfigError
+
+SETTINGS_FILE = "settings.yaml"
+RUN_FILE = "run.json"
+NETWORK_FILE = "network.pt"
+CHECKPOINT_FILE = "checkpoint.pkl"
+TENSORBOARD_FOLDER = "tensorboard"
+PROGRESS_FILE = "progress.json"
+
+_NEEDED = (
+    "robot",
+    "task",
+    "control_hz",
+    "command",
+    "seed",
+    "steps",
+    "wall_s",
+    "settings",
+    "best",
+    "versions",
+)
+
+
+def read_run_record(run: Path) -> dict[str, Any]:
+    """What `train` wrote about a run.
+
+    Raises:
+        ConfigError: If `run` is no finished run folder.
+    """
+    path = run / RUN_FILE
+    if not path.is_file() or not (run / NETWORK_FILE).is_file():
+        raise ConfigError(
+            f"{run}: no finished training run ({RUN_FILE} or {NETWORK_FILE} is missing). Run `fulmar train`."
+        )
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ConfigError(f"{path}: not valid JSON: {error}. Train again.") from error
+    missing = [key for key in _NEEDED if not isinstance(record, dict) or key not in record]
+    if missing:
+        raise ConfigError(
+            f"{path}: lacks '{missing[0]}', so it is not what `fulmar train` left. Train again."
+        )
+    return dict(record)
+
+
+def write_run_record(run: Path, record: dict[str, Any]) -> None:
+    """Write what `read_run_record` reads."""
+    (run / RUN_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")

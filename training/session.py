@@ -1,0 +1,152 @@
+"""What happens between two updates of a run: checks, checkpoints, the curriculum, and its end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+
+from training.checkpoint import save_checkpoint
+from training.checks import Check, Judge
+from training.deploy import deployed_network
+from training.network import DeployedNetwork
+from training.progress import Watcher
+from training.settings import TrainingSettings
+from training.vec_env import BatchVecEnv
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a run ends; whichever comes first."""
+
+    time_s: float | None = None  # wall-clock [s]
+    updates: int | None = None
+
+    def progress(self, elapsed_s: float, updates: int) -> float:
+        """Share of the run that is over [-]."""
+        shares = [0.0]
+        if self.time_s is not None:
+            shares.append(elapsed_s / self.time_s)
+        if self.updates is not None:
+            shares.append(updates / self.updates)
+        return min(1.0, max(shares))
+
+
+@dataclass
+class Story:
+    """What a run remembers of itself, also across an interruption."""
+
+    elapsed_s: float = 0.0  # wall-clock that earlier parts took [s]
+    updates: int = 0
+    checks: list[Check] = field(default_factory=list)
+    best: tuple[Check, DeployedNetwork] | None = None
+
+
+class RunIsOver(Exception):  # noqa: N818 - it is the planned end, no error
+    """Ends learning between two updates."""
+
+
+class Session(BaseCallback):
+    """Looks after a run between two updates."""
+
+    def __init__(
+        self,
+        story: Story,
+        *,
+        judge: Judge,
+        settings: TrainingSettings,
+        limits: Limits,
+        worlds: BatchVecEnv,
+        command_scale: np.ndarray,
+        watcher: Watcher,
+        checkpoint: Path,
+        asked_to_stop: Callable[[], bool],
+    ) -> None:
+        """Begin, or go on.
+
+        Args:
+            story: The run so far.
+            judge: Says how good a network is.
+            settings: How to learn.
+            limits: When to end.
+            worlds: Where it learns.
+            command_scale: Full command of each actuator, in its own unit.
+            watcher: Whom to tell.
+            checkpoint: File to resume from later.
+            asked_to_stop: Whether a person wants it to end.
+        """
+        super().__init__()
+        self.story, self._judge, self._settings, self._limits = story, judge, settings, limits
+        self._worlds, self._command_scale, self._watcher = worlds, command_scale, watcher
+        self._checkpoint, self._asked_to_stop = checkpoint, asked_to_stop
+        self._before_s = story.elapsed_s
+        self._began = time.monotonic()
+        self._next_check = self.elapsed_s + settings.evaluate_every_s
+        self._next_checkpoint = self.elapsed_s + settings.checkpoint_every_s
+        self._first = True  # what comes first is no update yet
+
+    @property
+    def elapsed_s(self) -> float:
+        """Wall-clock of learning, over all parts of the run [s]."""
+        return self._before_s + time.monotonic() - self._began
+
+    def _on_training_start(self) -> None:
+        self._watcher.begin()
+
+    def _on_training_end(self) -> None:
+        self._watcher.end()
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        story = self.story
+        story.updates += not self._first
+        self._first = False
+        story.elapsed_s = self.elapsed_s
+        progress = self._limits.progress(story.elapsed_s, story.updates)
+        self._watcher.advance(progress, story.elapsed_s, self.num_timesteps)
+        self._worlds.set_strength(self._settings.strength(progress))
+        over = progress >= 1.0 or self._asked_to_stop()
+        if over or story.elapsed_s >= self._next_check:
+            self._check()
+            self._next_check = self.elapsed_s + self._settings.evaluate_every_s
+            over = over or self._learned()
+        if over or self.elapsed_s >= self._next_checkpoint:
+            self.save()
+            self._next_checkpoint = self.elapsed_s + self._settings.checkpoint_every_s
+        if over:
+            raise RunIsOver
+
+    def _check(self) -> None:
+        story = self.story
+        normaliser = self.model.get_vec_normalize_env()
+        assert normaliser is not None
+        network = deployed_network(self.model, normaliser, self._command_scale)
+        success, score = self._judge(network)
+        check = Check(story.elapsed_s, self.num_timesteps, success, score)
+        if story.best is None or score > story.best[0].score:
+            story.best = check, network  # at once, since a person may interrupt anywhere
+        story.checks.append(check)
+        self._watcher.verdict(story.elapsed_s, success)
+        self.logger.record("held_out/success_rate", success)
+        self.logger.record("held_out/score", score)
+
+    def _learned(self) -> bool:
+        """Whether the last checks in a row were all good enough."""
+        enough = self._settings.stop_at_success
+        if enough is None:
+            return False
+        last = self.story.checks[-enough.checks :]
+        return len(last) == enough.checks and all(check.success_rate >= enough.rate for check in last)
+
+    def save(self) -> None:
+        """Write a checkpoint."""
+        self.story.elapsed_s = self.elapsed_s
+        more: dict[str, Any] = {"story": self.story}
+        save_checkpoint(self._checkpoint, self.model, more)
