@@ -70,9 +70,12 @@ class MujocoBackend:
         world.begin(np.asarray(command, dtype=float), ticks, self._truth)
         outside = tuple(float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
+        doing = None
         for _ in range(ticks):
             applied = world.actuation.advance(dt, latest_s=world.latest_s)
-            machine.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
+            if applied is not doing or not machine.steady:
+                machine.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
+                doing = applied
             mujoco.mj_step(model, data, machine.steps_per_tick)
         if not np.isfinite(data.qpos).all():
             raise SafetyError(f"MuJoCo's state is not finite at t = {data.time:.2f} s: {data.qpos}.")

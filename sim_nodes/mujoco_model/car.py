@@ -9,12 +9,12 @@ import numpy as np
 
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.disturbances.world import World
-from fulmar_core.dynamics.rolling import SERVO_S
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.wheels import STEP_S, Chassis, add_wheel_servo
 
-STEERING_HZ = 15.0  # bandwidth of the steering servos [Hz]
+STEERING_HZ = 25.0  # bandwidth of the steering servos [Hz]
+STEERING_DAMPING = 0.7  # of critical [-]
 KNUCKLE_INERTIA = 2e-3  # of what turns with a steered wheel, and of its servo's gears [kg·m²]
 SIDES = (("left", 0.5), ("right", -0.5))
 
@@ -40,6 +40,11 @@ class Car:
         )
 
     @property
+    def steady(self) -> bool:
+        """The floor's forces are MuJoCo's own."""
+        return True
+
+    @property
     def rest_height(self) -> float:
         """Height of the axles [m]."""
         return self._chassis.rest_height
@@ -57,10 +62,9 @@ class Car:
             add_wheel_servo(
                 spec,
                 name,
-                weight=self._robot.body.mass / len(chassis.places),
-                radius=chassis.radius,
+                chassis,
                 force=self._car.wheel_force / len(chassis.places),
-                lag_s=max(self._car.response.lag_s, SERVO_S),
+                response=self._car.response,
             )
         return body
 
@@ -126,7 +130,7 @@ class Car:
             name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1], armature=KNUCKLE_INERTIA
         )
         omega = 2.0 * math.pi * STEERING_HZ
-        stiffness, damping = KNUCKLE_INERTIA * omega**2, 2.0 * KNUCKLE_INERTIA * omega
+        stiffness, damping = KNUCKLE_INERTIA * omega**2, 2.0 * STEERING_DAMPING * KNUCKLE_INERTIA * omega
         spec.add_actuator(
             name=name,
             trntype=mujoco.mjtTrn.mjTRN_JOINT,

@@ -7,14 +7,12 @@ import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.disturbances.world import World
-from fulmar_core.dynamics.rolling import SERVO_S
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.wheels import STEP_S, Chassis, add_wheel_servo
 
-WEIGHT_TO_CASTER = (
-    0.25  # how far the weight lies from the axle towards a single caster, which has to carry some [-]
-)
+# How far the weight lies from the axle towards a single caster, which has to carry some; our value [-].
+WEIGHT_TO_CASTER = 0.15
 
 
 class DifferentialBase:
@@ -35,6 +33,11 @@ class DifferentialBase:
         )
 
     @property
+    def steady(self) -> bool:
+        """The floor's forces are MuJoCo's own."""
+        return True
+
+    @property
     def rest_height(self) -> float:
         """Height of the axle [m]."""
         return self._chassis.rest_height
@@ -49,14 +52,7 @@ class DifferentialBase:
         if drive.caster_x > 0.0:
             chassis.add_caster(body, "front_caster", drive.caster_x)
         for wheel in chassis.places:
-            add_wheel_servo(
-                spec,
-                wheel,
-                weight=self._robot.body.mass / len(chassis.places),
-                radius=drive.wheel_radius,
-                force=drive.wheel_force,
-                lag_s=max(drive.response.lag_s, SERVO_S),
-            )
+            add_wheel_servo(spec, wheel, chassis, force=drive.wheel_force, response=drive.response)
         return body
 
     def bind(self, model: mujoco.MjModel) -> None:

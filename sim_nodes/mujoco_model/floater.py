@@ -27,14 +27,22 @@ class Floater:
 
     steps_per_tick = 1
 
+    @property
+    def steady(self) -> bool:
+        """Whether forces change with nothing but what the actuators do; those of water change with every step."""
+        return self._water is None
+
     def __init__(self, robot: Robot) -> None:
         """Prepare for `add`."""
         self._robot, self._actuators = robot, robot.actuators
         self._body = 0
-        self._water = None if robot.hydrodynamics is None else Water(robot.hydrodynamics)
-        self._swims = self._water is not None
-        self._planar = robot.body.planar
-        self._world: World | None = None
+        self._planar, self._swims = robot.body.planar, robot.hydrodynamics is not None
+        self._water: Water | None = None
+        if robot.hydrodynamics is not None:
+            places, directions = (
+                np.array(vectors) for vectors in list(zip(*self._pushes(), strict=True))[1:]
+            )
+            self._water = Water(robot.hydrodynamics, places, directions)
 
     @property
     def rest_height(self) -> float:
@@ -79,7 +87,6 @@ class Floater:
         model.body_mass[self._body] = world.mass
         model.body_inertia[self._body] = nominal * (world.yaw_inertia / nominal[2])
         model.body_ipos[self._body] = (world.com_x, world.com_y, 0.0)
-        self._world = world
         if self._water is not None:
             self._water.take_world(world, model.body_inertia[self._body])
 
@@ -110,14 +117,21 @@ class Floater:
         fx, fy, torque = outside
         wrench = (fx, fy, 0.0, 0.0, 0.0, torque)
         if self._water is not None:
-            wrench = self._water.wrench(model, data, self._body, wrench)
+            wrench = self._water.wrench(data, wrench)
         data.xfrc_applied[self._body] = wrench
 
     def _pushes(self) -> list[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
-        """Name, place and direction of everything that pushes."""
+        """Name, place and unit vector of everything that pushes."""
         if isinstance(self._actuators, Thrusters):
-            return [(nozzle.name, nozzle.position, nozzle.direction) for nozzle in self._actuators.nozzles]
+            return [
+                (nozzle.name, nozzle.position, _unit(nozzle.direction)) for nozzle in self._actuators.nozzles
+            ]
         return [(each.name, each.position, (1.0, 0.0, 0.0)) for each in self._actuators.propellers]
+
+
+def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = sum(part * part for part in vector) ** 0.5
+    return vector[0] / length, vector[1] / length, vector[2] / length
 
 
 def _add_push(
@@ -127,13 +141,12 @@ def _add_push(
     position: tuple[float, float, float],
     direction: tuple[float, float, float],
 ) -> None:
-    length = sum(part * part for part in direction) ** 0.5
     body.add_site(name=name, pos=list(position), size=[0.02, 0.02, 0.02], rgba=[0.9, 0.4, 0.2, 1])
     spec.add_actuator(
         name=name,
         trntype=mujoco.mjtTrn.mjTRN_SITE,
         target=name,
-        gear=[*(part / length for part in direction), 0.0, 0.0, 0.0],
+        gear=[*direction, 0.0, 0.0, 0.0],
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_NONE,
         dyntype=mujoco.mjtDyn.mjDYN_NONE,

@@ -28,6 +28,11 @@ class Machine(Protocol):
 
     steps_per_tick: int
 
+    @property
+    def steady(self) -> bool:
+        """Whether the forces of one tick hold for the next one where the actuators do the same."""
+        ...
+
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add bodies, joints and actuators to a model; returns the body that carries the sensors."""
         ...

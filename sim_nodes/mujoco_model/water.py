@@ -15,11 +15,17 @@ class Water:
     Still water is at z = 0, where the hull floats at rest whatever it weighs in an episode.
     """
 
-    def __init__(self, hydrodynamics: Hydrodynamics) -> None:
-        """Take what the hull is like."""
-        self._water = hydrodynamics
+    def __init__(self, hydrodynamics: Hydrodynamics, places: np.ndarray, directions: np.ndarray) -> None:
+        """Take what the hull is like.
+
+        Args:
+            hydrodynamics: Of the hull.
+            places: Where the actuators push, in the body's frame, shape (n, 3) [m].
+            directions: Unit vectors of their forces, shape (n, 3).
+        """
+        self._water, self._places, self._directions = hydrodynamics, places, directions
         self._mass, self._inertia, self._drag = np.ones(1), np.ones(3), 1.0
-        self._offset = np.zeros(3)
+        self._offset, self._per_newton = np.zeros(3), np.zeros((len(places), 6))
 
     def take_world(self, world: World, inertia: np.ndarray) -> None:
         """Take the body of an episode.
@@ -31,42 +37,34 @@ class Water:
         self._mass, self._inertia = np.reshape(world.mass, (1,)), np.array(inertia)
         self._drag = float(world.drag)
         self._offset = np.array([float(world.com_x), float(world.com_y), 0.0])
+        moments = np.cross(self._places - self._offset, self._directions)
+        self._per_newton = np.concatenate((self._directions, moments), axis=1)
 
-    def wrench(
-        self, model: mujoco.MjModel, data: mujoco.MjData, body: int, outside: np.ndarray
-    ) -> np.ndarray:
+    def wrench(self, data: mujoco.MjData, outside: tuple[float, ...]) -> np.ndarray:
         """What to apply to the body beside its actuators and its weight.
 
         Args:
-            model: The model; the body has a free joint.
-            data: Its state, with the thrusts of the coming step in `ctrl`.
-            body: Number of the body.
-            outside: Push of the surroundings in the world's frame, shape (6,).
+            data: State of a model whose first joint is the body's free one, with the coming thrusts in `ctrl`.
+            outside: Push of the surroundings in the world's frame, six numbers [N, N·m].
 
         Returns:
             Force and moment about the centre of mass in the world's frame, shape (6,) [N, N·m].
         """
         rotation = np.empty(9)
         mujoco.mju_quat2Mat(rotation, data.qpos[3:7])
-        to_body = rotation.reshape(3, 3).T
+        to_world = rotation.reshape(3, 3)
         omega = data.qvel[3:6]
-        velocity = np.concatenate((to_body @ data.qvel[:3] + _cross(omega, self._offset), omega))
+        velocity = np.concatenate((data.qvel[:3] @ to_world + _cross(omega, self._offset), omega))
         weight = GRAVITY * self._mass[0]
-        up = to_body[:, 2]
+        up = to_world[2]  # in the body's frame
         buoyancy, righting = self._water.hydrostatics.wrench(data.qpos[2], up, weight)
-        thrust = self._thrust(model, data)
+        thrust = data.ctrl @ self._per_newton
         total = self._drag * self._water.damping(velocity) + thrust
-        total[:3] += to_body @ outside[:3] + (buoyancy - weight) * up
-        total[3:] += to_body @ outside[3:] + righting
+        total[:3] += outside[:3] @ to_world + (buoyancy - weight) * up
+        total[3:] += outside[3:] @ to_world + righting
         felt = self._water.with_added_mass(total, velocity, self._mass, self._inertia) - thrust
         felt[:3] += weight * up
-        return np.concatenate((felt[:3] @ to_body, felt[3:] @ to_body))
-
-    def _thrust(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """Of the actuators, about the centre of mass in the body's frame, shape (6,)."""
-        places = model.site_pos[model.actuator_trnid[:, 0]] - self._offset
-        forces = model.actuator_gear[:, :3] * data.ctrl[:, None]
-        return np.concatenate((forces.sum(axis=0), np.cross(places, forces).sum(axis=0)))
+        return np.concatenate((to_world @ felt[:3], to_world @ felt[3:]))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -8,8 +8,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from fulmar_core.actuators.response import Response
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.dynamics.rolling import SERVO_S
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.surroundings import BODY, DARK, FLOOR_BIT, add_hull
@@ -21,9 +23,7 @@ WEIGHT_HEIGHT = (
     1.0 / 3.0
 )  # of the robot's height, where its centre of mass is, but at least as high as the axles [-]
 CLEARANCE = 0.4  # of the chassis above the floor, in wheel radii [-]
-TIGHT_S = (
-    0.01  # part of the servos' lag that a push from outside feels; the rest is in how they take commands [s]
-)
+TIGHT_S = 0.005  # with which a wheel gives way to a push; the rest of its lag is in how it takes commands [s]
 CONTACT_S = 0.01  # time constant of the floor contact [s]
 SETTLE_S = 1.0  # time in which a model comes to rest after its compilation [s]
 
@@ -178,20 +178,22 @@ def _about_axes(offset: np.ndarray) -> np.ndarray:
 
 
 def add_wheel_servo(
-    spec: mujoco.MjSpec, wheel: str, *, weight: float, radius: float, force: float, lag_s: float
+    spec: mujoco.MjSpec, wheel: str, chassis: Chassis, *, force: float, response: Response
 ) -> None:
     """Add the motor of one wheel and the servo that makes it turn at a speed [rad/s].
 
     Args:
         spec: Model under construction.
         wheel: Name of the wheel and of its joint; the servo is called alike.
-        weight: Share of the robot's mass that it has to move [kg].
-        radius: Of the wheel [m].
-        force: The most that it pushes [N].
-        lag_s: Time constant with which the wheel follows its command [s].
+        chassis: What it moves.
+        force: The most that it pushes the robot [N]; what turns the wheel itself comes on top.
+        response: How fast the wheel follows.
     """
-    tight = min(TIGHT_S, 0.5 * lag_s)
-    stiffness = weight * radius**2 / tight
+    radius, mass = chassis.radius, chassis.robot.body.mass
+    stiffness = mass / len(chassis.places) * radius**2 / TIGHT_S
+    most = force * radius * (1.0 + 0.5 * WHEEL_SHARE * len(chassis.places))
+    # The core's model moves a whole tick with the speed of its end, which makes it half a tick faster than its lag.
+    lag = max(response.lag_s, SERVO_S) - 0.5 * chassis.robot.timing.physics_dt - TIGHT_S
     spec.add_actuator(
         name=wheel,
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
@@ -201,7 +203,7 @@ def add_wheel_servo(
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         biasprm=[0.0, 0.0, -stiffness] + [0.0] * 7,
         dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
-        dynprm=[lag_s - tight] + [0.0] * 9,
+        dynprm=[max(lag, STEP_S)] + [0.0] * 9,
         forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-        forcerange=[-force * radius, force * radius],
+        forcerange=[-most, most],
     )
