@@ -36,7 +36,6 @@ class Car:
             friction=self._car.friction,
             wheels=places,
             weight_x=0.5 * length,
-            outline_x=0.5 * length,
         )
 
     @property

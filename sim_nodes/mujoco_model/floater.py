@@ -72,6 +72,7 @@ class Floater:
             radius=robot.body.radius,
             low=low,
             high=low + robot.body.height,
+            ahead=robot.body.footprint_x,
         )
         for name, position, direction in self._pushes():
             _add_push(spec, body, name, position, direction)

@@ -50,7 +50,7 @@ def add_hull(
     radius: float,
     low: float,
     high: float,
-    ahead: float = 0.0,
+    ahead: float,
 ) -> None:
     """Add the outline that touches obstacles and blocks; it weighs nothing and never touches the floor.
 

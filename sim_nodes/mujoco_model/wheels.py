@@ -39,7 +39,6 @@ class Chassis:
         friction: float,
         wheels: dict[str, tuple[float, float]],
         weight_x: float,
-        outline_x: float = 0.0,
     ) -> None:
         """Describe it.
 
@@ -49,11 +48,9 @@ class Chassis:
             friction: Of tyres on the floor [-].
             wheels: Name and place (x, y) of each [m].
             weight_x: Of the centre of mass, ahead of the origin [m].
-            outline_x: Of the outline's centre, ahead of the origin [m].
         """
         self.robot, self.radius, self.friction, self.places = robot, wheel_radius, friction, wheels
         self.rest_height = wheel_radius
-        self._outline_x = outline_x
         height = max(wheel_radius, WEIGHT_HEIGHT * robot.body.height)
         self._weight = np.array([weight_x, 0.0, height - wheel_radius])
         self._wheel_mass = WHEEL_SHARE * robot.body.mass
@@ -78,7 +75,7 @@ class Chassis:
             radius=outline.radius,
             low=(CLEARANCE - 1.0) * self.radius,
             high=outline.height - self.radius,
-            ahead=self._outline_x,
+            ahead=outline.footprint_x,
         )
         return body
 

@@ -31,6 +31,7 @@ class Body:
     height: float  # [m]
     planar: bool  # True: only x, y and yaw move
     footprint: tuple[float, float] | None = None  # length and width of a box; None: a disc of `radius` [m]
+    footprint_x: float = 0.0  # of the box's centre, ahead of the body's origin [m]
 
     def __post_init__(self) -> None:
         """Refuse bodies that cannot exist."""

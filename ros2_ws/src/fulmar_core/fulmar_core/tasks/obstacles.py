@@ -115,7 +115,7 @@ def clearance(state: PlanarState, obstacles: Array, robot: Robot) -> Array:
         gap = gap - robot.body.radius
     else:
         length, width = robot.body.footprint
-        dx = xp.clip(xp.abs(x) - 0.5 * length, 0.0, None)
+        dx = xp.clip(xp.abs(x - robot.body.footprint_x) - 0.5 * length, 0.0, None)
         dy = xp.clip(xp.abs(y) - 0.5 * width, 0.0, None)
         there = obstacles[..., 2] > 0.0
         gap = xp.where(there, xp.sqrt(dx * dx + dy * dy) - obstacles[..., 2], gap)
