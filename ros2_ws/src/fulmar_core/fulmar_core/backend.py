@@ -23,7 +23,6 @@ class Sample:
     odometry: RigidBodyState  # measured, without a batch axis
     imu: ImuSample | None  # None: the robot has no inertial unit
     truth: RigidBodyState | None  # None: not a simulator
-    block: np.ndarray | None = None  # (2,) where the thing to push is [m]; None: there is none
     block: np.ndarray | None = None  # (2,) where the thing to push is, in the world; None: there is none [m]
 
 
