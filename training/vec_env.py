@@ -14,6 +14,7 @@ from fulmar_core.episode import episode_steps
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.push_block import PushBlock
 
 
 class BatchVecEnv(VecEnv):
@@ -123,6 +124,8 @@ class BatchVecEnv(VecEnv):
         touching = self._task.collides(after, goal, self._robot)
         if touching is not None:
             ended_early = ended_early | touching
+        if isinstance(self._task, PushBlock):
+            reward = reward + self._task.block_reward(goal, simulation.goal)
         penalty = getattr(self._task, "penalty", None)  # tasks where nothing is in the way have none
         if penalty is not None:
             reward = reward - penalty(after, goal, self._robot)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 import numpy as np
 
-from fulmar_core.backend import Backend
+from fulmar_core.backend import Backend, Sample
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
@@ -80,7 +81,7 @@ def batches(
         steps = episode_steps(task, dt)
         for step in range(steps):
             simulation.step(np.asarray(controller.act(simulation.observe())))
-            log.add(simulation.truth, judge.see(simulation.truth), simulation.command)
+            log.add(simulation.truth, judge.see(simulation.truth, simulation.goal.block), simulation.command)
             progress(first * steps + (step + 1) * count)
         yield log.trajectories()
 
@@ -152,12 +153,20 @@ def _side_by_side(
     goal, command = drawn.goal, np.tile(robot.actuators.safe_command, (count, 1))
     log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, drawn.goal, control_dt)
     for step in range(episode_steps(task, control_dt)):
-        measured = stack_planar([planar_of(sample.odometry) for sample in samples])
+        measured, block = stack_planar([planar_of(sample.odometry) for sample in samples]), _blocks(samples)
+        if block is not None:
+            goal = dataclasses.replace(goal, block=block)
         goal = task.advance(goal, measured, np.asarray(step * control_dt)) if step else goal
         action = np.asarray(controller.act(observer(measured, goal, command)))
         command = slewed(robot.actuators.limited(action), command, robot, control_dt)
         samples = [backend.step(each, substeps) for backend, each in zip(backends, command, strict=False)]
         truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])
-        log.add(truth, judge.see(truth), command)
+        log.add(truth, judge.see(truth, _blocks(samples)), command)
         progress((step + 1) * count)
     return log.trajectories()
+
+
+def _blocks(samples: list[Sample]) -> np.ndarray | None:
+    """Where the things to push are, shape (samples, 2); None where there are none [m]."""
+    places = [sample.block for sample in samples if sample.block is not None]
+    return np.stack(places) if len(places) == len(samples) else None

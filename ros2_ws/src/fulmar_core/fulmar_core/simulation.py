@@ -21,6 +21,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.push_block import PushBlock
 
 _MOVING = (
     "truth", "measured", "goal", "world", "command", "strength", "_repeats", "_steps", "_actuation", "_odometer",
@@ -38,6 +39,11 @@ class BatchSimulation:
         command: What was last commanded, after every limit, shape (worlds, n).
         strength: How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-].
     """
+
+    truth: PlanarState
+    measured: PlanarState
+    goal: Goal
+    world: World
 
     def __init__(
         self,
@@ -146,9 +152,10 @@ class BatchSimulation:
             noise = 2.0 * uniform_from(bits, self._dtype) - 1.0
         self._actuation.begin(xp.asarray(self.command.T, copy=True), self.world, noise)
         time_s = xp.astype(self._steps, self._dtype) * self.control_dt
+        before = self.truth
         self.truth = control_step(
             self.robot,
-            self.truth,
+            before,
             self._actuation,
             self.world,
             time_s=time_s,
@@ -157,6 +164,8 @@ class BatchSimulation:
             off_centre=self._off_centre,
         )
         self._steps = self._steps + 1
+        if isinstance(self.task, PushBlock):
+            self.goal, self.truth = self.task.pushed(self.goal, before, self.truth, self.robot)
         self.goal = self.task.advance(self.goal, self.truth, time_s + self.control_dt)
         self._measure(None)
 

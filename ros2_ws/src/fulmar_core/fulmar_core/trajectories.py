@@ -11,6 +11,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.push_block import PushBlock
 
 
 @dataclass(frozen=True)
@@ -116,9 +117,16 @@ class Judge:
         self._task, self._dt, self._steps = task, control_dt, 0
         self.goal = goal
 
-    def see(self, truth: PlanarState) -> Goal:
-        """The goal after one more control step, by the true state at its end."""
+    def see(self, truth: PlanarState, block: np.ndarray | None = None) -> Goal:
+        """The goal after one more control step, by the true state at its end.
+
+        Args:
+            truth: True state.
+            block: Where the thing to push is by now, shape (..., 2), for tasks that have one [m].
+        """
         self._steps += 1
+        if block is not None and isinstance(self._task, PushBlock):
+            self.goal = dataclasses.replace(self.goal, block=block)
         counted = getattr(self._task, "counted", None)
         if counted is not None:
             self.goal = counted(self.goal, truth, self._task.tolerance.position)

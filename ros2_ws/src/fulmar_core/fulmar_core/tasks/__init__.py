@@ -10,13 +10,29 @@ from typing import cast
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
+from fulmar_core.tasks.go_through_poses import GoThroughPoses
 from fulmar_core.tasks.go_through_positions import GoThroughPositions
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.push_block import PushBlock
+from fulmar_core.tasks.race_gates import RaceGates
+from fulmar_core.tasks.race_waypoints import RaceWaypoints
+from fulmar_core.tasks.race_wayposes import RaceWayposes
 from fulmar_core.tasks.track_velocities import TrackVelocities
 
-Task = GoToPose | GoToPosition | GoToPositionWithObstacles | GoThroughPositions | TrackVelocities
+Task = (
+    GoToPose
+    | GoToPosition
+    | GoToPositionWithObstacles
+    | GoThroughPositions
+    | GoThroughPoses
+    | TrackVelocities
+    | RaceWaypoints
+    | RaceWayposes
+    | RaceGates
+    | PushBlock
+)
 
 
 def load_task(name: str) -> Task:

@@ -9,6 +9,7 @@ import numpy as np
 from array_api_compat import array_namespace
 
 from fulmar_core.counter_rng import Draws
+from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
@@ -52,7 +53,7 @@ class Obstacles:
         n = draws.worlds
         begin, end = np.stack((start.x, start.y), axis=-1), np.asarray(target)[:, :2]
         middle, reach = 0.5 * (begin + end), 0.75 * np.linalg.norm(end - begin, axis=-1)
-        clear = robot.body.radius + self.radius + 0.2
+        clear = outline_of(robot).extent + self.radius + 0.2
         wanted = np.asarray(draws.uniform(1.0, self.most + 1.0))
         placed = np.zeros((n, self.most, 3))
         for i in range(self.most):
@@ -111,15 +112,8 @@ def clearance(state: PlanarState, obstacles: Array, robot: Robot) -> Array:
     """
     xp = array_namespace(state.x)
     x, y, gap = _relative(state, obstacles)
-    if robot.body.footprint is None:
-        gap = gap - robot.body.radius
-    else:
-        length, width = robot.body.footprint
-        dx = xp.clip(xp.abs(x - robot.body.footprint_x) - 0.5 * length, 0.0, None)
-        dy = xp.clip(xp.abs(y) - 0.5 * width, 0.0, None)
-        there = obstacles[..., 2] > 0.0
-        gap = xp.where(there, xp.sqrt(dx * dx + dy * dy) - obstacles[..., 2], gap)
-    return xp.min(gap, axis=-1)
+    there = obstacles[..., 2] > 0.0
+    return xp.min(xp.where(there, outline_of(robot).gap(x, y) - obstacles[..., 2], gap), axis=-1)
 
 
 def _relative(state: PlanarState, obstacles: Array) -> tuple[Array, Array, Array]:

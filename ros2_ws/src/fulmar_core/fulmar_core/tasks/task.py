@@ -13,7 +13,17 @@ from fulmar_core.tasks.terms import Errors, Tolerance
 
 
 class TaskProtocol(Protocol):
-    """Frozen, free of side effects; every array has the leading shape of the state it goes with."""
+    """Frozen, free of side effects; every array has the leading shape of the state it goes with.
+
+    Some tasks have more, which whoever runs them asks for by name:
+
+    - `required: int`: targets that make an episode a success, where not a closing window but their number counts.
+    - `counted(goal, state, radius) -> Goal`: as `advance`, for judges: a target counts within a radius of theirs [m].
+    - `penalty(state, goal, robot) -> Array`: what a state costs a learner beside the reward.
+    - `pushed(goal, before, after, robot) -> (Goal, PlanarState)`: where the block is after a step in the core's batch,
+      and the robot once the block has held it up; simulators with contacts move the block themselves.
+    - `block_reward(goal, ended) -> Array`: reward of what a step did to the block, beside that of the robot.
+    """
 
     name: str
     title: str

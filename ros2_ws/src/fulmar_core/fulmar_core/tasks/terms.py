@@ -82,10 +82,10 @@ class Tolerance:
 class Errors:
     """How far a state is from its current target; None where a task does not ask."""
 
-    position: Array | None = None  # (...,) >= 0 [m]
-    heading: Array | None = None  # (...,) in [-pi, pi] [rad]
-    velocity: Array | None = None  # (...,) >= 0 [m/s]
-    yaw_rate: Array | None = None  # (...,) [rad/s]
+    position: Array = None  # (...,) >= 0 [m]
+    heading: Array = None  # (...,) in [-pi, pi] [rad]
+    velocity: Array = None  # (...,) >= 0 [m/s]
+    yaw_rate: Array = None  # (...,) [rad/s]
 
 
 def pose_errors(state: PlanarState, target: Array, *, heading: bool) -> Errors:

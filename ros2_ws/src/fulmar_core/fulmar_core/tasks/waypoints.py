@@ -23,7 +23,9 @@ class Course:
     def __post_init__(self) -> None:
         """Refuse courses that do not fit."""
         if self.count < 2 or not 0.0 < self.spacing[0] <= self.spacing[1] or self.area < self.spacing[0]:
-            raise ValueError("'count' must be at least 2, 'spacing' [low, high] with 0 < low <= high <= area.")
+            raise ValueError(
+                "'count' must be at least 2, 'spacing' [low, high] with 0 < low <= high <= area."
+            )
 
     def draw(self, draws: Draws) -> np.ndarray:
         """Draw courses.
@@ -54,4 +56,4 @@ class Course:
 def headings_along(places: np.ndarray) -> np.ndarray:
     """Heading at each waypoint of a closed course: from the one before to the one after, shape (..., count) [rad]."""
     way = np.roll(places, -1, axis=-2) - np.roll(places, 1, axis=-2)
-    return np.arctan2(way[..., 1], way[..., 0])
+    return np.asarray(np.arctan2(way[..., 1], way[..., 0]))

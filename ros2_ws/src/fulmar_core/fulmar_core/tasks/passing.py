@@ -1,0 +1,173 @@
+"""What tasks share whose targets are passed one after another, as many as time allows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.planar import PlanarState, at_rest, wrapped
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks.terms import (
+    MOTION_TERMS,
+    Errors,
+    Tolerance,
+    goal_terms,
+    heading_terms,
+    motion_terms,
+    pose_errors,
+)
+from fulmar_core.tasks.waypoints import headings_along
+
+PLACE_TERMS = ("direction_x_in_body", "direction_y_in_body", "distance")
+TURN_TERMS = ("cos_heading_error", "sin_heading_error")
+IN_ORDER = ("goal", "next_goal", "goal_after_next")
+
+
+def path_terms(seen: int, *, heading: bool) -> tuple[str, ...]:
+    """Names of the observation terms.
+
+    Args:
+        seen: How many targets a controller sees, from the current one on, 1 to 3.
+        heading: Whether it sees their headings too.
+    """
+    each = (*PLACE_TERMS, *TURN_TERMS) if heading else PLACE_TERMS
+    return (*MOTION_TERMS, *(f"{target}_{name}" for target in IN_ORDER[:seen] for name in each))
+
+
+@dataclass(frozen=True)
+class WaypointReward:
+    """Weights of the reward, per control step."""
+
+    progress: float  # times metres come nearer to the current waypoint
+    reached: float  # for each waypoint reached
+    bearing: float  # times exp(-|bearing of the waypoint| / 0.25 rad): RoboRAN tasks_cfg/go_through_positions_cfg.py
+    spin: float  # cost of the turn rate [per rad/s]
+
+    def of(self, progress: Array, reached: Array, bearing: Array, after: PlanarState) -> Array:
+        """Reward of having come nearer [m], of targets reached (0 or 1) and of where the target is [rad]."""
+        xp = array_namespace(progress)
+        return (
+            self.progress * progress
+            + self.reached * xp.astype(reached, progress.dtype)
+            + self.bearing * xp.exp(-xp.abs(bearing) / 0.25)
+            - self.spin * xp.abs(after.yaw_rate)
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PassingTask:
+    """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
+
+    name: str
+    title: str
+    episode_s: float  # length of an episode [s]
+    start_distance: tuple[float, float]  # from the first target [m]
+    start_cone_deg: float = (
+        180.0  # how far from straight behind the first target; 180: on any side of it [deg]
+    )
+    reach: float  # a controller takes a target for reached within this, less than the tolerance [m]
+    tolerance: Tolerance  # within which a judge does
+    required: int  # targets that make an episode a success
+    reward_weights: WaypointReward
+
+    goal_topic: ClassVar[str] = "goal_path"
+    heads: ClassVar[bool] = False  # whether the targets' headings count
+    seen: ClassVar[int] = 2  # targets that a controller sees
+    observation_names: ClassVar[tuple[str, ...]] = path_terms(2, heading=False)
+
+    def __post_init__(self) -> None:
+        """Refuse a reach that judges would not count."""
+        if not 0.0 < self.reach <= self.tolerance.position:
+            raise ValueError("'reach' must be greater than 0 and at most the tolerance of the position.")
+        if not 0.0 <= self.start_cone_deg <= 180.0:
+            raise ValueError("'start_cone_deg' must lie in [0, 180].")
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        raise NotImplementedError
+
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+        """Draw a start at rest and a closed course."""
+        places = self.places(draws)
+        heading = headings_along(places)
+        distance = np.asarray(draws.uniform(*self.start_distance))
+        cone = math.radians(self.start_cone_deg)
+        bearing = heading[:, 0] + math.pi + np.asarray(draws.uniform(-cone, cone))
+        yaw = np.asarray(draws.uniform(-math.pi, math.pi))
+        x, y = places[:, 0, 0] + distance * np.cos(bearing), places[:, 0, 1] + distance * np.sin(bearing)
+        targets = np.concatenate((places, heading[..., None]), axis=-1)
+        n = draws.worlds
+        return at_rest(x, y, yaw), Goal(targets, np.zeros(n), no_obstacles(n), np.zeros((n, 2)))
+
+    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        terms: tuple[Array, ...] = motion_terms(state)
+        for further in range(self.seen):
+            target = goal.ahead(further)
+            terms += toward(state, target)
+            if self.heads:
+                terms += heading_terms(state, target)
+        return terms
+
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """A target that is passed is done."""
+        return self._after(goal, state, self.reached(goal, state, self.reach))
+
+    def counted(self, goal: Goal, state: PlanarState, radius: float) -> Goal:
+        """The goal with one more target done where the current one counts within a radius [m], as judges have it."""
+        return self._after(goal, state, self.reached(goal, state, radius, strict=False))
+
+    def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
+        """Whether the current target is passed.
+
+        Args:
+            goal: Before this step.
+            state: After it, shapes (...,).
+            radius: How near counts [m].
+            strict: Judge the heading, where it counts, as a controller does and not as a judge.
+
+        Returns:
+            Truth values, shape (...,).
+        """
+        return self.errors(state, goal).position < radius
+
+    def _after(self, goal: Goal, state: PlanarState, reached: Array) -> Goal:
+        done = goal.done + array_namespace(goal.done).astype(reached, goal.done.dtype)
+        return Goal(goal.targets, done, goal.obstacles, goal.block)
+
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+        """Reward of one control step; see `TaskProtocol.reward`."""
+        old, new = self.errors(before, goal).position, self.errors(after, goal).position
+        return self.reward_weights.of(
+            old - new, self.reached(goal, after, self.reach), bearing_of(after, goal.current), after
+        )
+
+    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+        """Distance from the current target, and heading error where that counts."""
+        return pose_errors(state, goal.current, heading=self.heads)
+
+    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+        """Nothing stands about."""
+        return None
+
+
+def toward(state: PlanarState, target: Array) -> tuple[Array, Array, Array]:
+    """Direction of a target in the body's frame, and its distance [m], `PLACE_TERMS`."""
+    xp = array_namespace(state.x)
+    x, y = goal_terms(state, target)
+    distance = xp.sqrt(x * x + y * y)
+    safe = xp.clip(distance, 1e-3, None)
+    return x / safe, y / safe, distance
+
+
+def bearing_of(state: PlanarState, target: Array) -> Array:
+    """Angle from the body's x axis to a target, in [-pi, pi] [rad]."""
+    x, y = goal_terms(state, target)
+    return wrapped(array_namespace(x).atan2(y, x))

@@ -1,0 +1,159 @@
+"""Push a block to its place, and leave it there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.dynamics.outline import outline_of
+from fulmar_core.dynamics.pushing import Block, push
+from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.planar import PlanarState, at_rest, to_body
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks.passing import toward
+from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
+
+Range = tuple[float, float]
+APART = 0.05  # least gap between robot and block at the start [m]
+ROOM = 0.5  # span of starts for robots too large for the usual one [m]
+
+
+@dataclass(frozen=True)
+class PushReward:
+    """Weights of the reward, per control step; d is from the block to its place, b from the robot to the block."""
+
+    block: float  # times exp(-d / 0.25 m): RoboRAN tasks_cfg/push_block_cfg.py
+    block_far: float  # times exp(-d / 2 m): leads in from metres away
+    home: float  # for each step that the block is in its place
+    push: float  # times metres the block comes nearer to its place
+    robot: float  # times exp(-b / 0.25 m): RoboRAN, same file
+    approach: float  # times metres the robot comes nearer to where it has to stand for pushing
+    spin: float  # cost of the turn rate [per rad/s]
+
+
+@dataclass(frozen=True)
+class PushBlock:
+    """Push a block to a place; that arrives on `goal_point`, where the block is on `block/pose`."""
+
+    kind: Literal["push_block"]
+    name: str
+    title: str
+    episode_s: float  # length of an episode [s]
+    block: Block
+    block_distance: Range  # of the block from its place when judged [m]
+    training_block_distance: Range  # when learning [m]
+    start_distance: Range  # of the robot from the block; farther off where it would touch it [m]
+    goal_area: float  # side of the square that places are drawn from [m]
+    stand_off: float  # how far behind the block the robot is led [m]
+    tolerance: Tolerance
+    fine_distance: float  # where the magnified way of the block saturates [m]
+    reward_weights: PushReward
+
+    goal_topic: ClassVar[str] = "goal_point"
+    observation_names: ClassVar[tuple[str, ...]] = (
+        "block_direction_x_in_body",
+        "block_direction_y_in_body",
+        "block_distance",
+        "place_direction_x_in_body",
+        "place_direction_y_in_body",
+        "block_to_place_distance",
+        *MOTION_TERMS,
+        "fine_block_to_place_x_in_body",
+        "fine_block_to_place_y_in_body",
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse empty spans."""
+        for low, high in (self.block_distance, self.training_block_distance, self.start_distance):
+            if not 0.0 <= low <= high:
+                raise ValueError(
+                    f"distances must be [low, high] with 0 <= low <= high, found [{low}, {high}]."
+                )
+
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+        """Draw where robot and block start, and where the block belongs; see `TaskProtocol.draw`."""
+        half, n = 0.5 * self.goal_area, draws.worlds
+        place = np.asarray(draws.uniform(-half, half, 2))
+        angles = np.asarray(draws.uniform(-math.pi, math.pi, 3))
+        distance = np.asarray(
+            draws.uniform(*(self.training_block_distance if training else self.block_distance))
+        )
+        block = place + distance[:, None] * np.stack((np.cos(angles[:, 0]), np.sin(angles[:, 0])), axis=-1)
+        least = outline_of(robot).extent + self.block.radius + APART
+        low = max(self.start_distance[0], least)
+        away = np.asarray(draws.uniform(low, max(self.start_distance[1], low + ROOM)))
+        start = at_rest(
+            block[:, 0] + away * np.cos(angles[:, 1]), block[:, 1] + away * np.sin(angles[:, 1]), angles[:, 2]
+        )
+        targets = np.concatenate((place, np.zeros((n, 1))), axis=-1)[:, None, :]
+        return start, Goal(targets, np.zeros(n), no_obstacles(n), block)
+
+    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        block_x, block_y, block_distance = toward(state, goal.block)
+        place_x, place_y, _ = toward(state, goal.current)
+        dx, dy, distance = self._way(goal)
+        divisor = array_namespace(dx).clip(distance, self.fine_distance, None)
+        fine = to_body(state.yaw, dx / divisor, dy / divisor)
+        return block_x, block_y, block_distance, place_x, place_y, distance, *motion_terms(state), *fine
+
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The goal stays; the block is moved by what `pushed` says, or by the world."""
+        return goal
+
+    def pushed(
+        self, goal: Goal, before: PlanarState, after: PlanarState, robot: Robot
+    ) -> tuple[Goal, PlanarState]:
+        """Where the block is after a step, and what pushing left of the robot's speed; see `TaskProtocol`."""
+        x, y, slowed = push(before, after, goal.block[..., 0], goal.block[..., 1], self.block, robot)
+        return replace(goal, block=array_namespace(x).stack((x, y), axis=-1)), slowed
+
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+        """Reward of how the robot moved in one control step; see `TaskProtocol.reward`."""
+        xp = array_namespace(after.x)
+        w = self.reward_weights
+        return (
+            w.robot * xp.exp(-toward(after, goal.block)[2] / 0.25)
+            + w.approach * (self._to_stand(before, goal) - self._to_stand(after, goal))
+            - w.spin * xp.abs(after.yaw_rate)
+        )
+
+    def block_reward(self, goal: Goal, ended: Goal) -> Array:
+        """Reward of how the block moved in one control step; see `TaskProtocol`."""
+        xp = array_namespace(goal.block)
+        w = self.reward_weights
+        old, d = self._way(goal)[2], self._way(ended)[2]
+        return (
+            w.block * xp.exp(-d / 0.25)
+            + w.block_far * xp.exp(-d / 2.0)
+            + w.home * xp.astype(d <= self.tolerance.position, d.dtype)
+            + w.push * (old - d)
+        )
+
+    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+        """Distance of the block from its place."""
+        return Errors(position=self._way(goal)[2])
+
+    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+        """Touching the block is the task."""
+        return None
+
+    def _way(self, goal: Goal) -> tuple[Array, Array, Array]:
+        """From the block to its place in the world, and how far that is [m]."""
+        target = goal.current
+        dx, dy = target[..., 0] - goal.block[..., 0], target[..., 1] - goal.block[..., 1]
+        return dx, dy, array_namespace(dx).sqrt(dx * dx + dy * dy)
+
+    def _to_stand(self, state: PlanarState, goal: Goal) -> Array:
+        """How far the robot is from behind the block, seen from its place; at its place there is no behind [m]."""
+        dx, dy, distance = self._way(goal)
+        xp = array_namespace(dx)
+        share = self.stand_off / xp.clip(distance, self.fine_distance, None)
+        sx, sy = goal.block[..., 0] - share * dx - state.x, goal.block[..., 1] - share * dy - state.y
+        return xp.sqrt(sx * sx + sy * sy)

@@ -1,0 +1,24 @@
+"""Drive a race track corner by corner, each in the direction of the track, as many as time allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.tasks.passing_poses import PosePassingTask
+from fulmar_core.tasks.race_track import RaceTrack
+
+
+@dataclass(frozen=True, kw_only=True)
+class RaceWayposes(PosePassingTask):
+    """Pass through the corners of a race track in their order, looking along it."""
+
+    kind: Literal["race_wayposes"]
+    track: RaceTrack
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        return self.track.draw(draws)
