@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from array_api_compat import array_namespace, device
 
+from fulmar_core.arrays import clip
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
@@ -67,4 +68,4 @@ def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> 
     xp = array_namespace(command)
     most = control_dt * np.asarray(robot.actuators.response.slew)
     limit = xp.asarray(most, dtype=command.dtype, device=device(command))
-    return previous + xp.clip(command - previous, -limit, limit)
+    return previous + clip(command - previous, -limit, limit)

@@ -9,6 +9,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.arrays import clip
 from fulmar_core.rotation import Array
 
 
@@ -63,4 +64,4 @@ class Ackermann:
         """Nearest command that the car can carry out, shape (..., 2)."""
         xp = array_namespace(command)
         most = xp.asarray(self.scale, dtype=command.dtype, device=device(command))
-        return xp.clip(command, -most, most)
+        return clip(command, -most, most)

@@ -6,6 +6,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.arrays import clip
 from fulmar_core.disturbances.world import World
 from fulmar_core.rotation import Array
 
@@ -83,7 +84,7 @@ class ActuationState:
         self._since_s += dt
         if self._slew is not None:
             most = self._slew * dt
-            target = self.applied + xp.clip(target - self.applied, -most, most)
+            target = self.applied + clip(target - self.applied, -most, most)
         if self._response.lag_s > 0.0 and self._slew is None:
             target = self.applied + (target - self.applied) * min(1.0, dt / self._response.lag_s)
         self.applied = target

@@ -9,6 +9,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.arrays import clip
 from fulmar_core.rotation import Array
 
 
@@ -62,9 +63,9 @@ class DifferentialDrive:
         """
         xp = array_namespace(command)
         most = xp.asarray(self.scale, dtype=command.dtype, device=device(command))
-        within = xp.clip(command, -most, most)
+        within = clip(command, -most, most)
         outer = xp.abs(within[..., 0:1]) + 0.5 * self.track * xp.abs(within[..., 1:2])
-        return within / xp.clip(outer / (self.max_wheel_speed * self.wheel_radius), 1.0, None)
+        return within / clip(outer / (self.max_wheel_speed * self.wheel_radius), 1.0, None)
 
     def wheel_speeds(self, command: Array) -> Array:
         """Speeds of the left and the right wheel.

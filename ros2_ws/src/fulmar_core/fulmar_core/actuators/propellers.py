@@ -11,6 +11,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.arrays import clip
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
@@ -66,7 +67,7 @@ class Propellers:
 
     def limited(self, command: Array) -> Array:
         """Nearest command that the hardware can carry out, shape (..., n)."""
-        return array_namespace(command).clip(command, -1.0, 1.0)
+        return clip(command, -1.0, 1.0)
 
     def thrust(self, command: Array) -> Array:
         """Thrust by linear interpolation of the curve.
@@ -79,7 +80,7 @@ class Propellers:
         """
         xp = array_namespace(command)
         start, rise = _table(self.curve, xp, command.dtype, device(command))
-        place = xp.clip((command + 1.0) * (0.5 * (len(self.curve) - 1)), 0.0, len(self.curve) - 1.0)
+        place = clip((command + 1.0) * (0.5 * (len(self.curve) - 1)), 0.0, len(self.curve) - 1.0)
         i = xp.astype(place, xp.int64)
         return start[i] + rise[i] * (place - xp.astype(i, command.dtype))
 

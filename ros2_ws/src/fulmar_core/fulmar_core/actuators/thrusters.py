@@ -10,6 +10,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.arrays import clip
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
@@ -93,7 +94,7 @@ class Thrusters:
         """
         xp = array_namespace(command)
         if self.continuous:
-            return xp.clip(command, 0.0, 1.0)
+            return clip(command, 0.0, 1.0)
         return xp.astype(command > 0.5, command.dtype)
 
     def thrusts(self, command: Array) -> Array:
@@ -137,10 +138,10 @@ class Thrusters:
         """
         xp = array_namespace(applied)
         if self.continuous:
-            applied = xp.clip(applied, 0.0, 1.0)  # whatever errors add, a valve does not suck
+            applied = clip(applied, 0.0, 1.0)  # whatever errors add, a valve does not suck
         thrust = applied * gain * self.thrust
         if self.shared_pressure:
-            thrust = thrust / xp.clip(xp.sum(applied, axis=0), 1.0, None)
+            thrust = thrust / clip(xp.sum(applied, axis=0), 1.0, None)
         matrix = xp.asarray(
             self.wrench_per_newton[:, (0, 1, 5)].T.copy(), dtype=applied.dtype, device=device(applied)
         )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from array_api_compat import array_namespace, device
 
+from fulmar_core.arrays import clip
 from fulmar_core.rotation import Array, cross
 
 Six = tuple[float, float, float, float, float, float]
@@ -46,7 +47,7 @@ class Hydrostatics:
             body's frame, shape (..., 3) [N·m].
         """
         xp = array_namespace(rise)
-        force = xp.clip(weight - self.water_density * GRAVITY * self.waterplane_area * rise, 0.0, None)
+        force = clip(weight - self.water_density * GRAVITY * self.waterplane_area * rise, 0.0, None)
         # sin(roll) cos(pitch) is the y part of the upward axis, -sin(pitch) its x part.
         roll = -weight * self.metacentric_height_roll * up_in_body[..., 1]
         pitch = weight * self.metacentric_height_pitch * up_in_body[..., 0]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
@@ -27,8 +28,8 @@ class Outline:
     def nearest(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Point of the box that is nearest to another, both in the body's frame, shapes (...,) [m]."""
         xp = array_namespace(x)
-        near = xp.clip(x - self.ahead, -self.half_length, self.half_length) + self.ahead
-        return near, xp.clip(y, -self.half_width, self.half_width)
+        near = clip(x - self.ahead, -self.half_length, self.half_length) + self.ahead
+        return near, clip(y, -self.half_width, self.half_width)
 
     def gap(self, x: Array, y: Array) -> Array:
         """Distance of a point in the body's frame from the outline, negative inside a disc, shapes (...,) [m]."""

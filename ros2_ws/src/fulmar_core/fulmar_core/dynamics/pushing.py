@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.planar import PlanarState, to_body
@@ -65,14 +66,14 @@ def push(
         bx, by = to_body(yaw, x - before.x - part * step_x, y - before.y - part * step_y)
         near_x, near_y = outline.nearest(bx, by)
         dx, dy = bx - near_x, by - near_y
-        distance = xp.clip(xp.sqrt(dx * dx + dy * dy), 1e-6, None)
+        distance = clip(xp.sqrt(dx * dx + dy * dy), 1e-6, None)
         nx, ny = dx / distance, dy / distance  # from the robot into the block, in the body's frame
-        depth = xp.clip(outline.rounding + block.radius - distance, 0.0, None)
+        depth = clip(outline.rounding + block.radius - distance, 0.0, None)
         # The robot's side of the contact slides along by its own motion and its turning.
         ux, uy = to_body(yaw, step_x, step_y)
         touch_x, touch_y = near_x + outline.rounding * nx, near_y + outline.rounding * ny
         slip = (uy + turn * touch_x) * nx - (ux - turn * touch_y) * ny
-        aside = xp.clip(SIDEWAYS * slip, -block.grip * depth, block.grip * depth)
+        aside = clip(SIDEWAYS * slip, -block.grip * depth, block.grip * depth)
         mx, my = nx * depth - ny * aside, ny * depth + nx * aside
         c, s = xp.cos(yaw), xp.sin(yaw)
         x, y = x + c * mx - s * my, y + s * mx + c * my
@@ -87,11 +88,11 @@ def _slowed(
 ) -> PlanarState:
     """Take the floor's work from the part of a robot's speed that goes the block's way."""
     xp = array_namespace(dx)
-    length = xp.clip(xp.sqrt(dx * dx + dy * dy), 1e-9, None)
+    length = clip(xp.sqrt(dx * dx + dy * dy), 1e-9, None)
     ux, uy = dx / length, dy / length
-    along = xp.clip(state.vx * ux + state.vy * uy, 0.0, None)
+    along = clip(state.vx * ux + state.vy * uy, 0.0, None)
     work = block.floor_friction * block.mass * GRAVITY * driven
-    left = xp.sqrt(xp.clip(along * along - 2.0 * work / mass, 0.0, None))
+    left = xp.sqrt(clip(along * along - 2.0 * work / mass, 0.0, None))
     lost = along - left
     return PlanarState(
         state.x, state.y, state.yaw, state.vx - lost * ux, state.vy - lost * uy, state.yaw_rate

@@ -10,6 +10,7 @@ from array_api_compat import array_namespace
 
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.arrays import clip
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
@@ -49,17 +50,17 @@ def rolling_step(
     wanted = target[0] * gain[0]
     wheels = 2.0 if isinstance(drive, DifferentialDrive) else 1.0
     most = wheels * drive.wheel_force / world.mass
-    acceleration = xp.clip((wanted - speed) / lag, -most, most)
+    acceleration = clip((wanted - speed) / lag, -most, most)
     speed = speed + dt * (acceleration + (c * outside[0] + s * outside[1]) / world.mass)
     if isinstance(drive, DifferentialDrive):
         fastest = drive.wheel_force * drive.track / world.yaw_inertia
-        turning = xp.clip((target[1] * gain[1] - state.yaw_rate) / lag, -fastest, fastest)
+        turning = clip((target[1] * gain[1] - state.yaw_rate) / lag, -fastest, fastest)
         yaw_rate = state.yaw_rate + dt * (turning + outside[2] / world.yaw_inertia)
     else:
         # Bicycle model (Rajamani, "Vehicle Dynamics and Control", 2012, §2.2), rear axle as reference.
         # Tyres push sideways with friction at most; beyond it the car goes wider than it steers.
-        widest = drive.friction * GRAVITY / xp.clip(xp.abs(speed), 1e-3, None)
-        yaw_rate = xp.clip(speed * xp.tan(target[1] * gain[1]) / drive.wheelbase, -widest, widest)
+        widest = drive.friction * GRAVITY / clip(xp.abs(speed), 1e-3, None)
+        yaw_rate = clip(speed * xp.tan(target[1] * gain[1]) / drive.wheelbase, -widest, widest)
     yaw = state.yaw + dt * yaw_rate
     c, s = xp.cos(yaw), xp.sin(yaw)
     vx, vy = speed * c, speed * s

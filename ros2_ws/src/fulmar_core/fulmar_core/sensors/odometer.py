@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from array_api_compat import array_namespace, device
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import NOISE, normal_from, uniform_from, words, world_keys
 from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
@@ -157,7 +158,7 @@ class Odometer:
         if _any(spec.column("limit")):
             limit = self._constant("limit", columns)
             most = xp.where(limit > 0.0, limit, xp.full_like(limit, xp.inf))
-            columns = xp.clip(columns, -most, most)
+            columns = clip(columns, -most, most)
         if _any(spec.column("quantum")):
             quantum = self._constant("quantum", columns)
             safe = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
@@ -172,7 +173,7 @@ class Odometer:
         old = xp.concat((reading[None], self._history[:-1]))
         self._history = xp.where(fresh, reading[None], old)
         late = (self._spec.delay_s + world.sensor_delay) / self._period
-        back = xp.clip(xp.round(late), 0, self._depth - 1)
+        back = clip(xp.round(late), 0, self._depth - 1)
         worlds = reading.shape[1]
         return self._history[xp.astype(back, xp.int64), :, xp.arange(worlds, device=device(reading))].T
 

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
@@ -79,4 +80,4 @@ class GoToPositionWithObstacles:
         gap = clearance(state, goal.obstacles, robot)
         xp = array_namespace(gap)
         touching = xp.astype(gap < TOUCH, gap.dtype)
-        return self.collision_cost * touching + self.nearness_cost * xp.exp(-xp.clip(gap, 0.0, 9.0) / 0.15)
+        return self.collision_cost * touching + self.nearness_cost * xp.exp(-clip(gap, 0.0, 9.0) / 0.15)

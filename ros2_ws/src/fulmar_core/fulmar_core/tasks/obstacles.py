@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.planar import PlanarState, to_body
@@ -90,11 +91,11 @@ class Obstacles:
         order = xp.argsort(gap, axis=-1)[..., : self.seen]
         x, y, gap = (xp.take_along_axis(a, order, axis=-1) for a in (x, y, gap))
         there = gap < FAR
-        shrink = SIGHT / xp.clip(xp.sqrt(x * x + y * y), SIGHT, None)
+        shrink = SIGHT / clip(xp.sqrt(x * x + y * y), SIGHT, None)
         columns = (
             xp.where(there, x * shrink, xp.full_like(x, -SIGHT)),
             xp.where(there, y * shrink, xp.zeros_like(y)),
-            xp.exp(-xp.clip(gap, -1.0, 50.0) / 0.5),
+            xp.exp(-clip(gap, -1.0, 50.0) / 0.5),
         )
         return tuple(column[..., i] for i in range(self.seen) for column in columns)
 

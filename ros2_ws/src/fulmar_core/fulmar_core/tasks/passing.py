@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.planar import PlanarState, at_rest, wrapped
@@ -163,7 +164,7 @@ def toward(state: PlanarState, target: Array) -> tuple[Array, Array, Array]:
     xp = array_namespace(state.x)
     x, y = goal_terms(state, target)
     distance = xp.sqrt(x * x + y * y)
-    safe = xp.clip(distance, 1e-3, None)
+    safe = clip(distance, 1e-3, None)
     return x / safe, y / safe, distance
 
 

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.dynamics.pushing import Block, push
@@ -154,6 +155,6 @@ class PushBlock:
         """How far the robot is from behind the block, seen from its place; at its place there is no behind [m]."""
         dx, dy, distance = self._way(goal)
         xp = array_namespace(dx)
-        share = self.stand_off / xp.clip(distance, self.fine_distance, None)
+        share = self.stand_off / clip(distance, self.fine_distance, None)
         sx, sy = goal.block[..., 0] - share * dx - state.x, goal.block[..., 1] - share * dy - state.y
         return xp.sqrt(sx * sx + sy * sy)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import offset_to
 from fulmar_core.planar import PlanarState, at_rest, to_body, wrapped
@@ -129,5 +130,5 @@ def fine_terms(x: Array, y: Array, *, saturation: float) -> tuple[Array, Array, 
     """
     xp = array_namespace(x)
     distance = xp.sqrt(x * x + y * y)
-    divisor = xp.clip(distance, saturation, None)
+    divisor = clip(distance, saturation, None)
     return x / divisor, y / divisor, distance

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.planar import PlanarState, at_rest
@@ -61,8 +62,8 @@ class TrackVelocities:
         yaw = draws.uniform(-math.pi, math.pi)
         xp = array_namespace(ahead)
         speed = xp.sqrt(ahead * ahead + left * left)
-        fastest = can.turning_acceleration / xp.clip(speed, 1e-6, None)
-        targets = xp.stack((ahead, left, xp.clip(turn, -fastest, fastest)), axis=-1)
+        fastest = can.turning_acceleration / clip(speed, 1e-6, None)
+        targets = xp.stack((ahead, left, clip(turn, -fastest, fastest)), axis=-1)
         zero = xp.zeros_like(yaw)
         return at_rest(zero, zero, yaw), Goal(
             targets, zero, no_obstacles(draws.worlds), targets[:, 0, :2] * 0.0
@@ -74,8 +75,8 @@ class TrackVelocities:
         u, v, r = motion_terms(state)
         target = goal.current
         eu, ev, er = target[..., 0] - u, target[..., 1] - v, target[..., 2] - r
-        size = xp.clip(xp.sqrt(eu * eu + ev * ev), self.fine_velocity, None)
-        turn = xp.clip(er / self.fine_yaw_rate, -1.0, 1.0)
+        size = clip(xp.sqrt(eu * eu + ev * ev), self.fine_velocity, None)
+        turn = clip(er / self.fine_yaw_rate, -1.0, 1.0)
         return eu, ev, er, u, v, r, eu / size, ev / size, turn
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
@@ -85,7 +86,7 @@ class TrackVelocities:
         xp = array_namespace(goal.targets)
         done = xp.floor((time_s + 1e-6) / self.hold_s)
         last = goal.targets.shape[-2] - 1
-        done = xp.astype(xp.clip(done, 0.0, float(last)), goal.done.dtype)
+        done = xp.astype(clip(done, 0.0, float(last)), goal.done.dtype)
         return Goal(goal.targets, xp.zeros_like(goal.done) + done, goal.obstacles, goal.block)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
