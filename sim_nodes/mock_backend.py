@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.backend import Sample
+from fulmar_core.dynamics.pushing import Block, push
 from fulmar_core.episode import Episode
 from fulmar_core.motion import move
 from fulmar_core.planar import PlanarState, rigid_of
@@ -15,9 +16,14 @@ from sim_nodes.one_world import OneWorld
 class MockBackend:
     """One robot in the core's dynamics, measured without noise, without an inertial unit."""
 
-    def __init__(self, robot: Robot) -> None:
-        """Prepare for `reset`."""
-        self.robot = robot
+    def __init__(self, robot: Robot, *, block: Block | None = None) -> None:
+        """Prepare for `reset`.
+
+        Args:
+            robot: The robot.
+            block: What there is to push.
+        """
+        self.robot, self._block = robot, block
         self._world = OneWorld(robot, noisy=False)
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
@@ -26,17 +32,18 @@ class MockBackend:
         self._state = PlanarState(
             *(np.array([getattr(start, name)], dtype=float) for name in PlanarState.__slots__)
         )
+        self._place = np.array(episode.goal.block, dtype=float)
         sample = self._sample()
         self._world.reset(episode, sample.odometry, seed=seed, number=number)
         return sample
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Apply a command; see `Backend.step`."""
-        world = self._world
-        world.begin(np.asarray(command, dtype=float), ticks, rigid_of(self._state[0]))
+        world, before = self._world, self._state
+        world.begin(np.asarray(command, dtype=float), ticks, rigid_of(before[0]))
         self._state = move(
             self.robot,
-            self._state,
+            before,
             world.actuation,
             world.world,
             world.outside,
@@ -44,6 +51,10 @@ class MockBackend:
             latest_s=world.latest_s,
             off_centre=bool(world.world.com_x[0] or world.world.com_y[0]),
         )
+        if self._block is not None:
+            x, y = self._place[:1], self._place[1:]
+            x, y, self._state = push(before, self._state, x, y, self._block, self.robot)
+            self._place = np.concatenate((x, y))
         return self._sample()
 
     def make_safe(self) -> None:
@@ -54,4 +65,4 @@ class MockBackend:
 
     def _sample(self) -> Sample:
         truth = rigid_of(self._state[0])
-        return Sample(truth, None, truth)
+        return Sample(truth, None, truth, None if self._block is None else self._place)

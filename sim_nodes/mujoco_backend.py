@@ -7,6 +7,7 @@ import numpy as np
 
 from fulmar_core.backend import Sample
 from fulmar_core.counter_rng import NOISE
+from fulmar_core.dynamics.pushing import Block
 from fulmar_core.episode import Episode
 from fulmar_core.errors import SafetyError
 from fulmar_core.robot import Robot
@@ -22,18 +23,19 @@ SENSORS = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), 
 class MujocoBackend:
     """One robot in MuJoCo."""
 
-    def __init__(self, robot: Robot, *, sensor_noise: bool = True) -> None:
+    def __init__(self, robot: Robot, *, sensor_noise: bool = True, block: Block | None = None) -> None:
         """Build the model.
 
         Args:
             robot: The robot.
             sensor_noise: Whether odometry and inertial unit have the noise of the robot's YAML.
+            block: What there is to push.
         """
         self.robot = robot
-        self._noisy = sensor_noise
+        self._noisy, self._block = sensor_noise, block
         self._rng = np.random.default_rng()
         self._world = OneWorld(robot, noisy=sensor_noise)
-        self._enter(Scene(robot))
+        self._enter(Scene(robot, block=block))
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -49,13 +51,13 @@ class MujocoBackend:
         """Begin anew; see `Backend.reset`."""
         obstacles = np.asarray(episode.goal.obstacles, dtype=float)
         if not self._scene.has_room_for(obstacles):
-            self._enter(Scene(self.robot, radii_for(obstacles)))
+            self._enter(Scene(self.robot, radii_for(obstacles), self._block))
         scene, machine = self._scene, self._scene.machine
         machine.take_world(scene.model, episode.world)
         mujoco.mj_setConst(scene.model, scene.data)
         mujoco.mj_resetData(scene.model, scene.data)
         machine.place(scene.model, scene.data, episode.start)
-        scene.place_obstacles(obstacles)
+        scene.place_things(episode.goal)
         self._rng = np.random.default_rng((seed, number, NOISE))
         truth, imu = self._read()
         return self._sample(truth, imu, self._world.reset(episode, truth, seed=seed, number=number))
@@ -112,4 +114,4 @@ class MujocoBackend:
         self._truth = truth
         if self._noisy:
             imu = measure_imu(imu, self.robot.sensors.imu, self._rng)
-        return Sample(odometry, imu, truth)
+        return Sample(odometry, imu, truth, self._scene.block_place)

@@ -5,7 +5,11 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from fulmar_core.dynamics.pushing import Block
+from fulmar_core.goal import Goal
 from fulmar_core.robot import Robot
+from sim_nodes.mujoco_model.block import NAME as BLOCK
+from sim_nodes.mujoco_model.block import add_block, place_block
 from sim_nodes.mujoco_model.machine import Machine, machine_of
 from sim_nodes.mujoco_model.obstacles import add_obstacles, place_obstacles, there_is_room
 from sim_nodes.mujoco_model.surroundings import add_sensors, add_surroundings
@@ -14,28 +18,36 @@ PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 
 
 class Scene:
-    """A robot's model with room for some obstacles."""
+    """A robot's model with room for some obstacles, and perhaps a block."""
 
-    def __init__(self, robot: Robot, radii: tuple[float, ...] = ()) -> None:
+    def __init__(self, robot: Robot, radii: tuple[float, ...] = (), block: Block | None = None) -> None:
         """Compile.
 
         Args:
             robot: The robot.
             radii: Of the obstacles that there is room for [m].
+            block: The thing to push; None for none.
         """
-        self.robot, self.radii = robot, radii
+        self._radii, self._block = radii, block
         self.machine: Machine = machine_of(robot)
-        self.model = _spec(robot, self.machine, radii).compile()
+        self.model = _spec(robot, self.machine, radii, block).compile()
         self.machine.bind(self.model)
         self.data = mujoco.MjData(self.model)
 
     def has_room_for(self, obstacles: np.ndarray) -> bool:
         """Whether these obstacles can be shown, shape (m, 3); if not, another scene has to be compiled."""
-        return there_is_room(self.radii, obstacles)
+        return there_is_room(self._radii, obstacles)
 
-    def place_obstacles(self, obstacles: np.ndarray) -> None:
-        """Move the obstacles of a new episode into place, shape (m, 3)."""
-        place_obstacles(self.model, self.data, obstacles)
+    def place_things(self, goal: Goal) -> None:
+        """Move obstacles and block to where an episode has them; `data` has just been reset."""
+        place_obstacles(self.model, self.data, np.asarray(goal.obstacles))
+        if self._block is not None:
+            place_block(self.model, self.data, float(goal.block[0]), float(goal.block[1]))
+
+    @property
+    def block_place(self) -> np.ndarray | None:
+        """Where the block is, shape (2,); None where there is none [m]."""
+        return None if self._block is None else np.array(self.data.body(BLOCK).xpos[:2])
 
 
 def build_model(robot: Robot) -> mujoco.MjModel:
@@ -50,7 +62,7 @@ def build_model(robot: Robot) -> mujoco.MjModel:
     return Scene(robot).model
 
 
-def _spec(robot: Robot, machine: Machine, radii: tuple[float, ...]) -> mujoco.MjSpec:
+def _spec(robot: Robot, machine: Machine, radii: tuple[float, ...], block: Block | None) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
     spec.option.timestep = robot.timing.physics_dt / machine.steps_per_tick
@@ -60,4 +72,6 @@ def _spec(robot: Robot, machine: Machine, radii: tuple[float, ...]) -> mujoco.Mj
     add_surroundings(spec, PALE if robot.hydrodynamics is None else WATER)
     add_sensors(spec, machine.add(spec))
     add_obstacles(spec, radii)
+    if block is not None:
+        add_block(spec, block)
     return spec

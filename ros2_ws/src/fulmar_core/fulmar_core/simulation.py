@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from array_api_compat import is_numpy_namespace
+from array_api_compat import array_namespace, is_numpy_namespace
 
 from fulmar_core.counter_rng import uniform_from, words, world_keys
 from fulmar_core.disturbances.scenario import Scenario
@@ -82,7 +82,8 @@ class BatchSimulation:
         self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
         self.observer = Observer(robot, task)
-        self._xp, self._device, self._dtype = xp, device, dtype or xp.float32
+        self._xp = array_namespace(xp.empty(0))  # the library itself may lack what the array standard asks for
+        self._device, self._dtype = device, dtype or xp.float32
         self._numbers = self._whole(first + np.arange(worlds))
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
