@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_core.counter_rng import Draws
 
-CANDIDATES = 12  # places tried for each waypoint, then their mirror images; all fail for 3 courses in 10,000
+CANDIDATES = 12  # places tried for each waypoint, then their mirror images; all fail for 2 courses in 100,000
 
 
 @dataclass(frozen=True)
