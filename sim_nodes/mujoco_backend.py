@@ -7,12 +7,15 @@ import numpy as np
 
 from fulmar_core.backend import Sample
 from fulmar_core.counter_rng import NOISE
+from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.dynamics.pushing import Block
 from fulmar_core.episode import Episode
 from fulmar_core.errors import SafetyError
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample, measure_imu
 from fulmar_core.state import RigidBodyState
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.push_block import PushBlock
 from sim_nodes.mujoco_model import Scene
 from sim_nodes.mujoco_model.obstacles import radii_for
 from sim_nodes.one_world import OneWorld
@@ -36,6 +39,12 @@ class MujocoBackend:
         self._rng = np.random.default_rng()
         self._world = OneWorld(robot, noisy=sensor_noise)
         self._enter(Scene(robot, block=block))
+
+    @classmethod
+    def of(cls, robot: Robot, task: Task, scenario: Scenario) -> MujocoBackend:
+        """The simulator that a task and a scenario ask for."""
+        block = task.block if isinstance(task, PushBlock) else None
+        return cls(robot, sensor_noise=scenario.sensor_noise, block=block)
 
     @property
     def model(self) -> mujoco.MjModel:

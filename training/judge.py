@@ -35,7 +35,7 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
     )
     trajectories = roll_out_in_backends(
         controller,
-        lambda: MujocoBackend(robot, sensor_noise=world.sensor_noise),
+        lambda: MujocoBackend.of(robot, task, world),
         task,
         world,
         episodes=episodes,
