@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-_LEAST_PIVOT = 1e-9  # of the diagonal: below it the curvature is taken as positive
+_LEAST_PIVOT = 1e-10  # of the diagonal: less is rounding
 
 
-def solve_chain(diagonal: np.ndarray, beside: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve block-tridiagonal symmetric systems by Cholesky's method, each made positive definite on the way.
-
-    A pivot that is not positive is replaced by its magnitude (Nocedal and Wright, "Numerical Optimization",
-    §3.4), so the answer to a gradient always points uphill.
+def solve_chain(diagonal: np.ndarray, beside: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solve block-tridiagonal symmetric systems by Cholesky's method.
 
     Args:
         diagonal: Blocks on the diagonal, shape (links, n, n, problems).
@@ -22,43 +19,43 @@ def solve_chain(diagonal: np.ndarray, beside: np.ndarray, right: np.ndarray) -> 
         right: Right-hand sides, shape (links, n, problems).
 
     Returns:
-        Solutions, shape (links, n, problems).
+        Solutions, shape (links, n, problems), and which systems are positive definite, shape (problems,); the
+        solutions of others mean nothing.
     """
-    links, n = right.shape[0], right.shape[1]
     factors: list[np.ndarray] = []
     couplings: list[np.ndarray] = []
     parts: list[np.ndarray] = []
-    for link in range(links):
+    definite = np.ones(right.shape[2], dtype=bool)
+    for link in range(len(right)):
         block, part = diagonal[link].copy(), right[link].copy()
         if link:
-            above = couplings[-1]
-            for k in range(n):
-                block -= above[k][:, None] * above[k][None, :]
-                part -= above[k] * parts[-1][k]
-        factor = _cholesky(block, diagonal[link])
-        factors.append(factor)
-        parts.append(_forward(factor, part))
-        if link < links - 1:
-            couplings.append(_forward(factor, beside[link]))
+            for row, known in zip(couplings[-1], parts[-1], strict=True):
+                block -= row[:, None] * row[None, :]
+                part -= row * known
+        factors.append(_cholesky(block, _LEAST_PIVOT * diagonal[link], definite))
+        parts.append(_forward(factors[-1], part))
+        if link < len(beside):
+            couplings.append(_forward(factors[-1], beside[link]))
     solution = np.empty_like(right)
-    for link in range(links - 1, -1, -1):
+    for link in range(len(right) - 1, -1, -1):
         part = parts[link]
-        if link < links - 1:
+        if link < len(beside):
             part = part - np.sum(couplings[link] * solution[link + 1][None], axis=1)
         solution[link] = _backward(factors[link], part)
-    return solution
+    return solution, definite
 
 
-def _cholesky(block: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Lower factor of each block; `scale` has the diagonal that pivots are compared with."""
-    n = block.shape[0]
+def _cholesky(block: np.ndarray, least: np.ndarray, definite: np.ndarray) -> np.ndarray:
+    """Lower factor of each block; where a pivot is not above `least`, `definite` becomes false."""
     lower = np.zeros_like(block)
-    for j in range(n):
+    for j in range(len(block)):
         pivot = block[j, j].copy()
         for k in range(j):
             pivot -= lower[j, k] * lower[j, k]
-        lower[j, j] = np.sqrt(np.maximum(np.abs(pivot), _LEAST_PIVOT * np.abs(scale[j, j])))
-        for i in range(j + 1, n):
+        good = pivot > np.maximum(least[j, j], 0.0)
+        definite &= good
+        lower[j, j] = np.sqrt(np.where(good, pivot, np.inf))
+        for i in range(j + 1, len(block)):
             entry = block[i, j].copy()
             for k in range(j):
                 entry -= lower[i, k] * lower[j, k]

@@ -4,11 +4,12 @@ A mass with |a| <= 1 (in its unit) needs, for a change of velocity Δv and of po
 (Δv, q) lies in a convex set, where q = Δp - h v̄ and v̄ is the mean of first and last velocity: q is the moment of
 the acceleration about the middle of the interval. The set's boundary is made by accelerations along η + λ s (the
 bilinear tangent law: Bryson and Ho, "Applied Optimal Control", §2.7). Along Δv that gives the parabola
-4|q| <= h² - |Δv|², and with x = |Δv|² / h² over all directions, to within 3 % of |q|,
+4|q| <= h² - |Δv|², and in all directions, with x = |Δv|² / h²,
 
-    16 (|q|² - S(x) (Δv × q)² / h²) <= (h² - |Δv|²)²,   S(x) = 1 + (1 - x) (0.66 - 0.73 (1 - x) + 0.97 (1 - x)²).
+    16 (|q|² - S(x) (Δv × q)² / h²) <= (h² - |Δv|²)²,   S(x) = 1 + (1 - x) (0.35 + 0.262 (1 - x) + 0.209 (1 - x)²).
 
-The three numbers are fitted so that the right set contains the true one: whatever flies is inside.
+The three numbers are fitted so that this set contains the true one: whatever flies is inside. Seen from the centre
+it is 3 % larger on average, and 8 % in its worst direction.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_FIT = (0.66, -0.73, 0.97)
+_FIT = (0.35, 0.262, 0.209)
 
 
 def reach_slack(
@@ -114,9 +115,7 @@ def log_barrier(velocity_change: np.ndarray, moment: np.ndarray, duration: np.nd
     return LogBarrier(-g, H)
 
 
-def _invariants(
-    velocity_change: np.ndarray, moment: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _invariants(velocity_change: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """|Δv|², |q|² and Δv × q: the set is round, so nothing else matters."""
     (v0, v1), (q0, q1) = velocity_change, moment
     return v0 * v0 + v1 * v1, q0 * q0 + q1 * q1, v0 * q1 - v1 * q0
