@@ -1,0 +1,119 @@
+"""Paths made of sines: Lissajous figure, hypotrochoid, sine wave."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from fulmar_core.references.spacing import Point, along_curve, on_circle, positive
+
+MOST_TURNS = 100  # of a hypotrochoid before it closes
+
+
+@dataclass(frozen=True)
+class Lissajous:
+    """x = A sin(m t + φ), y = B sin(n t) (Lawrence, "A Catalog of Special Plane Curves", §6.2)."""
+
+    kind: Literal["lissajous"]
+    half_width: float  # A [m]
+    half_height: float  # B [m]
+    x_cycles: int  # m
+    y_cycles: int  # n
+    phase_deg: float = 90.0  # φ [deg]
+    centre: Point = (0.0, 0.0)
+
+    closed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Refuse lines and figures that repeat."""
+        positive(
+            half_width=self.half_width,
+            half_height=self.half_height,
+            x_cycles=self.x_cycles,
+            y_cycles=self.y_cycles,
+        )
+        if math.gcd(self.x_cycles, self.y_cycles) > 1:
+            raise ValueError(
+                f"'x_cycles' and 'y_cycles' must have no common factor, found {self.x_cycles} and {self.y_cycles}."
+            )
+
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
+
+        def curve(t: np.ndarray) -> np.ndarray:
+            x = self.half_width * on_circle(self.x_cycles * t + self.phase_deg / 360.0)[:, 1]
+            return np.stack((x, self.half_height * on_circle(self.y_cycles * t)[:, 1]), axis=1)
+
+        return along_curve(curve, count, closed=True, centre=self.centre)
+
+
+@dataclass(frozen=True)
+class Hypotrochoid:
+    """Drawn by a pen on a wheel that rolls inside a ring (Lawrence, "A Catalog of Special Plane Curves", §6.3).
+
+    x = (R - r) cos t + d cos((R - r) t / r), y = (R - r) sin t - d sin((R - r) t / r).
+    """
+
+    kind: Literal["hypotrochoid"]
+    ring_radius: float  # R [m]
+    wheel_radius: float  # r [m]
+    pen_distance: float  # d, from the wheel's axle [m]
+    centre: Point = (0.0, 0.0)
+
+    closed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Refuse wheels that do not fit, and curves that close too late."""
+        positive(ring_radius=self.ring_radius, wheel_radius=self.wheel_radius, pen_distance=self.pen_distance)
+        if self.wheel_radius >= self.ring_radius:
+            raise ValueError("'wheel_radius' must be smaller than 'ring_radius'.")
+        if abs(float(self._ratio) - self.wheel_radius / self.ring_radius) > 1e-9:
+            raise ValueError(
+                f"'wheel_radius' / 'ring_radius' = {self.wheel_radius / self.ring_radius:g} must be a fraction of "
+                f"whole numbers up to {MOST_TURNS}, or the curve does not close."
+            )
+
+    @property
+    def _ratio(self) -> Fraction:
+        """Wheel over ring; the numerator is the number of turns until the curve closes."""
+        return Fraction(self.wheel_radius / self.ring_radius).limit_denominator(MOST_TURNS)
+
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
+        turns, teeth = self._ratio.numerator, self._ratio.denominator
+
+        def curve(t: np.ndarray) -> np.ndarray:
+            axle = (self.ring_radius - self.wheel_radius) * on_circle(turns * t)
+            return axle + self.pen_distance * on_circle((turns - teeth) * t)
+
+        return along_curve(curve, count, closed=True, centre=self.centre)
+
+
+@dataclass(frozen=True)
+class Sine:
+    """Wave along x, left to right, with its middle at the centre: y = A sin(2 π n s), 0 <= s <= 1."""
+
+    kind: Literal["sine"]
+    length: float  # along x [m]
+    amplitude: float  # A [m]
+    cycles: float  # n
+    centre: Point = (0.0, 0.0)
+
+    closed: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Refuse lines."""
+        positive(length=self.length, amplitude=self.amplitude, cycles=self.cycles)
+
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
+
+        def curve(t: np.ndarray) -> np.ndarray:
+            y = self.amplitude * on_circle(self.cycles * t)[:, 1]
+            return np.stack((self.length * (t - 0.5), y), axis=1)
+
+        return along_curve(curve, count, closed=False, centre=self.centre)

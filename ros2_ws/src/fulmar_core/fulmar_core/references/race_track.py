@@ -1,0 +1,89 @@
+"""A random closed track with smooth corners."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from fulmar_core.references.spacing import Point, along_curve, positive
+
+HANDLE = 0.2  # of the distance to the next corner: RoboRAN tasks_cfg, `rad`
+SHARPEST_DEG = 12.5  # corners that turn back more closely are drawn again: same, [deg]
+GAP = 1.0 / 15.0  # least distance of corners over the size: 1 m on the public tracks
+_MOST_DRAWS = 10_000
+
+
+@dataclass(frozen=True)
+class RaceTrack:
+    """Corners drawn in a square, visited around their middle, joined by cubic Bézier curves.
+
+    Figures of the public RoboRAN tracks: 9 to 13 corners in a square of 15 m. At each corner the track runs in the
+    direction halfway between the ways in and out.
+    """
+
+    kind: Literal["race_track"]
+    seed: int  # >= 0; the same seed is the same track
+    size: float = 15.0  # side of the square that corners are drawn from [m]
+    corner_counts: tuple[int, int] = (9, 13)  # fewest and most
+    centre: Point = (0.0, 0.0)
+
+    closed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Refuse what is no track."""
+        positive(size=self.size)
+        fewest, most = self.corner_counts
+        if not 3 <= fewest <= most <= 20:
+            raise ValueError(
+                f"'corner_counts' must be [fewest, most] within [3, 20], found [{fewest}, {most}]."
+            )
+        if self.seed < 0:
+            raise ValueError("'seed' must not be negative.")
+
+    def corners(self) -> np.ndarray:
+        """Corners in the order of the track, shape (n, 2) [m]."""
+        rng = np.random.Generator(np.random.Philox(key=self.seed))
+        count = int(rng.integers(*self.corner_counts, endpoint=True))
+        for _ in range(_MOST_DRAWS):
+            corners = rng.uniform(-0.5, 0.5, (count, 2))
+            offset = corners - corners.mean(axis=0)
+            corners = corners[np.argsort(np.arctan2(offset[:, 1], offset[:, 0]))]
+            if _is_drivable(corners):
+                return np.asarray(self.size * corners + np.array(self.centre))
+        raise ValueError(f"no track with {count} corners found for seed {self.seed}. Take another seed.")
+
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
+        corners = self.corners() - np.array(self.centre)
+        after = np.roll(corners, -1, axis=0)
+        length = np.linalg.norm(after - corners, axis=1, keepdims=True)
+        way_out = (after - corners) / length
+        middle = way_out + np.roll(way_out, 1, axis=0)
+        heading = middle / np.linalg.norm(middle, axis=1, keepdims=True)
+        reach = HANDLE * length
+        bends = np.stack(
+            (corners, corners + reach * heading, after - reach * np.roll(heading, -1, axis=0), after)
+        )
+
+        def curve(t: np.ndarray) -> np.ndarray:
+            piece = np.minimum((t * len(corners)).astype(int), len(corners) - 1)
+            s = (t * len(corners) - piece)[:, None]
+            a, b, c, d = bends[:, piece]
+            r = 1.0 - s
+            return np.asarray(r**3 * a + 3.0 * r * r * s * b + 3.0 * r * s * s * c + s**3 * d)
+
+        return along_curve(curve, count, closed=True, centre=self.centre)
+
+
+def _is_drivable(corners: np.ndarray) -> bool:
+    """Corners lie apart, and none turns back on itself."""
+    gaps = np.linalg.norm(corners[:, None] - corners[None], axis=-1) + np.eye(len(corners))
+    way_out = np.roll(corners, -1, axis=0) - corners
+    way_in = np.roll(way_out, 1, axis=0)
+    cos = -np.sum(way_in * way_out, axis=1) / (
+        np.linalg.norm(way_in, axis=1) * np.linalg.norm(way_out, axis=1) + 1e-12
+    )
+    return bool(gaps.min() >= GAP and cos.max() <= math.cos(math.radians(SHARPEST_DEG)))

@@ -1,0 +1,75 @@
+"""Points at equal distances along a curve; what all reference paths share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+Point = tuple[float, float]  # x, y [m]
+
+_FINEST = 40  # samples of a curve for each point asked for
+_LEAST = 4000
+
+
+def positive(**sizes: float) -> None:
+    """Refuse sizes that are not greater than 0.
+
+    Raises:
+        ValueError: Names the first such size.
+    """
+    for name, size in sizes.items():
+        if size <= 0.0:
+            raise ValueError(f"'{name}' must be greater than 0.")
+
+
+def along_curve(
+    curve: Callable[[np.ndarray], np.ndarray], count: int, *, closed: bool, centre: Point
+) -> np.ndarray:
+    """Spread points over a smooth curve.
+
+    Args:
+        curve: Positions (n, 2) about the origin for parameters (n,) from 0 to 1 [m].
+        count: How many points.
+        closed: The curve ends where it began: the last point is one distance before the first, which is not
+            repeated. Otherwise the last point is the curve's end.
+        centre: Where the origin goes [m].
+
+    Returns:
+        Points on the curve, shape (count, 2) [m]; distances along it are equal to about 1 part in 1,000.
+
+    Raises:
+        ValueError: Fewer than three points.
+    """
+    parameter = np.linspace(0.0, 1.0, max(_LEAST, _FINEST * count) + 1)
+    walked = _walked(curve(parameter))
+    at = np.interp(_stations(walked[-1], count, closed), walked, parameter)
+    return np.asarray(curve(at) + np.array(centre))
+
+
+def along_corners(corners: np.ndarray, count: int, *, closed: bool, centre: Point) -> np.ndarray:
+    """Spread points over straight lines between corners, shape (n, 2); otherwise as `along_curve`."""
+    if closed:
+        corners = np.concatenate((corners, corners[:1]))
+    walked = _walked(corners)
+    at = _stations(walked[-1], count, closed)
+    points = np.stack([np.interp(at, walked, corners[:, i]) for i in (0, 1)], axis=1)
+    return np.asarray(points + np.array(centre))
+
+
+def on_circle(turns: np.ndarray) -> np.ndarray:
+    """Unit vectors at angles in turns, shape (..., 2)."""
+    return np.stack((np.cos(2.0 * math.pi * turns), np.sin(2.0 * math.pi * turns)), axis=-1)
+
+
+def _walked(points: np.ndarray) -> np.ndarray:
+    """Length of the way to each point, shape (n,)."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def _stations(length: float, count: int, closed: bool) -> np.ndarray:
+    if count < 3:
+        raise ValueError(f"a path needs at least 3 points, found {count}.")
+    return np.linspace(0.0, length, count, endpoint=not closed)
