@@ -3,7 +3,7 @@
 A mass with |a| <= 1 (in its unit) needs, for a change of velocity Δv and of position Δp within h, that the pair
 (Δv, q) lies in a convex set, where q = Δp - h v̄ and v̄ is the mean of first and last velocity: q is the moment of
 the acceleration about the middle of the interval. The set's boundary is made by accelerations along η + λ s (the
-bilinear tangent law: Bryson and Ho, "Applied Optimal Control", §2.7). Along Δv that gives the parabola
+bilinear tangent law: Bryson and Ho, "Applied Optimal Control"). Along Δv that gives the parabola
 4|q| <= h² - |Δv|², and in all directions, with x = |Δv|² / h²,
 
     16 (|q|² - S(x) (Δv × q)² / h²) <= (h² - |Δv|²)²,   S(x) = 1 + (1 - x) (0.35 + 0.262 (1 - x) + 0.209 (1 - x)²).

@@ -1,4 +1,4 @@
-"""Figures of eight and their oval relative; formulas from Lawrence, "A Catalog of Special Plane Curves", ch. 5."""
+"""Figures of eight and their oval relative; formulas from Lawrence, "A Catalog of Special Plane Curves"."""
 
 from __future__ import annotations
 

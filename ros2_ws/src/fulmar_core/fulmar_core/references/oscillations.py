@@ -16,7 +16,7 @@ MOST_TURNS = 100  # of a hypotrochoid before it closes
 
 @dataclass(frozen=True)
 class Lissajous:
-    """x = A sin(m t + φ), y = B sin(n t) (Lawrence, "A Catalog of Special Plane Curves", §6.2)."""
+    """x = A sin(m t + φ), y = B sin(n t) (Lawrence, "A Catalog of Special Plane Curves")."""
 
     kind: Literal["lissajous"]
     half_width: float  # A [m]
@@ -53,7 +53,7 @@ class Lissajous:
 
 @dataclass(frozen=True)
 class Hypotrochoid:
-    """Drawn by a pen on a wheel that rolls inside a ring (Lawrence, "A Catalog of Special Plane Curves", §6.3).
+    """Drawn by a pen on a wheel that rolls inside a ring (Lawrence, "A Catalog of Special Plane Curves").
 
     x = (R - r) cos t + d cos((R - r) t / r), y = (R - r) sin t - d sin((R - r) t / r).
     """
