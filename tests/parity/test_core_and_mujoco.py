@@ -7,97 +7,266 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.controllers.lqr import load_lqr
-from fulmar_core.disturbances.scenario import World, load_scenario
-from fulmar_core.metrics import episode_metrics, successes
-from fulmar_core.robot import load_robot
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.dynamics.rigid_body import Disturbance, MassProperties, step
+from fulmar_core.episode import Episode, draw_episode
+from fulmar_core.goal import goal_at
+from fulmar_core.observation import slewed
+from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.robot import Rolling, load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
-from fulmar_core.state import RigidBodyState, planar_state
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 
-from sim_nodes.mujoco_backend import MujocoBackend
+from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
+from sim_nodes.mujoco_model import BODY, build_model  # noqa: E402
 
-PLANAR = load_robot("floating_platform")
-FREE = replace(PLANAR, body=replace(PLANAR.body, planar=False, inertia=(0.1, 0.2, 0.3)))
-CALM = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-PLANAR_PUSH = ((0.05, -0.03, 0.0), (0.0, 0.0, 0.004))
-SPATIAL_PUSH = ((0.05, -0.03, 0.02), (0.003, -0.002, 0.004))
-STEPS = 100  # 20 s
-
-
-def start_of(robot) -> RigidBodyState:
-    if robot.body.planar:
-        return planar_state(0.3, -0.2, 0.8, vx=0.1, vy=-0.05, yaw_rate=0.2)
-    quat = np.array([0.1, -0.3, 0.2, 0.9])
-    return RigidBodyState(
-        np.array([0.3, -0.2, 0.1]),
-        quat / np.linalg.norm(quat),
-        np.array([0.1, -0.05, 0.02]),
-        np.array([0.2, -0.1, 0.15]),
-    )
+PLATFORM = load_robot("floating_platform")
+FLYER = load_robot("modular_freeflyer")
+BOAT = load_robot("kingfisher")
+POSE, IDEAL = load_task("go_to_pose"), load_scenario("ideal")
+TWO_PI = 2.0 * np.pi
 
 
-@pytest.mark.parametrize(
-    ("robot", "wrench"),
-    [(PLANAR, CALM), (PLANAR, PLANAR_PUSH), (FREE, CALM), (FREE, SPATIAL_PUSH)],
-    ids=["planar", "planar pushed", "six degrees", "six degrees pushed"],
-)
-def test_core_and_mujoco_move_alike_under_the_same_valves(robot, wrench):
-    world = World(5.0, robot.body.inertia, *wrench)
-    core, mujoco = MockBackend(robot), MujocoBackend(robot, sensor_noise=False)
+def world_of(robot, **changes):
+    """The nominal body in a still world, but for some numbers."""
+    world = draw_episode(robot, POSE, IDEAL, seed=0, number=0).world
+    return replace(world, **{name: np.asarray(value) for name, value in changes.items()})
+
+
+def episode_of(robot, *, moving=False, **changes):
+    motion = (0.1, -0.05, 0.2) if moving else (0.0, 0.0, 0.0)
+    start = PlanarState(*(np.asarray(value) for value in (0.3, -0.2, 0.8, *motion)))
+    return Episode(start, goal_at((0.0, 0.0, 0.0)), world_of(robot, **changes))
+
+
+def drive(robot, episode, command_at, seconds):
+    """Paths of the core and of MuJoCo under the same commands, arrays of (x, y, yaw, ahead, left, turn rate)."""
+    backends = MockBackend(robot), MujocoBackend(robot, sensor_noise=False)
+    for backend in backends:
+        backend.reset(episode, seed=0)
+    substeps = robot.timing.substeps(robot.timing.control_hz)
+    dt = substeps * robot.timing.physics_dt
+    command, paths = robot.actuators.safe_command, ([], [])
+    for k in range(round(seconds / dt)):
+        wanted = robot.actuators.limited(np.asarray(command_at(k * dt), dtype=float))
+        command = slewed(wanted, command, robot, dt)
+        for backend, path in zip(backends, paths, strict=True):
+            state = planar_of(backend.step(command, substeps).truth)
+            path.append([state.x, state.y, state.yaw, *state.velocity_in_body, state.yaw_rate])
+    return tuple(np.array(path) for path in paths)
+
+
+def turned(ours, theirs):
+    """Difference of the last headings [rad]."""
+    return abs((theirs[-1, 2] - ours[-1, 2] + np.pi) % TWO_PI - np.pi)
+
+
+PUSH = {"force_x": 0.05, "force_y": -0.03, "torque": 0.004}
+WEAR = {"gain": np.linspace(0.8, 1.0, 8), "alive": np.array([1.0] * 7 + [0.0])}
+
+
+@pytest.mark.parametrize("robot", [PLATFORM, FLYER], ids=lambda robot: robot.name)
+@pytest.mark.parametrize("changes", [{}, {"mass": 5.0} | PUSH, WEAR], ids=["calm", "pushed", "worn"])
+def test_robots_with_thrusters_move_alike_to_rounding(robot, changes):
     rng = np.random.default_rng(6)
-    for backend in (core, mujoco):
-        backend.reset(start_of(robot), world, seed=0)
-    for _ in range(STEPS):
-        command = (rng.uniform(size=8) > 0.7).astype(float)
-        ours, theirs = core.step(command, 10).truth, mujoco.step(command, 10).truth
-    # Same integrator: what remains is rounding, grown over 1,000 physics steps on values of up to some metres.
-    tight = {"rtol": 0.0, "atol": 1e-9}
-    np.testing.assert_allclose(theirs.position_in_world, ours.position_in_world, **tight)
-    np.testing.assert_allclose(theirs.velocity_in_world, ours.velocity_in_world, **tight)
-    np.testing.assert_allclose(theirs.angular_velocity_in_body, ours.angular_velocity_in_body, **tight)
-    alike = abs(float(np.dot(theirs.quat_xyzw, ours.quat_xyzw)))  # q and -q are one attitude
-    assert alike == pytest.approx(1.0, abs=1e-9)
-    assert np.linalg.norm(ours.position_in_world - start_of(robot).position_in_world) > 0.1  # it did move
-
-
-@pytest.mark.parametrize("task", ["go_to_pose", "go_to_position"])
-def test_an_lqr_is_judged_alike_in_the_batch_and_in_mujoco(task):
-    the_task, scenario = load_task(task), load_scenario("nominal")
-    lqr = load_lqr(PLANAR, the_task)
-    batch = roll_out_in_batch(lqr, PLANAR, the_task, scenario, episodes=6, seed=11)
-    mujoco = roll_out_in_backends(lqr, lambda: MujocoBackend(PLANAR), the_task, scenario, episodes=6, seed=11)
-    assert successes(batch, the_task).tolist() == successes(mujoco, the_task).tolist() == [True] * 6
-    times = [episode_metrics(run, the_task)["time_to_target_s"] for run in (batch, mujoco)]
-    # Other noise, so the last corrections differ; the way there takes some fifteen seconds.
-    np.testing.assert_allclose(times[0], times[1], rtol=0, atol=6.0)
-
-
-def test_without_noise_both_fly_the_same_path():
-    task, scenario = load_task("go_to_pose"), load_scenario("ideal")
-    lqr = load_lqr(PLANAR, task)
-    batch = roll_out_in_batch(lqr, PLANAR, task, scenario, episodes=4, seed=11)
-    mujoco = roll_out_in_backends(
-        lqr, lambda: MujocoBackend(PLANAR, sensor_noise=False), task, scenario, episodes=4, seed=11
+    commands = rng.uniform(size=(101, 8))
+    ours, theirs = drive(
+        robot, episode_of(robot, moving=True, **changes), lambda t: commands[round(5 * t)], 20.0
     )
-    # The batch is float32: near the goal a valve may once differ, until then it is rounding.
-    np.testing.assert_allclose(batch.position_error[:, :20], mujoco.position_error[:, :20], rtol=0, atol=1e-3)
+    # Same integrator: what remains is rounding, grown over 1,000 physics steps on values of up to some metres.
+    np.testing.assert_allclose(theirs[:, [0, 1, 3, 4, 5]], ours[:, [0, 1, 3, 4, 5]], rtol=0, atol=1e-8)
+    assert turned(ours, theirs) < 1e-8
+    assert np.hypot(*(ours[-1, :2] - ours[0, :2])) > 0.1  # it did move
+
+
+def test_a_centre_of_mass_beside_the_origin_bends_the_path_alike():
+    def ahead(_t):
+        return [1.0, 0, 0, 0, 0, 0, 0, 1.0]
+
+    ours, theirs = drive(PLATFORM, episode_of(PLATFORM, com_x=0.0, com_y=0.02), ahead, 10.0)
+    straight, _ = drive(PLATFORM, episode_of(PLATFORM), ahead, 10.0)
+    # MuJoCo integrates the motion of the origin, the core that of the centre of mass.
+    np.testing.assert_allclose(theirs[:, :2], ours[:, :2], rtol=0, atol=0.01)
+    assert np.hypot(*(ours[-1, :2] - straight[-1, :2])) > 0.5
+
+
+WAYS_TO_SWIM = {
+    "ahead": lambda t: (0.7, 0.7),
+    "astern": lambda t: (-0.9, -0.9),
+    "circle": lambda t: (0.8, 0.3),
+    "turn on the spot": lambda t: (-0.9, 0.5),
+    "mixed": lambda t: (np.sin(0.4 * t), np.cos(0.7 * t)),
+}
+HEAVY_WATER = replace(
+    BOAT, hydrodynamics=replace(BOAT.hydrodynamics, added_mass=(4.0, 20.0, 25.0, 1.0, 2.0, 3.0))
+)
+
+
+@pytest.mark.parametrize("way", WAYS_TO_SWIM)
+@pytest.mark.parametrize("robot", [BOAT, HEAVY_WATER], ids=["as it is", "with added mass"])
+def test_the_boat_surges_and_turns_alike_within_half_a_per_cent(robot, way):
+    ours, theirs = drive(robot, episode_of(robot), WAYS_TO_SWIM[way], 20.0)
+    length = np.hypot(*np.diff(ours[:, :2], axis=0).T).sum()
+    np.testing.assert_allclose(theirs[:, :2], ours[:, :2], rtol=0, atol=0.005 * max(length, 1.0))
+    np.testing.assert_allclose(
+        theirs[:, 3], ours[:, 3], rtol=0, atol=0.005 * max(0.2, np.abs(ours[:, 3]).max())
+    )
+    np.testing.assert_allclose(
+        theirs[:, 5], ours[:, 5], rtol=0, atol=0.005 * max(0.1, np.abs(ours[:, 5]).max())
+    )
+
+
+WAYS_TO_DRIVE = {  # shares of the largest command
+    "straight": lambda t: (0.6, 0.0),
+    "arc": lambda t: (0.3, 0.3),
+    "back": lambda t: (-0.4, 0.4),
+    "slalom": lambda t: (0.4, 0.4 * np.sin(1.5 * t)),
+    "mixed": lambda t: (0.4 * np.sin(0.8 * t), 0.5 * np.cos(1.3 * t)),
+}
+
+
+@pytest.mark.parametrize("way", WAYS_TO_DRIVE)
+@pytest.mark.parametrize("name", ["turtlebot2", "jetbot", "leatherback"])
+def test_robots_on_wheels_drive_alike_within_a_few_per_cent_of_the_way(name, way):
+    robot = load_robot(name)
+    assert isinstance(robot.actuators, Rolling)
+    share = 0.4 if name == "leatherback" else 1.0  # at 3.6 m/s it would slide
+    scale = robot.actuators.scale * (share, 1.0)
+    ours, theirs = drive(robot, episode_of(robot), lambda t: np.array(WAYS_TO_DRIVE[way](t)) * scale, 5.0)
+    dt = 1.0 / robot.timing.control_hz
+    length, angle = np.abs(ours[:, 3]).sum() * dt, np.abs(ours[:, 5]).sum() * dt
+    # Tyres creep a little under load, and servos take a moment that the core's model does not have.
+    assert np.hypot(*(theirs[-1, :2] - ours[-1, :2])) < 0.01 + 0.02 * length
+    assert np.degrees(turned(ours, theirs)) < 1.0 + 0.015 * np.degrees(angle)
+
+
+def test_a_free_body_tumbles_in_mujoco_as_in_the_core():
+    robot = replace(PLATFORM, body=replace(PLATFORM.body, planar=False, inertia=(0.1, 0.2, 0.3)))
+    model = build_model(robot)
+    data = mujoco.MjData(model)
+    body = model.body(BODY).id
+    model.body_ipos[body] = 0.0
+    quat = np.array([0.1, -0.3, 0.2, 0.9])
+    quat /= np.linalg.norm(quat)
+    state = RigidBodyState(
+        np.array([0.3, -0.2, 0.1]), quat, np.array([0.1, -0.05, 0.02]), np.array([0.2, -0.1, 0.15])
+    )
+    data.qpos[:] = (*state.position_in_world, quat[3], *quat[:3])
+    data.qvel[:] = (*state.velocity_in_world, *state.angular_velocity_in_body)
+    force, torque = np.array([0.05, -0.03, 0.02]), np.array([0.003, -0.002, 0.004])
+    data.xfrc_applied[body] = (*force, *torque)
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        command = (rng.uniform(size=8) > 0.7).astype(float)
+        state = step(
+            state,
+            *robot.actuators.wrench_in_body(command),
+            body=MassProperties(np.array([robot.body.mass]), np.array(robot.body.inertia)),
+            disturbance=Disturbance(force, torque),
+            planar=False,
+            dt=0.02,
+            substeps=10,
+        )
+        data.ctrl[:] = robot.actuators.thrusts(command)
+        mujoco.mj_step(model, data, 10)
+    tight = {"rtol": 0.0, "atol": 1e-8}
+    np.testing.assert_allclose(data.qpos[:3], state.position_in_world, **tight)
+    np.testing.assert_allclose(data.qvel[:3], state.velocity_in_world, **tight)
+    np.testing.assert_allclose(data.qvel[3:], state.angular_velocity_in_body, **tight)
+    x, y, z, w = state.quat_xyzw
+    assert abs(np.dot(data.qpos[3:7], (w, x, y, z))) == pytest.approx(
+        1.0, abs=1e-9
+    )  # q and -q are one attitude
+
+
+class Swaying:
+    """Commands that depend on the episode alone, so that every simulator gets the same ones."""
+
+    def __init__(self, robot):
+        self.robot, self.control_hz = robot, robot.timing.control_hz
+        self.k = 0
+
+    def reset(self):
+        self.k = 0
+
+    def act(self, observation):
+        self.k += 1
+        n = np.arange(len(self.robot.actuators.names))
+        episodes = np.arange(len(observation))[:, None]
+        return np.sin(0.5 * self.k / self.control_hz + 1.3 * n + 0.3 * episodes) * self.robot.actuators.scale
+
+
+EVERY_ROBOT = ["floating_platform", "modular_freeflyer", "kingfisher", "turtlebot2", "jetbot", "leatherback"]
+
+
+@pytest.mark.parametrize("name", EVERY_ROBOT)
+def test_failures_noise_delays_and_pushes_are_the_batch_s_own_in_every_backend(name):
+    """The mock moves as the batch does, so any difference would be one of actuators, pushes or counters."""
+    robot, task = load_robot(name), replace(load_task("go_to_position"), episode_s=12.0)
+    given = {"robot": robot, "task": task, "scenario": load_scenario("randomised"), "episodes": 5, "seed": 3}
+    batch = roll_out_in_batch(Swaying(robot), **given)
+    del given["robot"]
+    mock = roll_out_in_backends(Swaying(robot), lambda: MockBackend(robot), **given)
+    # The batch is float32: rounding, grown over 12 s of spinning.
+    np.testing.assert_allclose(mock.position_error, batch.position_error, rtol=0, atol=2e-3)
+
+
+@pytest.mark.parametrize(("name", "atol"), [("floating_platform", 0.02), ("kingfisher", 0.01)])
+def test_mujoco_floats_under_every_disturbance_as_the_batch_does(name, atol):
+    robot, task = load_robot(name), replace(load_task("go_to_position"), episode_s=8.0)
+    given = {"task": task, "scenario": load_scenario("randomised"), "episodes": 5, "seed": 3}
+    batch = roll_out_in_batch(Swaying(robot), robot, **given)
+    ours = roll_out_in_backends(Swaying(robot), lambda: MujocoBackend(robot), **given)
+    np.testing.assert_allclose(ours.position_error, batch.position_error, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("scenario", ["nominal", "randomised"])
+def test_odometry_errs_in_mujoco_as_in_the_batch_number_by_number(scenario):
+    scenario = load_scenario(scenario)
+    simulation = BatchSimulation(PLATFORM, POSE, scenario, worlds=3, seed=4, dtype=np.float64)
+    backends = [MujocoBackend(PLATFORM) for _ in range(3)]
+    samples = [
+        backend.reset(draw_episode(PLATFORM, POSE, scenario, seed=4, number=i), seed=4, number=i)
+        for i, backend in enumerate(backends)
+    ]
+    for _ in range(20):
+        for i, sample in enumerate(samples):
+            measured = planar_of(sample.odometry)
+            assert measured.x == pytest.approx(simulation.measured.x[i], abs=1e-3)
+            assert measured.vy == pytest.approx(simulation.measured.vy[i], abs=1e-3)
+            assert measured.yaw_rate == pytest.approx(simulation.measured.yaw_rate[i], abs=1e-3)
+        simulation.step(np.zeros((3, 8)))
+        samples = [backend.step(np.zeros(8), 10) for backend in backends]
+
+
+class Reflex(Swaying):
+    """Commands that depend on what is seen alone."""
+
+    def act(self, observation):
+        return (observation[:, : len(self.robot.actuators.names)] > 0.0).astype(float)
 
 
 def test_more_episodes_than_simulators_are_run_in_turns(monkeypatch):
     from fulmar_core import rollout
 
-    task, scenario = replace(load_task("go_to_pose"), episode_s=2.0), load_scenario("nominal")
-    lqr = load_lqr(PLANAR, task)
+    task, scenario = replace(POSE, episode_s=2.0), load_scenario("nominal")
     seen = []
 
     def run(side_by_side):
         monkeypatch.setattr(rollout, "SIDE_BY_SIDE", side_by_side)
         return roll_out_in_backends(
-            lqr, lambda: MujocoBackend(PLANAR), task, scenario, episodes=5, seed=3, progress=seen.append
+            Reflex(PLATFORM),
+            lambda: MujocoBackend(PLATFORM),
+            task,
+            scenario,
+            episodes=5,
+            seed=3,
+            progress=seen.append,
         )
 
     np.testing.assert_array_equal(run(2).position_error, run(5).position_error)
