@@ -88,6 +88,10 @@ train-demo: dev ## Train a policy, export it and judge it in MuJoCo
 	$(BIN)/fulmar evaluate floating_platform go_to_pose --controller policy --policy runs/bundles/go_to_pose \
 		--through mujoco --episodes 256
 
+.PHONY: policies
+policies: dev ## Make the shipped policies that are missing or out of date (under 90 minutes on two cores)
+	$(BIN)/fulmar policies
+
 .PHONY: test
 test: dev ## Run every test
 	@if $(BIN)/python -m pytest $(PYTEST_ARGS); then echo; echo "All tests passed."; \

@@ -47,6 +47,7 @@ def save_checkpoint(path: Path, learner: BaseAlgorithm, more: dict[str, Any]) ->
         "returns": normaliser.returns,
         "worlds": worlds.state(),
         "random": (random.getstate(), np.random.get_state(), torch.get_rng_state()),
+        "first_actions": learner.action_space.np_random.bit_generator.state,
         "more": more,
     }
     new = path.with_suffix(".new")
@@ -90,6 +91,7 @@ def load_checkpoint(
         setattr(learner, name, value)
     if isinstance(learner, OffPolicyAlgorithm):
         learner.replay_buffer = content["replay"]
+    learner.action_space.np_random.bit_generator.state = content["first_actions"]
     python, numpy, pytorch = content["random"]
     random.setstate(python)
     np.random.set_state(numpy)

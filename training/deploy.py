@@ -57,7 +57,8 @@ def deployed_network(
         limit=float(normaliser.clip_obs),
         memory=2 * trained.lstm.hidden_size if trained.lstm else 0,
     )
-    network = DeployedNetwork(plan)
+    with torch.random.fork_rng(devices=[]):  # whoever looks at a learner must not change what it draws next
+        network = DeployedNetwork(plan)
     with torch.no_grad():
         network.mean.copy_(torch.as_tensor(statistics.mean, dtype=torch.float32))
         deviation = np.sqrt(statistics.var + normaliser.epsilon)

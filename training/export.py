@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,7 @@ def export(run: Path, out: Path) -> Passport:
             key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
         }
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
+        | {key: record[key] for key in ("recipe",) if key in record}
         | _verdict(record),
     )
     return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
@@ -86,16 +88,20 @@ def _to_onnx(network: DeployedNetwork) -> bytes:
     example = [torch.zeros(2, network.plan.inputs), *([torch.zeros(2, memory)] if memory else [])]
     worlds = torch.export.Dim("worlds")
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of optional packages that nobody needs
-    program = torch.onnx.export(
-        network,
-        tuple(example),
-        input_names=["observation", *(["memory"] if memory else [])],
-        output_names=["command", "logits", *(["next_memory"] if memory else [])],
-        dynamic_shapes=tuple({0: worlds} for _ in example),
-        opset_version=OPSET,
-        dynamo=True,
-        verbose=False,
-    )
+    with warnings.catch_warnings():
+        warnings.filterwarnings(
+            "ignore", message=".*axis name: worlds will not be used"
+        )  # both inputs share it
+        program = torch.onnx.export(
+            network,
+            tuple(example),
+            input_names=["observation", *(["memory"] if memory else [])],
+            output_names=["command", "logits", *(["next_memory"] if memory else [])],
+            dynamic_shapes=tuple({0: worlds} for _ in example),
+            opset_version=OPSET,
+            dynamo=True,
+            verbose=False,
+        )
     assert program is not None
     model = program.model_proto
     _strip_metadata(model)

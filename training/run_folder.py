@@ -1,6 +1,7 @@
 """What lies in a run folder, and how its record is read.
 
 settings.yaml   how it learns
+start.json      what was asked for: robot, task, seed, limits
 run.json        what was done; written at the end
 network.pt      the best weights, as a robot would run them
 checkpoint.pkl  everything a run needs to go on exactly where it was
@@ -17,6 +18,7 @@ from typing import Any
 from fulmar_core.errors import ConfigError
 
 SETTINGS_FILE = "settings.yaml"
+START_FILE = "start.json"
 RUN_FILE = "run.json"
 NETWORK_FILE = "network.pt"
 CHECKPOINT_FILE = "checkpoint.pkl"
@@ -58,6 +60,25 @@ def read_run_record(run: Path) -> dict[str, Any]:
             f"{path}: lacks '{missing[0]}', so it is not what `fulmar train` left. Train again."
         )
     return dict(record)
+
+
+def read_start(run: Path) -> dict[str, Any]:
+    """What a run was asked for: `robot`, `task`, `seed`, `time_limit_s` and `updates`.
+
+    Raises:
+        ConfigError: If `run` is no run folder.
+    """
+    path = run / START_FILE
+    try:
+        start = dict(json.loads(path.read_text(encoding="utf-8")))
+        return {key: start[key] for key in ("robot", "task", "seed", "time_limit_s", "updates")}
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise ConfigError(f"{run}: no training run to resume ({START_FILE} cannot be read).") from error
+
+
+def write_start(run: Path, start: dict[str, Any]) -> None:
+    """Write what `read_start` reads."""
+    (run / START_FILE).write_text(json.dumps(start, indent=2) + "\n", encoding="utf-8")
 
 
 def write_run_record(run: Path, record: dict[str, Any]) -> None:

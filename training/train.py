@@ -35,6 +35,7 @@ from training.run_folder import (
     SETTINGS_FILE,
     TENSORBOARD_FOLDER,
     write_run_record,
+    write_start,
 )
 from training.session import Limits, RunIsOver, Session, Story
 from training.settings import OffPolicy, TrainingSettings, write_training_settings
@@ -102,6 +103,8 @@ def train(
     else:
         out.mkdir(parents=True, exist_ok=True)
         write_training_settings(settings, out / SETTINGS_FILE)
+        asked = {"robot": robot.name, "task": task.name, "seed": seed}
+        write_start(out, asked | {"time_limit_s": time_limit_s, "updates": updates})
         env = VecNormalize(worlds, norm_reward=False, gamma=settings.algorithm.gamma)
         learner = build_learner(settings.algorithm, env, seed=seed)
     _log_to(learner, out / TENSORBOARD_FOLDER, curves)
@@ -117,7 +120,10 @@ def train(
             checkpoint=out / CHECKPOINT_FILE,
             asked_to_stop=interrupt.is_set,
         )
-        interrupted = _learn(learner, session, settings) or interrupt.is_set()
+        try:
+            interrupted = _learn(learner, session, settings) or interrupt.is_set()
+        finally:
+            learner.logger.close()
     assert story.best is not None
     best, network = story.best
     save_network(network, out / NETWORK_FILE)

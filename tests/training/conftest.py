@@ -82,8 +82,8 @@ def learner(robot, task, small_settings):
 @pytest.fixture(scope="session")
 def bundle(run, learner, tmp_path_factory):
     """Bundle of the learner's network, exported from a run folder."""
-    from training.export import export
     from training.deploy import deployed_network
+    from training.export import export
     from training.network import save_network
 
     folder = shutil.copytree(run[0], tmp_path_factory.mktemp("exported") / "run")

@@ -151,7 +151,7 @@ def test_weights_that_are_none_are_refused(run_copy, tmp_path):
 def test_a_network_for_another_number_of_terms_is_refused(run_copy, tmp_path):
     record = json.loads((run_copy / RUN_FILE).read_text())
     (run_copy / RUN_FILE).write_text(json.dumps(record | {"task": "go_to_position"}))
-    with pytest.raises(ConfigError, match="the network takes 10 terms, .* now have 8"):
+    with pytest.raises(ConfigError, match=r"the network takes 10 terms, .* now have 8"):
         export(run_copy, tmp_path / "out")
 
 

@@ -1,0 +1,87 @@
+"""`fulmar policies`: make the policies that come with Fulmar."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.console import console, output, print_json
+from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.exit_codes import FAILED
+
+
+def policies(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Bundles such as kingfisher_go_to_pose; all."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the bundles; the shipped ones by default.")
+    ] = None,
+    runs: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run folders.")] = Path(
+        "runs/policies"
+    ),
+    as_json: JsonOption = False,
+) -> None:
+    """Make the shipped policies of configs/policies.yaml: train, judge in MuJoCo, export.
+
+    A bundle that was made from the same robot, task, scenario, settings, seed and time is left as it is; a run that
+    was broken off is resumed. So the command can be repeated until everything is there.
+
+    Try:
+
+    fulmar policies
+
+    fulmar policies kingfisher_go_to_pose
+    """
+    from fulmar_bringup.provenance import git_revision
+    from policy_server.shipped import policies_directory
+    from training.executors import LocalExecutor
+    from training.job_bars import JobBars
+    from training.policies import is_made, load_policy_table, make_policies, policy_job
+
+    table = load_policy_table()
+    known = [policy.name for policy in table.policies]
+    for name in names or []:
+        if name not in known:
+            raise ConfigError(f"configs/policies.yaml has no policy '{name}'.{did_you_mean(name, known)}")
+    jobs = [
+        policy_job(
+            policy,
+            episodes=table.episodes,
+            runs=runs,
+            bundles=out or policies_directory(),
+            command="fulmar " + " ".join(sys.argv[1:]),
+            git_revision=git_revision(),
+        )
+        for policy in table.policies
+        if not names or policy.name in names
+    ]
+    missing = [job for job in jobs if not is_made(job)]
+    left = sum(job.time_limit_s or job.settings.time_limit_s for job in missing) / table.at_once
+    console.print(
+        f"{len(missing)} of {len(jobs)} policies to make, about {left / 60.0:.0f} minutes and the judging"
+    )
+    with JobBars(missing) as bars:
+        lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
+    if as_json:
+        print_json({"policies": lines})
+    else:
+        _print_lines(lines)
+    if not all(line["good"] for line in lines):
+        raise typer.Exit(FAILED)
+
+
+def _print_lines(lines: list[dict[str, Any]]) -> None:
+    width = max(len(line["policy"]) for line in lines)
+    output.print(f"{'policy':<{width}}  success  needed", markup=False)
+    for line in lines:
+        success = "   -   " if line["success"] is None else f"{line['success']:7.3f}"
+        note = "" if line["good"] else f"  {line.get('error', 'too low')}"
+        output.print(
+            f"{line['policy']:<{width}}  {success}  {line['needed']:6.2f}{note}", markup=False, soft_wrap=True
+        )

@@ -1,0 +1,149 @@
+"""Several runs at once: each in a process of its own, one that fails stops no other, the best is named."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fulmar_core.episode import JUDGE_SEED
+from training.campaign import CAMPAIGN_FILE, run_campaign, summarised
+from training.executors import LocalExecutor
+from training.jobs import Job, Outcome, run_job
+from training.run_folder import read_run_record
+
+
+@pytest.fixture
+def job(small_settings, tmp_path):
+    """A run of two small updates."""
+    return Job("one", "floating_platform", "go_to_pose", 1, small_settings, tmp_path / "one", updates=2)
+
+
+def with_seed(job, seed):
+    return replace(job, name=f"seed {seed}", seed=seed, out=job.out.parent / str(seed))
+
+
+class Quiet:
+    def begin(self): ...
+
+    def advance(self, share, elapsed_s, steps): ...
+
+    def verdict(self, elapsed_s, success): ...
+
+    def end(self): ...
+
+
+@pytest.mark.slow
+def test_a_campaign_runs_every_seed_reports_the_one_that_fails_and_names_the_best(job, tmp_path):
+    watched = []
+    jobs = [with_seed(job, seed) for seed in (1, JUDGE_SEED, 2)]
+    told = run_campaign(jobs, LocalExecutor(2), tmp_path, lambda *args: watched.append(args))
+    assert json.loads((tmp_path / CAMPAIGN_FILE).read_text()) == told
+    assert [line["seed"] for line in told["seeds"]] == [1, JUDGE_SEED, 2]
+    assert told["failed"] == 1
+    assert "are kept for judging" in told["seeds"][1]["error"]
+    assert told["best_seed"] in (1, 2)
+    assert read_run_record(Path(told["best_run"]))["updates"] == 2
+    states = {number: state for number, state, _ in watched}
+    assert states == {0: "done", 1: "failed", 2: "done"}
+
+
+@pytest.mark.slow
+def test_a_process_whose_parent_dies_finishes_its_run(job):
+    waits = """
+import pickle, subprocess, sys, time
+from training.executors import _start
+process = _start(pickle.load(sys.stdin.buffer))
+print(process.pid, flush=True)
+time.sleep(600)
+"""
+    long = replace(job, updates=10**9)
+    import pickle
+
+    parent = subprocess.Popen([sys.executable, "-c", waits], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    pickle.dump(long, parent.stdin)
+    parent.stdin.flush()
+    deadline = time.monotonic() + 60.0
+    while not (long.out / "progress.json").is_file() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    parent.kill()
+    parent.wait()
+    while not (long.out / "run.json").is_file() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert read_run_record(long.out)["interrupted"] is True
+
+
+def test_a_job_that_was_done_is_not_done_again(job):
+    first = run_job(job, Quiet())
+    stamp = (job.out / "network.pt").stat().st_mtime_ns
+    assert run_job(job, Quiet()) == first
+    assert (job.out / "network.pt").stat().st_mtime_ns == stamp
+
+
+def test_a_job_goes_on_where_it_was_interrupted_then_judges_and_exports(job, tmp_path):
+    run_job(job, Quiet())
+    record = read_run_record(job.out)
+    (job.out / "run.json").write_text(json.dumps(record | {"interrupted": True}))
+    more = replace(job, updates=3, episodes=2, bundle=tmp_path / "bundle", recipe="abc")
+    done = run_job(more, Quiet())
+    assert done["updates"] == 3
+    assert done["mujoco"]["episodes"] == 2
+    assert json.loads((tmp_path / "bundle" / "passport.json").read_text())["training"]["recipe"] == "abc"
+
+
+def outcome(job, seed, *, held_out, mujoco=None, score=0.0):
+    record = {"best": {"success_rate": held_out, "score": score}, "steps": 1, "wall_s": 1.0}
+    if mujoco is not None:
+        record["mujoco"] = {"success_rate": mujoco}
+    return Outcome(with_seed(job, seed), record)
+
+
+def test_the_best_run_is_the_one_that_does_best_in_mujoco_then_by_score(job):
+    told = summarised(
+        [
+            outcome(job, 1, held_out=1.0, mujoco=0.9, score=2.0),
+            outcome(job, 2, held_out=0.9, mujoco=1.0, score=1.0),
+            outcome(job, 3, held_out=0.9, mujoco=1.0, score=1.5),
+            Outcome(with_seed(job, 4), None, "broke"),
+        ]
+    )
+    assert (told["best_seed"], told["failed"]) == (3, 1)
+    assert told["success_mean"] == pytest.approx(2.9 / 3.0)
+    assert told["seeds"][3] == {"seed": 4, "run": str(with_seed(job, 4).out), "error": "broke"}
+
+
+def test_a_campaign_of_failures_has_no_best(job):
+    told = summarised([Outcome(job, None, "broke")])
+    assert (told["best_seed"], told["success_mean"], told["success_std"]) == (None, None, None)
+
+
+@pytest.mark.slow
+def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path):
+    pytest.importorskip("ray", reason="the extra 'cluster' is not installed")
+    import ray
+    from ray.cluster_utils import Cluster
+
+    from training.ray_executor import RayExecutor
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    try:
+        cluster.add_node(num_cpus=1)
+        executor = RayExecutor(cluster.address)
+        assert sum(node["Alive"] for node in ray.nodes()) == 2
+        watched = []
+        jobs = [with_seed(job, seed) for seed in (1, 2, JUDGE_SEED)]
+        told = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
+        assert told["failed"] == 1
+        assert "are kept for judging" in told["seeds"][2]["error"]
+        assert told["best_seed"] in (1, 2)
+        for one in jobs[:2]:
+            assert read_run_record(one.out)["updates"] == 2
+        assert {number: state for number, state, _ in watched} == {0: "done", 1: "done", 2: "failed"}
+    finally:
+        ray.shutdown()
+        cluster.shutdown()

@@ -1,0 +1,148 @@
+"""The table of shipped policies: complete, and only what has to be made again is made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fulmar_core.policy_bundle import read_passport
+from policy_server.policy import Policy
+from training import policies
+from training.jobs import Job, Outcome, run_job
+from training.policies import (
+    PolicyTable,
+    ShippedPolicy,
+    is_made,
+    load_policy_table,
+    make_policies,
+    policy_job,
+    recipe,
+)
+from training.settings import load_training_settings
+
+FIVE = (
+    "go_to_position",
+    "go_to_pose",
+    "track_velocities",
+    "go_through_positions",
+    "go_to_position_with_obstacles",
+)
+ONE = ShippedPolicy("floating_platform", "go_to_pose", seed=3, time_limit_s=1.0, success=0.9)
+
+
+def test_the_table_names_every_policy_that_shall_ship():
+    names = {policy.name for policy in load_policy_table().policies}
+    wanted = {
+        f"{robot}_{task}" for robot in ("floating_platform", "kingfisher", "turtlebot2") for task in FIVE
+    }
+    wanted |= {f"{robot}_go_to_position" for robot in ("modular_freeflyer", "jetbot", "leatherback")}
+    assert names == wanted
+
+
+def test_making_all_of_them_takes_under_ninety_minutes():
+    table = load_policy_table()
+    judging_s = 60.0
+    total_s = sum(policy.time_limit_s + judging_s for policy in table.policies) / table.at_once
+    assert total_s < 90.0 * 60.0
+    assert max(policy.time_limit_s for policy in table.policies) <= 300.0
+
+
+def test_two_lines_for_one_bundle_are_refused():
+    with pytest.raises(ValueError, match="two lines"):
+        PolicyTable(2, 256, (ONE, replace(ONE, seed=4)))
+
+
+@pytest.fixture
+def settings(robot, task):
+    return load_training_settings(robot, task)
+
+
+@pytest.mark.parametrize("change", [{"seed": 4}, {"time_limit_s": 2.0}, {"task": "go_to_position"}])
+def test_a_policy_of_another_seed_time_or_task_is_made_from_something_else(settings, change):
+    assert recipe(replace(ONE, **change), settings) != recipe(ONE, settings)
+
+
+def test_other_settings_or_another_robot_make_another_policy_but_a_higher_demand_does_not(
+    settings, robot, monkeypatch
+):
+    first = recipe(ONE, settings)
+    assert recipe(ONE, replace(settings, worlds=1024)) != first
+    assert recipe(replace(ONE, success=1.0), settings) == first
+    heavier = replace(robot, body=replace(robot.body, mass=9.0))
+    monkeypatch.setattr(policies, "load_robot", lambda _: heavier)
+    assert recipe(ONE, settings) != first
+
+
+class Here:
+    """Runs jobs in this process, and counts them."""
+
+    def __init__(self):
+        self.names = []
+
+    def run(self, jobs, watch):
+        self.names += [job.name for job in jobs]
+        return [Outcome(job, run_job(job)) for job in jobs]
+
+
+@pytest.fixture
+def small_job(small_settings, tmp_path) -> Job:
+    made_from = recipe(ONE, small_settings)
+    return Job(
+        ONE.name,
+        ONE.robot,
+        ONE.task,
+        ONE.seed,
+        small_settings,
+        tmp_path / "run",
+        updates=2,
+        episodes=2,
+        bundle=tmp_path / ONE.name,
+        recipe=made_from,
+    )
+
+
+def test_a_policy_is_made_once_and_again_only_when_it_is_made_from_something_else(
+    small_job, robot, task, tmp_path
+):
+    table, executor = PolicyTable(2, 2, (ONE,)), Here()
+    assert not is_made(small_job)
+    (first,) = make_policies(table, [small_job], executor, lambda *_: None)
+    assert (first["made"], first["needed"]) == (True, 0.9)
+    assert first["good"] == (first["success"] >= 0.9)
+    Policy(small_job.bundle, robot, task)
+    assert read_passport(small_job.bundle).training["recipe"] == small_job.recipe
+    (second,) = make_policies(table, [small_job], executor, lambda *_: None)
+    assert second == first | {"made": False}
+    changed = replace(small_job, recipe="other", out=tmp_path / "other")
+    (third,) = make_policies(table, [changed], executor, lambda *_: None)
+    assert third["made"] is True
+    assert executor.names == [ONE.name] * 2
+
+
+def test_a_damaged_bundle_is_made_again(small_job):
+    make_policies(PolicyTable(1, 2, (ONE,)), [small_job], Here(), lambda *_: None)
+    (small_job.bundle / "policy.onnx").write_bytes(b"")
+    assert not is_made(small_job)
+
+
+def test_a_policy_that_could_not_be_made_is_reported(small_job):
+    class Broken:
+        def run(self, jobs, watch):
+            return [Outcome(job, None, "no memory left") for job in jobs]
+
+    (line,) = make_policies(PolicyTable(1, 2, (ONE,)), [small_job], Broken(), lambda *_: None)
+    assert (line["good"], line["error"]) == (False, "no memory left")
+
+
+def test_a_policy_s_run_has_a_folder_of_its_own_for_everything_it_is_made_from(tmp_path, settings):
+    job = policy_job(
+        ONE,
+        episodes=256,
+        runs=tmp_path,
+        bundles=tmp_path / "bundles",
+        command="fulmar policies",
+        git_revision="a",
+    )
+    assert job.out.name == f"floating_platform_go_to_pose_{recipe(ONE, settings)[:8]}"
+    assert (job.bundle, job.episodes, job.time_limit_s) == (tmp_path / "bundles" / ONE.name, 256, 1.0)

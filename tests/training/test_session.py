@@ -1,0 +1,161 @@
+"""A run between two updates: it resumes exactly, stops when it should, and leaves a finished folder."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from training.checkpoint import load_checkpoint
+from training.run_folder import CHECKPOINT_FILE, SETTINGS_FILE, TENSORBOARD_FOLDER, read_run_record
+from training.settings import Curriculum, StopAtSuccess, load_training_settings
+from training.train import train
+from training.vec_env import BatchVecEnv
+
+TURTLEBOT, TASK = load_robot("turtlebot2"), load_task("go_to_pose")
+
+
+def small(name):
+    """Settings of an algorithm, cut to what takes a moment."""
+    settings = load_training_settings(TURTLEBOT, TASK, name)
+    algorithm = settings.algorithm
+    if hasattr(algorithm, "epochs"):
+        algorithm = replace(algorithm, steps=8, minibatch=64, epochs=2, hidden=(8,))
+    else:
+        algorithm = replace(
+            algorithm, buffer=2000, minibatch=32, first_steps=64, gradient_steps=2, hidden=(8,)
+        )
+    if hasattr(algorithm, "memory"):
+        algorithm = replace(algorithm, memory=4)
+    curriculum = Curriculum(0.0, 0.5)
+    return replace(settings, algorithm=algorithm, worlds=16, evaluate_every_s=1e6, curriculum=curriculum)
+
+
+def weights(folder, settings):
+    """Every number of the learner that a run has left."""
+    worlds = BatchVecEnv(TURTLEBOT, TASK, _scenario(settings), worlds=settings.worlds, seed=1)
+    learner, _ = load_checkpoint(folder / CHECKPOINT_FILE, settings.algorithm, worlds)
+    return learner.policy.state_dict(), learner.get_vec_normalize_env().obs_rms
+
+
+def _scenario(settings):
+    from fulmar_core.disturbances.scenario import load_scenario
+
+    return load_scenario(settings.scenario)
+
+
+@pytest.fixture
+def quick_judge(monkeypatch):
+    """Judge without episodes; the success rates come from this list, the last one again and again."""
+    rates = [0.5]
+
+    def judge_of(*_):
+        left = iter(rates)
+        last = [rates[0]]
+
+        def judge(network):
+            last[0] = next(left, last[0])
+            return last[0], last[0]
+
+        return judge
+
+    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    return rates
+
+
+@pytest.mark.parametrize("name", ["differential_drive", "recurrent_ppo", "sac", "td3"])
+def test_a_resumed_run_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_path, quick_judge, name):
+    settings = small(name)
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    train(TURTLEBOT, TASK, settings, seed=1, out=whole, updates=6)
+    # The first part has the curriculum of the whole run, and ends in the middle of it.
+    first = replace(settings, curriculum=Curriculum(0.0, 1.0))
+    train(TURTLEBOT, TASK, first, seed=1, out=parts, updates=3)
+    torch.manual_seed(99)
+    np.random.seed(99)
+    record = train(TURTLEBOT, TASK, settings, seed=1, out=parts, updates=6, resume=True)
+    assert record["updates"] == 6
+    (expected, statistics), (found, others) = weights(whole, settings), weights(parts, settings)
+    for key, value in expected.items():
+        assert torch.equal(value, found[key]), key
+    np.testing.assert_array_equal(statistics.mean, others.mean)
+    assert statistics.count == others.count
+
+
+def test_another_seed_gives_other_weights(tmp_path, quick_judge):
+    settings = small("differential_drive")
+    for seed in (1, 2):
+        train(TURTLEBOT, TASK, settings, seed=seed, out=tmp_path / str(seed), updates=2)
+    one, other = (weights(tmp_path / str(seed), settings)[0] for seed in (1, 2))
+    assert not all(torch.equal(one[key], other[key]) for key in one)
+
+
+def test_a_number_of_updates_is_kept(tmp_path, quick_judge):
+    record = train(TURTLEBOT, TASK, small("differential_drive"), seed=1, out=tmp_path, updates=3)
+    assert record["updates"] == 3
+    assert record["steps"] == 3 * 8 * 16
+
+
+def test_a_run_stops_early_once_several_checks_in_a_row_are_good_enough(tmp_path, quick_judge):
+    quick_judge[:] = [0.995, 0.9, 1.0, 0.996, 1.0]
+    settings = replace(
+        small("differential_drive"), evaluate_every_s=1e-6, stop_at_success=StopAtSuccess(0.995, checks=2)
+    )
+    record = train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=50)
+    assert [check["success_rate"] for check in record["curve"]] == [0.995, 0.9, 1.0, 0.996]
+    assert record["interrupted"] is False
+
+
+def test_ctrl_c_leaves_a_finished_run_that_can_be_resumed(tmp_path, quick_judge):
+    class Impatient:
+        """A person who presses Ctrl-C after the second update."""
+
+        def begin(self): ...
+
+        def advance(self, share, elapsed_s, steps):
+            if steps == 2 * 8 * 16:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        def verdict(self, elapsed_s, success): ...
+
+        def end(self): ...
+
+    settings, before = small("differential_drive"), signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=50, watcher=Impatient())
+    assert signal.getsignal(signal.SIGINT) is before
+    record = read_run_record(tmp_path)
+    assert record["interrupted"] is True
+    assert record["updates"] == 2
+    again = train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=4, resume=True)
+    assert (again["updates"], again["interrupted"]) == (4, False)
+
+
+def test_the_curriculum_reaches_the_worlds(tmp_path, quick_judge, monkeypatch):
+    told = []
+    monkeypatch.setattr(BatchVecEnv, "set_strength", lambda self, strength: told.append(strength))
+    train(TURTLEBOT, TASK, small("differential_drive"), seed=1, out=tmp_path, updates=4)
+    assert told == pytest.approx([0.0, 0.5, 1.0, 1.0, 1.0])
+
+
+def test_a_run_folder_holds_settings_curves_and_a_checkpoint(tmp_path, quick_judge):
+    settings = small("differential_drive")
+    train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=2)
+    assert load_training_settings(TURTLEBOT, TASK, str(tmp_path / SETTINGS_FILE)) == settings
+    assert list((tmp_path / TENSORBOARD_FOLDER).glob("events*"))
+    assert (tmp_path / CHECKPOINT_FILE).is_file()
+
+
+@pytest.mark.parametrize("content", [None, b"nothing of ours"])
+def test_there_must_be_a_checkpoint_to_resume_from(tmp_path, content):
+    if content is not None:
+        (tmp_path / CHECKPOINT_FILE).write_bytes(content)
+    with pytest.raises(ConfigError, match="checkpoint"):
+        train(TURTLEBOT, TASK, small("differential_drive"), seed=1, out=tmp_path, updates=2, resume=True)

@@ -1,0 +1,104 @@
+"""Every pair of robot and task has settings; mistakes in them are told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.paths import config_names
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from training.settings import (
+    Curriculum,
+    StopAtSuccess,
+    load_training_settings,
+    write_training_settings,
+)
+
+PLATFORM, TURTLEBOT = load_robot("floating_platform"), load_robot("turtlebot2")
+TASK = load_task("go_to_pose")
+
+
+@pytest.mark.parametrize("robot", config_names("robots"))
+def test_every_robot_has_settings_for_any_task(robot):
+    assert load_training_settings(load_robot(robot), TASK).algorithm.kind == "ppo"
+
+
+def test_a_robot_learns_as_its_family_does():
+    assert load_training_settings(TURTLEBOT, TASK) == load_training_settings(
+        TURTLEBOT, TASK, "differential_drive"
+    )
+
+
+def test_a_file_of_the_pair_s_own_name_replaces_the_family_s(monkeypatch, tmp_path):
+    own = replace(load_training_settings(TURTLEBOT, TASK), worlds=1024)
+    write_training_settings(own, tmp_path / "turtlebot2_go_to_pose.yaml")
+    monkeypatch.setattr("training.settings.config_names", lambda _: ["turtlebot2_go_to_pose"])
+    monkeypatch.setattr("training.settings.config_path", lambda family, name: tmp_path / f"{name}.yaml")
+    assert load_training_settings(TURTLEBOT, TASK) == own
+
+
+@pytest.mark.parametrize("name", ["thrusters", "recurrent_ppo", "sac", "td3"])
+def test_what_is_written_is_what_is_read(tmp_path, name):
+    settings = load_training_settings(TURTLEBOT, TASK, name)
+    settings = replace(settings, curriculum=Curriculum(0.2, 0.5), stop_at_success=StopAtSuccess(0.995))
+    write_training_settings(settings, tmp_path / "settings.yaml")
+    assert load_training_settings(TURTLEBOT, TASK, str(tmp_path / "settings.yaml")) == settings
+
+
+@pytest.mark.parametrize("name", ["sac", "td3"])
+def test_algorithms_for_continuous_actions_are_refused_for_valves_that_only_open_and_close(name):
+    assert load_training_settings(TURTLEBOT, TASK, name).algorithm.kind == name
+    with pytest.raises(
+        ConfigError, match=f"{name} needs actuators that move by degrees, those of 'floating_pl"
+    ):
+        load_training_settings(PLATFORM, TASK, name)
+
+
+def test_unknown_settings_are_refused():
+    with pytest.raises(UnknownNameError, match="recurrent_ppo"):
+        load_training_settings(PLATFORM, TASK, "recurrent_ppa")
+
+
+def test_an_unknown_algorithm_names_the_line(tmp_path):
+    (tmp_path / "wrong.yaml").write_text("scenario: nominal\nalgorithm:\n  kind: pppo\n")
+    with pytest.raises(ConfigError, match=r"wrong\.yaml:3: 'kind' = 'pppo' is not known"):
+        load_training_settings(PLATFORM, TASK, str(tmp_path / "wrong.yaml"))
+
+
+@pytest.mark.parametrize(("progress", "strength"), [(0.0, 0.2), (0.25, 0.6), (0.5, 1.0), (0.9, 1.0)])
+def test_a_curriculum_grows_until_the_scenario_is_whole(progress, strength):
+    assert Curriculum(0.2, 0.5).strength(progress) == pytest.approx(strength)
+
+
+def test_without_a_curriculum_the_scenario_is_whole_from_the_start():
+    settings = load_training_settings(PLATFORM, TASK)
+    assert settings.curriculum is None
+    assert settings.strength(0.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"worlds": 100}, "3200 must be a multiple of 'minibatch'"),
+        ({"threads": 0}, "'worlds' and 'threads' must be at least 1"),
+        ({"time_limit_s": 0.0}, "'time_limit_s' greater than 0"),
+    ],
+)
+def test_settings_that_cannot_work_are_refused(change, words):
+    with pytest.raises(ValueError, match=words):
+        replace(load_training_settings(PLATFORM, TASK), **change)
+
+
+@pytest.mark.parametrize("values", [(-0.1, 0.5), (0.5, 0.0), (0.5, 1.5)])
+def test_a_curriculum_of_impossible_shares_is_refused(values):
+    with pytest.raises(ValueError, match="must lie in"):
+        Curriculum(*values)
+
+
+@pytest.mark.parametrize("values", [(0.0, 2), (1.1, 2), (0.9, 0)])
+def test_a_stop_that_would_come_always_or_never_is_refused(values):
+    with pytest.raises(ValueError, match="must lie in"):
+        StopAtSuccess(*values)

@@ -1,0 +1,72 @@
+"""Several seeds of one training: how much of a result is luck, and which run to keep."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from training.executors import Executor, Watch
+from training.jobs import Job, Outcome
+
+CAMPAIGN_FILE = "campaign.json"
+
+
+def run_campaign(jobs: Sequence[Job], executor: Executor, out: Path, watch: Watch) -> dict[str, Any]:
+    """Run one job for each seed, and write what came out.
+
+    Args:
+        jobs: Jobs that differ in nothing but seed and folder.
+        executor: Who runs them.
+        out: Folder of the campaign.
+        watch: Told how they go on.
+
+    Returns:
+        What `campaign.json` says: each seed's success, their mean and spread, and the best run.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    told = summarised(executor.run(jobs, watch))
+    (out / CAMPAIGN_FILE).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    return told
+
+
+def summarised(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """One line for each seed, statistics over those that did not fail, and the best run."""
+    lines = [_line(outcome) for outcome in outcomes]
+    values = [outcome.success for outcome in outcomes if outcome.record is not None]
+    best = max((o for o in outcomes if o.record is not None), key=_rank, default=None)
+    mean = sum(values) / len(values) if values else None
+    return {
+        "robot": outcomes[0].job.robot,
+        "task": outcomes[0].job.task,
+        "seeds": lines,
+        "failed": sum(outcome.record is None for outcome in outcomes),
+        "success_mean": mean,
+        "success_std": math.sqrt(sum((v - mean) ** 2 for v in values) / len(values))
+        if mean is not None
+        else None,
+        "best_seed": best.job.seed if best else None,
+        "best_run": str(best.job.out) if best else None,
+    }
+
+
+def _line(outcome: Outcome) -> dict[str, Any]:
+    record = outcome.record
+    if record is None:
+        return {"seed": outcome.job.seed, "run": str(outcome.job.out), "error": outcome.error}
+    return {
+        "seed": outcome.job.seed,
+        "run": str(outcome.job.out),
+        "success_held_out": record["best"]["success_rate"],
+        "success_mujoco": record["mujoco"]["success_rate"] if "mujoco" in record else None,
+        "score": record["best"]["score"],
+        "steps": record["steps"],
+        "wall_s": record["wall_s"],
+    }
+
+
+def _rank(outcome: Outcome) -> tuple[float, float]:
+    assert outcome.record is not None
+    return outcome.success, outcome.record["best"]["score"]

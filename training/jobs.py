@@ -1,0 +1,134 @@
+"""One training run as a unit of work: learn, judge in MuJoCo, export."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from stable_baselines3.common.logger import KVWriter
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from training.progress import ProgressFile, Watcher
+from training.run_folder import CHECKPOINT_FILE, PROGRESS_FILE, read_run_record, write_run_record
+from training.settings import TrainingSettings
+from training.train import train
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to learn, and what to do with it."""
+
+    name: str  # for tables
+    robot: str
+    task: str
+    seed: int
+    settings: TrainingSettings
+    out: Path  # run folder; an unfinished run in it is resumed
+    time_limit_s: float | None = None  # the settings' by default [s]
+    updates: int | None = None
+    episodes: int = 0  # of the judgement in MuJoCo; 0: none
+    bundle: Path | None = None  # folder to export to
+    wandb: str = ""  # project on Weights & Biases that curves go to; empty: none
+    recipe: str = ""  # hash of what it is made from, for the record
+    command: str = ""
+    git_revision: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a job ended."""
+
+    job: Job
+    record: dict[str, Any] | None  # None if it failed
+    error: str = ""
+
+    @property
+    def success(self) -> float:
+        """Success rate in MuJoCo if it was judged there, else of the best check; -1 if it failed."""
+        if self.record is None:
+            return -1.0
+        judged = self.record.get("mujoco")
+        return float(judged["success_rate"] if judged else self.record["best"]["success_rate"])
+
+
+def run_job(job: Job, watcher: Watcher | None = None) -> dict[str, Any]:
+    """Do everything a job asks for that has not been done yet.
+
+    Args:
+        job: The job.
+        watcher: Whom to tell; `progress.json` in its folder by default.
+
+    Returns:
+        The run's record.
+    """
+    record = _finished(job) or learn(job, watcher or ProgressFile(job.out / PROGRESS_FILE))
+    if job.episodes and record.get("mujoco", {}).get("episodes") != job.episodes:
+        from training.judge import judge_in_mujoco
+
+        judge_in_mujoco(job.out, episodes=job.episodes)
+    if job.bundle is not None:
+        from training.export import export
+
+        export(job.out, job.bundle)
+    return read_run_record(job.out)
+
+
+def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
+    """Only the learning; goes on where its folder has a checkpoint.
+
+    Args:
+        job: The job.
+        watcher: Whom to tell.
+
+    Returns:
+        The run's record.
+    """
+    job.out.mkdir(parents=True, exist_ok=True)
+    train(
+        load_robot(job.robot),
+        load_task(job.task),
+        job.settings,
+        seed=job.seed,
+        out=job.out,
+        time_limit_s=job.time_limit_s,
+        updates=job.updates,
+        resume=(job.out / CHECKPOINT_FILE).is_file(),
+        command=job.command,
+        git_revision=job.git_revision,
+        watcher=watcher,
+        curves=_curves(job),
+    )
+    record = read_run_record(job.out)
+    if job.recipe:
+        record["recipe"] = job.recipe
+        write_run_record(job.out, record)
+    return record
+
+
+def _curves(job: Job) -> KVWriter | None:
+    if not job.wandb:
+        return None
+    from training.wandb_curves import WandbCurves
+
+    return WandbCurves(job.out, project=job.wandb, name=job.name, settings=asdict(job.settings))
+
+
+def _finished(job: Job) -> dict[str, Any] | None:
+    """The record of a run that needs no more learning; None if there is none."""
+    try:
+        record = read_run_record(job.out)
+    except ConfigError:
+        return None
+    return None if record.get("interrupted") else record
+
+
+def read_progress(job: Job) -> dict[str, Any]:
+    """How far a job is: `share`, `steps`, `rate` and `success`; empty before it begins."""
+    try:
+        return dict(json.loads((job.out / PROGRESS_FILE).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return {}

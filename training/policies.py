@@ -1,0 +1,152 @@
+"""The shipped policies: which there are, what each is made from, and which have to be made again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fulmar_core.config import load_config
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import BundleError
+from fulmar_core.paths import config_directory
+from fulmar_core.policy_bundle import FORMAT, read_passport
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from training.executors import Executor, Watch
+from training.jobs import Job, Outcome
+from training.settings import TrainingSettings, load_training_settings
+
+
+@dataclass(frozen=True)
+class ShippedPolicy:
+    """One line of the table."""
+
+    robot: str
+    task: str
+    seed: int
+    time_limit_s: float  # wall-clock of its training [s]
+    success: float  # what it has to reach in MuJoCo [-]
+
+    @property
+    def name(self) -> str:
+        """Name of its bundle."""
+        return f"{self.robot}_{self.task}"
+
+
+@dataclass(frozen=True)
+class PolicyTable:
+    """What `configs/policies.yaml` says."""
+
+    at_once: int  # runs side by side
+    episodes: int  # of the judgement in MuJoCo
+    policies: tuple[ShippedPolicy, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse two lines for one bundle."""
+        names = [policy.name for policy in self.policies]
+        if len(set(names)) != len(names):
+            raise ValueError("'policies' has two lines for one robot and task.")
+        if min(self.at_once, self.episodes) < 1:
+            raise ValueError("'at_once' and 'episodes' must be at least 1.")
+
+
+def load_policy_table() -> PolicyTable:
+    """Read `configs/policies.yaml`.
+
+    Raises:
+        ConfigError: A mistake in the file.
+    """
+    return load_config(PolicyTable, config_directory() / "policies.yaml")
+
+
+def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
+    """Hash of everything a policy is made from: robot, task, scenario, settings, seed and time."""
+    ingredients = {
+        "robot": asdict(load_robot(policy.robot)),
+        "task": asdict(load_task(policy.task)),
+        "scenario": asdict(load_scenario(settings.scenario)),
+        "settings": asdict(settings),
+        "policy": asdict(policy) | {"success": None},
+        "format": FORMAT,
+    }
+    return hashlib.sha256(json.dumps(ingredients, sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+def policy_job(
+    policy: ShippedPolicy, *, episodes: int, runs: Path, bundles: Path, command: str, git_revision: str
+) -> Job:
+    """The job that makes a policy.
+
+    Args:
+        policy: Line of the table.
+        episodes: Of the judgement in MuJoCo.
+        runs: Folder of the run folders; a run that was broken off there is resumed.
+        bundles: Folder of the bundles.
+        command: Command line, for the record.
+        git_revision: Commit of the code, for the record.
+    """
+    settings = load_training_settings(load_robot(policy.robot), load_task(policy.task))
+    made_from = recipe(policy, settings)
+    return Job(
+        policy.name,
+        policy.robot,
+        policy.task,
+        policy.seed,
+        settings,
+        runs / f"{policy.name}_{made_from[:8]}",
+        time_limit_s=policy.time_limit_s,
+        episodes=episodes,
+        bundle=bundles / policy.name,
+        recipe=made_from,
+        command=command,
+        git_revision=git_revision,
+    )
+
+
+def is_made(job: Job) -> bool:
+    """Whether a job's bundle is there, intact, and made from the same."""
+    assert job.bundle is not None
+    try:
+        passport = read_passport(job.bundle)
+    except BundleError:
+        return False
+    return passport.training.get("recipe") == job.recipe
+
+
+def make_policies(
+    table: PolicyTable, jobs: Sequence[Job], executor: Executor, watch: Watch
+) -> list[dict[str, Any]]:
+    """Make those bundles that are missing, or made from something else.
+
+    Args:
+        table: Says what each policy has to reach.
+        jobs: One for each line of the table that is asked for.
+        executor: Who runs them.
+        watch: Told how they go on; numbers count those that have to be made.
+
+    Returns:
+        One line for each job: name, whether it was made now, success in MuJoCo, what it has to be, what went wrong.
+    """
+    missing = [job for job in jobs if not is_made(job)]
+    outcomes = {outcome.job.name: outcome for outcome in executor.run(missing, watch)} if missing else {}
+    needed = {policy.name: policy.success for policy in table.policies}
+    return [_line(job, needed[job.name], outcomes.get(job.name)) for job in jobs]
+
+
+def _line(job: Job, needed: float, outcome: Outcome | None) -> dict[str, Any]:
+    line: dict[str, Any] = {"policy": job.name, "made": outcome is not None, "needed": needed}
+    if outcome is not None and outcome.record is None:
+        return line | {"success": None, "good": False, "error": outcome.error}
+    assert job.bundle is not None
+    training = read_passport(job.bundle).training
+    success = training.get("mujoco", {}).get("success_rate")
+    return line | {
+        "success": success,
+        "good": success is not None and success >= needed,
+        "wall_s": training["wall_s"],
+        "steps": training["steps"],
+    }

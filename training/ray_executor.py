@@ -1,0 +1,120 @@
+"""The same jobs on the machines of a Ray cluster; each needs Fulmar installed with the extra `train`."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import ray
+
+from fulmar_core.errors import FulmarError
+from training.executors import Watch
+from training.jobs import Job, Outcome, run_job
+from training.progress import Speed
+
+POLL_S = 0.5
+
+
+class RayExecutor:
+    """A task with one core for each job; run folders come back to this machine."""
+
+    def __init__(self, address: str | None = None) -> None:
+        """Join a cluster, or begin one on this machine.
+
+        Args:
+            address: Of the cluster, as `ray.init` takes it; RAY_ADDRESS or a new local one by default.
+        """
+        if not ray.is_initialized():
+            ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+
+    def run(self, jobs: Sequence[Job], watch: Watch) -> list[Outcome]:
+        """See `Executor.run`."""
+        board = _Board.remote()
+        tasks = {_work.remote(number, job, board): number for number, job in enumerate(jobs)}
+        outcomes: dict[int, Outcome] = {}
+        try:
+            while tasks:
+                done, _ = ray.wait(list(tasks), timeout=POLL_S)
+                for number, progress in ray.get(board.read.remote()).items():
+                    if number not in outcomes:
+                        watch(number, "running", progress)
+                for task in done:
+                    number = tasks.pop(task)
+                    outcomes[number] = _outcome(jobs[number], task)
+                    watch(number, "failed" if outcomes[number].record is None else "done", {})
+        finally:
+            for task in tasks:  # a person has seen enough
+                ray.cancel(task)
+        return [outcomes[number] for number in range(len(jobs))]
+
+
+def _outcome(job: Job, task: Any) -> Outcome:
+    try:
+        record, files = ray.get(task)
+    except ray.exceptions.RayError as error:
+        reason = getattr(error, "cause", None) or error
+        return Outcome(job, None, str(reason).strip().splitlines()[-1])
+    for name, content in files.items():
+        path = job.out / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return Outcome(job, record)
+
+
+@ray.remote(num_cpus=0)
+class _Board:
+    """Where jobs on all machines write how far they are."""
+
+    def __init__(self) -> None:
+        self._progress: dict[int, dict[str, Any]] = {}
+
+    def write(self, number: int, progress: dict[str, Any]) -> None:
+        self._progress[number] = progress
+
+    def read(self) -> dict[int, dict[str, Any]]:
+        return self._progress
+
+
+class _BoardWatcher:
+    """Tells the board, now and then."""
+
+    EVERY_S = 1.0
+
+    def __init__(self, number: int, board: Any) -> None:
+        self._number, self._board, self._speed, self._next = number, board, Speed(), 0.0
+        self._told: dict[str, Any] = {}
+
+    def begin(self) -> None:
+        """Nothing to tell yet."""
+
+    def advance(self, share: float, elapsed_s: float, steps: int) -> None:
+        """Note how far it is."""
+        self._told |= {"share": share, "steps": steps, "rate": self._speed.update(elapsed_s, steps)}
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + self.EVERY_S
+            self._board.write.remote(self._number, self._told)
+
+    def verdict(self, elapsed_s: float, success: float) -> None:
+        """Note the latest check."""
+        self._told["success"] = success
+
+    def end(self) -> None:
+        """The record says the rest."""
+
+
+@ray.remote(num_cpus=1, max_retries=0)
+def _work(number: int, job: Job, board: Any) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Do a job on whichever machine this is; returns its record and every file of its folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        here = Path(folder)
+        bundle = here / "bundle" if job.bundle is not None else None
+        try:
+            record = run_job(replace(job, out=here, bundle=bundle), _BoardWatcher(number, board))
+        except FulmarError as error:
+            raise RuntimeError(str(error)) from None
+        files = {str(path.relative_to(here)): path.read_bytes() for path in here.rglob("*") if path.is_file()}
+    return record, files
