@@ -36,6 +36,7 @@ class BatchVecEnv(VecEnv):
         reward_scale: float = 1.0,
         training: bool = True,
         strength: float = 1.0,
+        staggered: bool = True,
     ) -> None:
         """Build the worlds.
 
@@ -48,9 +49,11 @@ class BatchVecEnv(VecEnv):
             reward_scale: Factor on the rewards.
             training: Start episodes where learning starts.
             strength: How much of the scenario counts, from 0 to 1; may be moved later by `set_strength` [-].
+            staggered: First episodes have random lengths.
         """
         self._robot, self._task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
+        self._staggered = staggered
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
@@ -99,11 +102,15 @@ class BatchVecEnv(VecEnv):
     def reset(self) -> np.ndarray:
         """Begin anew in every world; returns the observations, shape (worlds, n)."""
         self.simulation = self._new_simulation(self.simulation.strength)
-        self._age = np.random.Generator(np.random.Philox(self._seed)).integers(
-            0, self._horizon, self.num_envs
-        )
+        rng = np.random.Generator(np.random.Philox(self._seed))
+        self._age = rng.integers(0, self._horizon if self._staggered else 1, self.num_envs)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return np.asarray(self.simulation.observe())
+
+    def begin_anew(self, worlds: Sequence[int] | np.ndarray) -> None:
+        """Begin the next episode in some worlds, whatever has become of the last one."""
+        self.simulation.reset(worlds)
+        self._age[np.asarray(worlds)] = 0
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
@@ -141,8 +148,7 @@ class BatchVecEnv(VecEnv):
                     "terminal_observation": observations[world],
                     "TimeLimit.truncated": bool(timed_out[world]),
                 }
-            simulation.reset(ended)
-            self._age[ended] = 0
+            self.begin_anew(ended)
             observations = np.asarray(simulation.observe())
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
 

@@ -1,4 +1,4 @@
-"""What every task promises."""
+"""What every task promises, with every robot."""
 
 from __future__ import annotations
 
@@ -9,77 +9,182 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from fulmar_core.counter_rng import Draws
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.dynamics.outline import outline_of
+from fulmar_core.goal import Goal
+from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
+from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import load_robot
-from fulmar_core.state import planar_pose, planar_state
+from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.tasks.planar import planar_error
+from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import GOAL_WIRES
 
-ROBOT = load_robot("floating_platform")
+TASKS = {name: load_task(name) for name in config_names("tasks")}
+ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+RANDOMISED = load_scenario("randomised")
+COUNT = 50
 
 
-@pytest.fixture(params=config_names("tasks"))
+@pytest.fixture(params=TASKS.values(), ids=TASKS)
 def task(request):
-    return load_task(request.param)
+    return request.param
 
 
-def batch(count=50):
-    rng = np.random.default_rng(2)
-    state = planar_state(
-        *rng.uniform(-3, 3, (3, count)), vx=rng.normal(size=count), yaw_rate=rng.normal(size=count)
-    )
-    return state, planar_pose(*rng.uniform(-3, 3, (3, count)))
+@pytest.fixture(params=ROBOTS.values(), ids=ROBOTS)
+def robot(request):
+    return request.param
+
+
+def draw(task, robot, *, training=False, count=COUNT):
+    return task.draw(Draws(2, np.arange(count), np.zeros(count)), robot, training=training)
+
+
+def on_the_way(task, robot):
+    """States and goals as they come along in an episode: some way off the start, with some targets done."""
+    start, goal = draw(task, robot)
+    rng = np.random.default_rng(3)
+    state = PlanarState(*(getattr(start, name) + rng.normal(size=COUNT) for name in COLUMNS))
+    done = rng.integers(0, goal.targets.shape[1], COUNT).astype(float)
+    return start, state, Goal(goal.targets, done, goal.obstacles, goal.block)
+
+
+def cast(value, convert):
+    return type(value)(*(convert(getattr(value, name)) for name in value.__slots__))
 
 
 def test_every_kind_of_task_has_a_file():
-    assert {type(load_task(name)) for name in config_names("tasks")} == set(get_args(Task))
+    assert {type(task) for task in TASKS.values()} == set(get_args(Task))
 
 
-def test_observations_are_finite_and_as_wide_as_their_names(task):
-    seen = task.observe(*batch())
-    assert seen.shape == (50, len(task.observation_names))
-    assert np.isfinite(seen).all()
+@pytest.mark.parametrize("training", [False, True])
+def test_what_is_drawn_is_finite_at_rest_and_within_the_geofence(task, robot, training):
+    start, goal = draw(task, robot, training=training, count=300)
+    for value in (
+        *(getattr(start, name) for name in COLUMNS),
+        *(getattr(goal, name) for name in Goal.__slots__),
+    ):
+        assert value.dtype == np.float64
+        assert np.isfinite(value).all()
+    assert goal.targets.shape == (300, goal.targets.shape[1], 3)
+    assert goal.obstacles.shape == (300, goal.obstacles.shape[1], 3)
+    assert (goal.done.shape, goal.block.shape) == ((300,), (300, 2))
+    assert not any(getattr(start, name).any() for name in ("vx", "vy", "yaw_rate"))
+    errors = task.errors(start, goal)
+    if errors.position is not None:
+        assert errors.position.max() < robot.limits.geofence
+    touching = task.collides(start, goal, robot)
+    assert touching is None or not touching.any()
 
 
-def test_at_the_goal_itself_everything_is_finite(task):
-    state, goal = planar_state(1.0, 2.0, 0.3), planar_pose(1.0, 2.0, 0.3)
-    assert np.isfinite(task.observe(state, goal)).all()
-    assert np.isfinite(task.reward(state, state, goal, np.zeros(8)))
+def test_it_sees_as_many_terms_as_it_has_names_and_no_name_twice(task, robot):
+    _, state, goal = on_the_way(task, robot)
+    terms = task.observe(state, goal)
+    assert len(terms) == len(task.observation_names) == len(set(task.observation_names))
+    assert all(np.shape(term) == (COUNT,) and np.isfinite(term).all() for term in terms)
+    observer = Observer(robot, task)
+    seen = observer(state, goal, np.zeros((COUNT, len(robot.actuators.names))))
+    assert seen.shape == (COUNT, len(observer.names))
+    assert len(set(observer.names)) == len(observer.names)
 
 
-def test_a_batch_is_observed_and_rewarded_like_its_members(task):
-    state, goal = batch()
-    command = (np.random.default_rng(3).uniform(size=(50, 8)) > 0.5).astype(float)
-    seen, reward = task.observe(state, goal), task.reward(state, state, goal, command)
-    assert reward.shape == (50,)
-    for i in range(50):
-        one = type(goal)(goal.position_in_world[i], goal.quat_xyzw[i])
-        np.testing.assert_allclose(task.observe(state[i], one), seen[i], rtol=0, atol=1e-12)
-        assert task.reward(state[i], state[i], one, command[i]) == pytest.approx(reward[i], abs=1e-12)
+def test_at_its_target_itself_everything_is_finite(task, robot):
+    _, goal = draw(task, robot)
+    x, y, yaw = np.moveaxis(goal.targets[:, 0], -1, 0)
+    state = PlanarState(x, y, yaw, x * 0.0, x * 0.0, x * 0.0)
+    goal = Goal(goal.targets, goal.done, goal.obstacles, goal.targets[:, 0, :2])
+    assert all(np.isfinite(term).all() for term in task.observe(state, goal))
+    assert np.isfinite(task.reward(state, state, goal)).all()
 
 
-def test_the_floating_type_is_kept(task):
-    state, goal = batch()
-    state, goal = state.astype(np.float32), goal.astype(np.float32)
-    assert task.observe(state, goal).dtype == np.float32
-    assert task.reward(state, state, goal, np.zeros((50, 8), np.float32)).dtype == np.float32
+def everything(task, robot, before, after, goal):
+    """Every number that a task makes of two states and a goal."""
+    errors = task.errors(after, goal)
+    values = [*task.observe(after, goal), task.reward(before, after, goal)]
+    values += [
+        error
+        for error in (errors.position, errors.heading, errors.velocity, errors.yaw_rate)
+        if error is not None
+    ]
+    ended = task.advance(goal, after, np.asarray(20.0) if after.x.ndim == 0 else after.x * 0.0 + 20.0)
+    values += [getattr(ended, name) for name in Goal.__slots__]
+    values += [ended.current]
+    for name in ("penalty", "collides"):
+        extra = getattr(task, name, lambda *_: None)(after, goal, robot)
+        values += [] if extra is None else [extra]
+    if isinstance(task, PushBlock):
+        moved, slowed = task.pushed(goal, before, after, robot)
+        values += [moved.block, slowed.vx, slowed.vy, task.block_reward(goal, moved)]
+    return values
 
 
-def test_resting_at_the_goal_is_worth_more_than_resting_anywhere_else(task):
-    state, goal = batch()
-    home = planar_state(
-        *goal.position_in_world[:, :2].T, np.arctan2(goal.quat_xyzw[:, 2], goal.quat_xyzw[:, 3]) * 2
-    )
-    nothing = np.zeros((50, 8))
-    assert (task.reward(home, home, goal, nothing) > task.reward(state, state, goal, nothing)).all()
+def test_a_batch_is_treated_like_its_members(task, robot):
+    before, after, goal = on_the_way(task, robot)
+    together = everything(task, robot, before, after, goal)
+    for i in (0, 7, COUNT - 1):
+        alone = everything(task, robot, before[i], after[i], goal[i])
+        for one, many in zip(alone, together, strict=True):
+            np.testing.assert_allclose(one, np.asarray(many)[i], rtol=0, atol=1e-12)
 
 
-def test_starts_lie_within_the_geofence_of_the_platform(task):
-    for training in (False, True):
-        for seed in range(50):
-            start, goal = task.start.draw(np.random.default_rng(seed), training=training)
-            assert planar_error(start, goal).position < ROBOT.limits.geofence
+def test_the_floating_type_is_kept(task, robot):
+    before, after, goal = (cast(value, np.float32) for value in on_the_way(task, robot))
+    values = everything(task, robot, before, after, goal)
+    assert {np.asarray(value).dtype for value in values} <= {np.dtype(np.float32), np.dtype(bool)}
+
+
+def test_torch_makes_of_it_what_numpy_does(task, robot):
+    torch = pytest.importorskip("torch")
+    before, after, goal = on_the_way(task, robot)
+    ours = everything(task, robot, before, after, goal)
+    theirs = everything(task, robot, *(cast(value, torch.as_tensor) for value in (before, after, goal)))
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(other.numpy(), one, rtol=0, atol=1e-9)
+
+
+def test_fifty_random_steps_stay_finite_with_worlds_that_begin_anew(task, robot):
+    simulation = BatchSimulation(robot, task, RANDOMISED, worlds=20, seed=4, training=True)
+    rng = np.random.default_rng(5)
+    for step in range(50):
+        before, goal = simulation.truth, simulation.goal
+        simulation.step(rng.uniform(-1.5, 1.5, simulation.command.shape) * robot.actuators.scale)
+        assert np.isfinite(simulation.observe()).all()
+        assert np.isfinite(task.reward(before, simulation.truth, goal)).all()
+        if step % 10 == 9:
+            simulation.reset(rng.integers(0, 20, 3))
+
+
+def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, robot):
+    _, state, goal = on_the_way(task, robot)
+    turn, dx, dy = 2.0, 3.0, -1.0
+    c, s = np.cos(turn), np.sin(turn)
+
+    def place(x, y):
+        return c * x - s * y + dx, s * x + c * y + dy
+
+    x, y = place(state.x, state.y)
+    vx, vy = c * state.vx - s * state.vy, s * state.vx + c * state.vy
+    moved = PlanarState(x, y, state.yaw + turn, vx, vy, state.yaw_rate)
+    if task.goal_topic == "goal_velocity":
+        elsewhere = goal
+    else:
+        targets = np.stack(
+            (*place(goal.targets[..., 0], goal.targets[..., 1]), goal.targets[..., 2] + turn), -1
+        )
+        discs = np.stack((*place(goal.obstacles[..., 0], goal.obstacles[..., 1]), goal.obstacles[..., 2]), -1)
+        elsewhere = Goal(targets, goal.done, discs, np.stack(place(goal.block[:, 0], goal.block[:, 1]), -1))
+    for here, there in zip(task.observe(state, goal), task.observe(moved, elsewhere), strict=True):
+        np.testing.assert_allclose(there, here, rtol=0, atol=1e-9)
+
+
+def test_who_is_large_has_room_to_start(task, robot):
+    start, goal = draw(task, robot, count=300)
+    if goal.obstacles.shape[1]:
+        away = np.hypot(goal.obstacles[..., 0] - start.x[:, None], goal.obstacles[..., 1] - start.y[:, None])
+        there = goal.obstacles[..., 2] > 0.0
+        assert np.all((away - goal.obstacles[..., 2])[there] > outline_of(robot).extent)
 
 
 def test_its_closing_window_fits_into_its_episode(task):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -165,7 +166,7 @@ def test_passing_a_gate_pays_and_passing_it_in_reverse_costs():
     assert gate_reward((0.1, 0.0, np.pi), (-0.1, 0.0, np.pi)) < -0.3 * w.reverse
     # Around both ends and through in reverse must never pay, however often.
     loop = [(0.1, 0.0), (-0.1, 0.0), (-0.1, 0.5), (0.1, 0.5), (0.1, 0.0)]
-    assert sum(gate_reward(a, b) for a, b in zip(loop[:-1], loop[1:], strict=True)) < -0.5 * w.reverse
+    assert sum(gate_reward(a, b) for a, b in itertools.pairwise(loop)) < -0.5 * w.reverse
 
 
 def test_behind_a_gate_the_way_to_it_leads_around():

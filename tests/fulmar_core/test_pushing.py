@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -38,7 +39,7 @@ def pushed(before, after, at, *, robot=BASE, block=BLOCK):
 def drive(robot, path, at, block=BLOCK):
     """Push along poses."""
     place = np.array(at, dtype=float)
-    for a, b in zip(path[:-1], path[1:], strict=True):
+    for a, b in itertools.pairwise(path):
         place, _ = pushed(body(*a), body(*b), place, robot=robot, block=block)
     return place
 
