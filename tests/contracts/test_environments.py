@@ -75,12 +75,12 @@ def test_a_seed_brings_the_same_episode_back_and_none_the_next_one():
 def test_an_episode_has_its_full_length_and_the_next_begins_where_reset_says():
     env = env_of()
     env.reset(seed=7)
-    for step in range(1, 601):
+    steps, ended = 0, False
+    while not ended:
         last, reward, terminated, truncated, _ = env.step(np.zeros(2, dtype=np.float32))
         assert np.isfinite(reward)
-        if terminated or truncated:
-            break
-    assert (step, terminated, truncated) == (600, False, True)
+        steps, ended = steps + 1, terminated or truncated
+    assert (steps, terminated, truncated) == (600, False, True)
     first, _ = env.reset()
     assert not np.array_equal(first, last)
     np.testing.assert_array_equal(first, env._batch.simulation.observe()[0])
