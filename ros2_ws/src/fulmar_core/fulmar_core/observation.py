@@ -46,7 +46,8 @@ class Observer:
             scale = xp.asarray(self._scale, dtype=previous_command.dtype, device=device(previous_command))
             share = previous_command / scale
             columns += [share[..., i] for i in range(share.shape[-1])]
-        return xp.stack(columns, axis=-1)
+        # Stacked in front and turned about: each column is written in one piece.
+        return xp.moveaxis(xp.stack(columns, axis=0), 0, -1)
 
 
 def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> Array:

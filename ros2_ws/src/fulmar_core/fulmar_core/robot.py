@@ -77,7 +77,14 @@ class Performance:
 
     def __post_init__(self) -> None:
         """Refuse machines that cannot move."""
-        needed = (self.force, self.torque, self.top_speed, self.speed, self.yaw_rate, self.turning_acceleration)
+        needed = (
+            self.force,
+            self.torque,
+            self.top_speed,
+            self.speed,
+            self.yaw_rate,
+            self.turning_acceleration,
+        )
         if min(needed) <= 0.0:
             raise ValueError(
                 "force, torque, top_speed, speed, yaw_rate and turning_acceleration must be greater than 0."

@@ -22,9 +22,10 @@ from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.push_block import PushBlock
+from fulmar_core.upcoming import UpcomingEpisodes
 
 _MOVING = (
-    "truth", "measured", "goal", "world", "command", "strength", "_repeats", "_steps", "_actuation", "_odometer",
+    "truth", "measured", "goal", "world", "command", "_strength", "_repeats", "_steps", "_actuation", "_odometer",
 )  # fmt: skip
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
@@ -78,11 +79,13 @@ class BatchSimulation:
             dtype: Floating type; the library's float32 by default.
         """
         self.robot, self.task, self.scenario, self.seed = robot, task, scenario, seed
-        self.worlds, self.training, self.strength = worlds, training, strength
+        self.worlds, self.training, self._strength = worlds, training, strength
         self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
         self.observer = Observer(robot, task)
-        self._xp = array_namespace(xp.empty(0))  # the library itself may lack what the array standard asks for
+        self._xp = array_namespace(
+            xp.empty(0)
+        )  # the library itself may lack what the array standard asks for
         self._device, self._dtype = device, dtype or xp.float32
         self._numbers = self._whole(first + np.arange(worlds))
         self._repeats = self._whole(np.zeros(worlds))
@@ -101,7 +104,20 @@ class BatchSimulation:
         self._safe = self._real(safe)
         self._actuation = actuation_of(robot, self._safe)
         self.command: Array = self._safe.T
-        self._begin(self._draw(first + np.arange(worlds), np.zeros(worlds, dtype=int)))
+        self._upcoming = UpcomingEpisodes(self._draw, worlds)
+        self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
+        self._measure(None)
+
+    @property
+    def strength(self) -> float:
+        """How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-]."""
+        return self._strength
+
+    @strength.setter
+    def strength(self, strength: float) -> None:
+        if strength != self._strength:
+            self._strength = strength
+            self._upcoming.forget()
 
     @property
     def control_dt(self) -> float:
@@ -123,15 +139,8 @@ class BatchSimulation:
             return
         index = self._whole(which)
         self._repeats[index] = self._repeats[index] + 1
-        repeats = np.asarray(self._repeats[index].tolist()) if self._on_torch else self._repeats[which]
-        drawn = self._draw(self._first + which, repeats)
         self._steps[index] = 0
-        for name in COLUMNS:
-            getattr(self.truth, name)[index] = self._real(getattr(drawn.start, name))
-        for name in Goal.__slots__:
-            getattr(self.goal, name)[index] = self._real(getattr(drawn.goal, name))
-        for name in FIELDS:
-            getattr(self.world, name)[..., index] = self._real(getattr(drawn.world, name))
+        self._upcoming.begin(which, index, self._repeats_now(), self.truth, self.goal, self.world)
         self._actuation.reset(index, self._safe[:, :1])
         self.command = self._xp.asarray(self.command, copy=True)
         self.command[index] = self._safe[:, 0]
@@ -151,7 +160,8 @@ class BatchSimulation:
             keys = world_keys(self.seed, self._numbers, self._repeats, ACTUATOR_NOISE)
             bits = words(keys, self._steps, self.command.shape[1])
             noise = 2.0 * uniform_from(bits, self._dtype) - 1.0
-        self._actuation.begin(xp.asarray(self.command.T, copy=True), self.world, noise)
+        by_actuator = xp.stack([self.command[:, i] for i in range(self.command.shape[1])])
+        self._actuation.begin(by_actuator, self.world, noise)
         time_s = xp.astype(self._steps, self._dtype) * self.control_dt
         before = self.truth
         self.truth = control_step(
@@ -178,24 +188,32 @@ class BatchSimulation:
         """Go on from a snapshot of a simulation that was built alike."""
         for name in _MOVING:
             setattr(self, name, copy.deepcopy(snapshot[name]))
+        self._upcoming.forget()
 
-    def _draw(self, numbers: np.ndarray, repeats: np.ndarray) -> Episode:
-        return draw_episodes(
+    def _draw(self, worlds: np.ndarray, repeats: np.ndarray) -> Episode:
+        """Episodes of some worlds in the simulation's own arrays."""
+        return Episode(*self._draw_parts(worlds, repeats))
+
+    def _draw_parts(self, worlds: np.ndarray, repeats: np.ndarray) -> tuple[PlanarState, Goal, World]:
+        drawn = draw_episodes(
             self.robot,
             self.task,
             self.scenario,
             seed=self.seed,
-            numbers=numbers,
+            numbers=self._first + worlds,
             repeats=repeats,
             training=self.training,
-            strength=self.strength,
+            strength=self._strength,
+        )
+        return (
+            PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS)),
+            Goal(*(self._real(getattr(drawn.goal, name)) for name in Goal.__slots__)),
+            World(*(self._real(getattr(drawn.world, name)) for name in FIELDS)),
         )
 
-    def _begin(self, drawn: Episode) -> None:
-        self.truth = PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS))
-        self.goal = Goal(*(self._real(getattr(drawn.goal, name)) for name in Goal.__slots__))
-        self.world = World(*(self._real(getattr(drawn.world, name)) for name in FIELDS))
-        self._measure(None)
+    def _repeats_now(self) -> np.ndarray:
+        """How often each world has begun anew, as NumPy."""
+        return np.array(self._repeats.cpu() if self._on_torch else self._repeats)
 
     def _measure(self, restarted: Array | None) -> None:
         """Measure every world; where only some restarted, the others keep what they had."""

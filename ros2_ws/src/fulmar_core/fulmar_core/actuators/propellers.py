@@ -96,8 +96,8 @@ class Propellers:
         """
         xp = array_namespace(applied)
         thrust = self.thrust(applied) * gain
-        ahead = xp.sum(thrust, axis=0)
         arms = self.lever_arms
+        ahead = sum(thrust[i] for i in range(len(arms)))
         moment = sum(float(arms[i]) * thrust[i] for i in range(len(arms)))
         return ahead, xp.zeros_like(ahead), moment
 

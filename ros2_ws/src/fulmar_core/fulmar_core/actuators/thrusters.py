@@ -14,6 +14,7 @@ from fulmar_core.arrays import clip
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
+Row = tuple[tuple[float, list[int], list[int]], ...]  # a weight, and the nozzles it counts for and against
 
 
 @dataclass(frozen=True)
@@ -136,14 +137,43 @@ class Thrusters:
         Returns:
             Force ahead [N], to the left [N], and yaw moment [N·m], shapes (...,).
         """
-        xp = array_namespace(applied)
         if self.continuous:
             applied = clip(applied, 0.0, 1.0)  # whatever errors add, a valve does not suck
-        thrust = applied * gain * self.thrust
-        if self.shared_pressure:
-            thrust = thrust / clip(xp.sum(applied, axis=0), 1.0, None)
-        matrix = xp.asarray(
-            self.wrench_per_newton[:, (0, 1, 5)].T.copy(), dtype=applied.dtype, device=device(applied)
+        thrust = applied * gain
+        every = ((1.0, list(range(len(self.nozzles))), []),)
+        share = 1.0 / clip(_weighted(applied, every), 1.0, None) if self.shared_pressure else 1.0
+        ahead, left, moment = (_weighted(thrust, row) * share for row in self._planar_rows)
+        return ahead, left, moment
+
+    @functools.cached_property
+    def _planar_rows(self) -> tuple[Row, ...]:
+        """Force ahead, to the left and yaw moment as sums over the nozzles."""
+        return tuple(_row(self.thrust * self.wrench_per_newton[:, column]) for column in (0, 1, 5))
+
+
+def _row(weights: np.ndarray) -> Row:
+    """Weights gathered by their size, so that equal ones are multiplied once."""
+    sizes = np.unique(np.round(np.abs(weights), 12))
+    return tuple(
+        (
+            float(size),
+            np.flatnonzero(same & (weights > 0)).tolist(),
+            np.flatnonzero(same & (weights < 0)).tolist(),
         )
-        wrench = matrix @ thrust
-        return wrench[0], wrench[1], wrench[2]
+        for size in sizes[sizes > 0.0]
+        for same in [np.isclose(np.abs(weights), size, rtol=0.0, atol=1e-12)]
+    )
+
+
+def _weighted(thrust: Array, row: Row) -> Array:
+    """Weighted sum over the first axis, in one order whatever the number of worlds: a BLAS would not promise that."""
+    total = None
+    for size, plus, minus in row:
+        part = None
+        for i in plus:
+            part = thrust[i] if part is None else part + thrust[i]
+        for i in minus:
+            part = -thrust[i] if part is None else part - thrust[i]
+        part = size * part
+        total = part if total is None else total + part
+    return array_namespace(thrust).zeros_like(thrust[0]) if total is None else total

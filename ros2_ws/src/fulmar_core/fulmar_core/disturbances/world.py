@@ -24,7 +24,9 @@ class World:
     drag: Array  # factor on the damping of the water [-]
     gain: Array  # (n, ...) factor on what each actuator does [-]
     alive: Array  # (n, ...) 1, or 0 for an actuator that stays closed or still [-]
-    action_noise: Array  # largest error of what an actuator does, of full command, anew at each control step [-]
+    action_noise: (
+        Array  # largest error of what an actuator does, of full command, anew at each control step [-]
+    )
     action_delay: Array  # until a command acts, beyond the actuators' own, at most one control step [s]
     force_x: Array  # constant, in the world [N]
     force_y: Array  # [N]

@@ -44,23 +44,22 @@ def free_body_step(
     xp = array_namespace(state.x)
     c, s = xp.cos(state.yaw), xp.sin(state.yaw)
     ahead, left, moment = push
-    if water is None:
-        ax = (c * ahead - s * left + outside[0]) / world.mass
-        ay = (s * ahead + c * left + outside[1]) / world.mass
-        spin = (moment + outside[2]) / world.yaw_inertia
-    else:
+    mass, yaw_inertia = world.mass, world.yaw_inertia
+    if water is not None:
         u, v, r = c * state.vx + s * state.vy, c * state.vy - s * state.vx, state.yaw_rate
         drag = water.planar_damping(u, v, r)
+        ahead, left = ahead + world.drag * drag[0], left + world.drag * drag[1]
+        moment = moment + world.drag * drag[2]
         mu, mv, ir = water.planar_added_mass
-        surge = ahead + world.drag * drag[0] + c * outside[0] + s * outside[1]
-        sway = left + world.drag * drag[1] + c * outside[1] - s * outside[0]
-        au = (surge + (mv - mu) * v * r) / (world.mass + mu) if mv != mu else surge / (world.mass + mu)
-        av = (sway + (mv - mu) * u * r) / (world.mass + mv) if mv != mu else sway / (world.mass + mv)
-        munk = (mu - mv) * u * v if mv != mu else 0.0
-        spin = (moment + world.drag * drag[2] + outside[2] + munk) / (world.yaw_inertia + ir)
-        ax, ay = c * au - s * av, s * au + c * av
+        mass, yaw_inertia = mass + mu, yaw_inertia + ir
+        if mv != mu:
+            # As if the sway's mass were the surge's, with what that leaves out as forces of their own.
+            across = c * outside[1] - s * outside[0]
+            left = (left + across + (mv - mu) * u * r) * (mass / (world.mass + mv)) - across
+            ahead = ahead + (mv - mu) * v * r
+            moment = moment + (mu - mv) * u * v
+    ax = (c * ahead - s * left + outside[0]) / mass
+    ay = (s * ahead + c * left + outside[1]) / mass
     vx, vy = state.vx + dt * ax, state.vy + dt * ay
-    yaw_rate = state.yaw_rate + dt * spin
-    return PlanarState(
-        state.x + dt * vx, state.y + dt * vy, state.yaw + dt * yaw_rate, vx, vy, yaw_rate
-    )
+    yaw_rate = state.yaw_rate + dt * ((moment + outside[2]) / yaw_inertia)
+    return PlanarState(state.x + dt * vx, state.y + dt * vy, state.yaw + dt * yaw_rate, vx, vy, yaw_rate)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from array_api_compat import array_namespace, device
@@ -77,7 +76,8 @@ class Odometer:
         longest = spec.delay_s + max_delay_s if noisy else 0.0
         self._depth = int(np.ceil(longest / period - 1e-9)) + 1 if longest > 0.0 else 1
         self._constants: dict[str, Array] = {}
-        self._history: Array | None = None
+        self._used = {part for part in Channel.__dataclass_fields__ if np.any(spec.column(part) != 0.0)}
+        self._past: list[Array] = []  # readings, newest first
         self._held: Array | None = None
 
     def measure(
@@ -111,14 +111,13 @@ class Odometer:
         columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
         bits = words(world_keys(self._seed, numbers, repeats, NOISE), steps, 7)
         reading = self._disturbed(columns, world, bits)
-        fresh = steps == 0
         if self._depth > 1:
-            reading = self._delayed(reading, world, steps, fresh)
+            reading = self._delayed(reading, world)
         lost = uniform_from(bits[6], columns.dtype) < world.dropout
         if self._every > 1:
             lost = lost | (steps % self._every != 0)
         if self._held is not None:
-            reading = xp.where(lost & ~fresh, self._held, reading)
+            reading = xp.where(lost & (steps != 0), self._held, reading)
         self._held = reading
         return PlanarState(*(reading[i] for i in range(6)))
 
@@ -131,52 +130,44 @@ class Odometer:
         columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
         keys = world_keys(self._seed, numbers, repeats, NOISE)
         reading = self._disturbed(columns, world, words(keys, 0, 7))
-        self._held = xp.asarray(self._held, copy=True)
-        self._held[:, only] = reading
-        if self._history is not None:
-            self._history[:, :, only] = reading[None]
+        # Copies: who was given these readings keeps them.
+        self._held, *self._past = (xp.asarray(old, copy=True) for old in (self._held, *self._past))
+        for old in (self._held, *self._past):
+            old[:, only] = reading
         return PlanarState(*(self._held[i] for i in range(6)))
 
     def _constant(self, part: str, like: Array) -> Array:
         if part not in self._constants:
             xp = array_namespace(like)
-            self._constants[part] = xp.asarray(
-                self._spec.column(part), dtype=like.dtype, device=device(like)
-            )
+            self._constants[part] = xp.asarray(self._spec.column(part), dtype=like.dtype, device=device(like))
         return self._constants[part]
 
     def _disturbed(self, columns: Array, world: World, bits: Array) -> Array:
         xp = array_namespace(columns)
-        spec = self._spec
-        if _any(spec.column("scale_std")):
+        if "scale_std" in self._used:
             columns = columns * (1.0 + self._constant("scale_std", columns) * world.sensor_scale)
-        if _any(spec.column("bias_std")):
+        if "bias_std" in self._used:
             columns = columns + self._constant("bias_std", columns) * world.sensor_bias
-        if _any(spec.column("std")):
+        if "std" in self._used:
             noise = normal_from(bits[:6], columns.dtype) * world.noise
             columns = columns + self._constant("std", columns) * noise
-        if _any(spec.column("limit")):
+        if "limit" in self._used:
             limit = self._constant("limit", columns)
             most = xp.where(limit > 0.0, limit, xp.full_like(limit, xp.inf))
             columns = clip(columns, -most, most)
-        if _any(spec.column("quantum")):
+        if "quantum" in self._used:
             quantum = self._constant("quantum", columns)
             safe = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
             columns = xp.where(quantum > 0.0, xp.round(columns / safe) * safe, columns)
         return columns
 
-    def _delayed(self, reading: Array, world: World, steps: Array, fresh: Array) -> Array:
+    def _delayed(self, reading: Array, world: World) -> Array:
         """Reading of some measurements ago; before the first one, the first."""
         xp = array_namespace(reading)
-        if self._history is None:
-            self._history = xp.stack([reading] * self._depth)
-        old = xp.concat((reading[None], self._history[:-1]))
-        self._history = xp.where(fresh, reading[None], old)
+        self._past = [reading, *(self._past or [reading] * self._depth)][: self._depth]
         late = (self._spec.delay_s + world.sensor_delay) / self._period
-        back = clip(xp.round(late), 0, self._depth - 1)
-        worlds = reading.shape[1]
-        return self._history[xp.astype(back, xp.int64), :, xp.arange(worlds, device=device(reading))].T
-
-
-def _any(values: Any) -> bool:
-    return bool(np.any(values != 0.0))
+        back = xp.round(clip(late, 0.0, self._depth - 1.0))
+        chosen = self._past[0]
+        for age, old in enumerate(self._past[1:], start=1):
+            chosen = xp.where(back == age, old, chosen)
+        return chosen
