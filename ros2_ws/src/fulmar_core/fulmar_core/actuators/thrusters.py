@@ -140,7 +140,7 @@ class Thrusters:
         if self.continuous:
             applied = clip(applied, 0.0, 1.0)  # whatever errors add, a valve does not suck
         thrust = applied * gain
-        every = ((1.0, list(range(len(self.nozzles))), []),)
+        every: Row = ((1.0, list(range(len(self.nozzles))), []),)
         share = 1.0 / clip(_weighted(applied, every), 1.0, None) if self.shared_pressure else 1.0
         ahead, left, moment = (_weighted(thrust, row) * share for row in self._planar_rows)
         return ahead, left, moment
@@ -167,9 +167,9 @@ def _row(weights: np.ndarray) -> Row:
 
 def _weighted(thrust: Array, row: Row) -> Array:
     """Weighted sum over the first axis, in one order whatever the number of worlds: a BLAS would not promise that."""
-    total = None
+    total: Array = None
     for size, plus, minus in row:
-        part = None
+        part: Array = None
         for i in plus:
             part = thrust[i] if part is None else part + thrust[i]
         for i in minus:

@@ -27,7 +27,6 @@ class Outline:
 
     def nearest(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Point of the box that is nearest to another, both in the body's frame, shapes (...,) [m]."""
-        xp = array_namespace(x)
         near = clip(x - self.ahead, -self.half_length, self.half_length) + self.ahead
         return near, clip(y, -self.half_width, self.half_width)
 
