@@ -89,11 +89,18 @@ class Session(BaseCallback):
         self._next_check = self.elapsed_s + settings.evaluate_every_s
         self._next_checkpoint = self.elapsed_s + settings.checkpoint_every_s
         self._first = True  # what comes first is no update yet
+        self._speeds: list[float] = []  # of each update [steps/s]
+        self._since = (time.monotonic(), 0)
 
     @property
     def elapsed_s(self) -> float:
         """Wall-clock of learning, over all parts of the run [s]."""
         return self._before_s + time.monotonic() - self._began
+
+    @property
+    def steps_per_s(self) -> float:
+        """Median speed of learning, checks and checkpoints apart [control steps/s]."""
+        return float(np.median(self._speeds)) if self._speeds else 0.0
 
     def _on_training_start(self) -> None:
         self._watcher.begin()
@@ -105,6 +112,13 @@ class Session(BaseCallback):
         return True
 
     def _on_rollout_start(self) -> None:
+        if not self._first:
+            began, steps = self._since
+            self._speeds.append((self.num_timesteps - steps) / (time.monotonic() - began))
+        self._between_updates()
+        self._since = time.monotonic(), self.num_timesteps
+
+    def _between_updates(self) -> None:
         story = self.story
         story.updates += not self._first
         self._first = False

@@ -138,6 +138,7 @@ def train(
         "steps": learner.num_timesteps,
         "updates": story.updates,
         "wall_s": round(story.elapsed_s, 1),
+        "steps_per_s": round(session.steps_per_s),
         "interrupted": interrupted,
         "best": asdict(best),
         "curve": [asdict(check) for check in story.checks],

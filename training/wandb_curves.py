@@ -34,4 +34,4 @@ class WandbCurves(KVWriter):
 
     def close(self) -> None:
         """Send the rest, and end the run there."""
-        self._run.finish(quiet=True)
+        self._run.finish()
