@@ -1,4 +1,4 @@
-"""Closed loops without ROS: what they need, and what they leave behind."""
+"""Closed loops without ROS: what they need, what they leave behind, and that both ways of running them agree."""
 
 from __future__ import annotations
 
@@ -6,18 +6,40 @@ import json
 import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from fulmar_core.controllers.lqr import load_lqr
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
+from fulmar_core.observation import Observer
+from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 
-ROBOT, TASK, NOMINAL = load_robot("floating_platform"), load_task("go_to_pose"), load_scenario("nominal")
+ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
+IDEAL, NOMINAL = load_scenario("ideal"), load_scenario("nominal")
+
+
+class Habit:
+    """A controller without skill: the same smooth function of what it sees, every time."""
+
+    name = "habit"
+
+    def __init__(self, robot, task):
+        self.observation_names = Observer(robot, task).names
+        self.control_hz = robot.timing.control_hz
+        self._scale = robot.actuators.scale
+        shape = (len(self.observation_names), len(self._scale))
+        self._weights = np.random.default_rng(8).normal(size=shape) * 0.3
+
+    def reset(self):
+        pass
+
+    def act(self, observation):
+        return np.tanh(observation @ self._weights) * self._scale
 
 
 class Counted(MockBackend):
@@ -52,7 +74,7 @@ def test_every_backend_is_closed_whatever_happens(monkeypatch, way_to_fail):
     task = replace(TASK, episode_s=1.0)
 
     def run():
-        roll_out_in_backends(load_lqr(ROBOT, task), Counted, task, NOMINAL, episodes=4, seed=1)
+        roll_out_in_backends(Habit(ROBOT, task), Counted, task, NOMINAL, episodes=4, seed=1)
 
     if way_to_fail:
         with pytest.raises(RuntimeError):
@@ -64,14 +86,30 @@ def test_every_backend_is_closed_whatever_happens(monkeypatch, way_to_fail):
 
 def test_an_episode_shorter_than_a_control_step_is_refused_by_name():
     task = replace(TASK, episode_s=0.05)
-    lqr, words = (
-        load_lqr(ROBOT, task),
+    controller, words = (
+        Habit(ROBOT, task),
         r"an episode of task 'go_to_pose' lasts 0\.05 s, less than one control",
     )
     with pytest.raises(ConfigError, match=words):
-        roll_out_in_batch(lqr, ROBOT, task, NOMINAL, episodes=2, seed=1)
+        roll_out_in_batch(controller, ROBOT, task, NOMINAL, episodes=2, seed=1)
     with pytest.raises(ConfigError, match=words):
-        roll_out_in_backends(lqr, lambda: MockBackend(ROBOT), task, NOMINAL, episodes=2, seed=1)
+        roll_out_in_backends(controller, lambda: MockBackend(ROBOT), task, NOMINAL, episodes=2, seed=1)
+
+
+@pytest.mark.parametrize("name", config_names("tasks"))
+@pytest.mark.parametrize("robot", ["turtlebot2", "modular_freeflyer"])
+def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
+    robot, task = load_robot(robot), replace(load_task(name), episode_s=8.0)
+    controller, block = Habit(robot, task), getattr(task, "block", None)
+    batch = roll_out_in_batch(controller, robot, task, IDEAL, episodes=3, seed=5)
+    alone = roll_out_in_backends(
+        controller, lambda: MockBackend(robot, block=block), task, IDEAL, episodes=3, seed=5
+    )
+    for column in ("x", "y", "position_error", "velocity_error", "goals", "touching", "outside", "shares"):
+        one, other = (np.asarray(getattr(run, column), dtype=float) for run in (batch, alone))
+        # The batch is in single precision; and this controller pulls nothing together.
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-3, err_msg=column)
+    np.testing.assert_allclose(np.cos(batch.yaw - alone.yaw), 1.0, rtol=0, atol=1e-5)
 
 
 def test_judging_works_where_training_is_not_installed(monkeypatch):
