@@ -1,0 +1,94 @@
+"""Obstacles stop a robot, and a block gives way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fulmar_core.paths import config_names
+from fulmar_core.planar import planar_of
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from fulmar_core.tasks.obstacles import TOUCH, clearance
+from sim_nodes.mock_backend import MockBackend
+
+mujoco = pytest.importorskip("mujoco")
+
+from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
+
+EVERY = config_names("robots")
+BLOCK = load_task("push_block").block
+AHEAD = np.array([[1.6, 0.0, 0.21], [9.0, 9.0, 0.0], [0.0, 5.0, 0.21]])
+
+
+def ahead(robot):
+    """A command that pushes straight ahead."""
+    kind = robot.actuators.kind
+    if kind == "thrusters":
+        return np.array(
+            [0.5, 0, 0, 0, 0, 0, 0, 0.5] if robot.actuators.continuous else [1.0, 0, 0, 0, 0, 0, 0, 1]
+        )
+    return np.array([0.7, 0.7]) if kind == "propellers" else np.array([0.4, 0.0])
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_an_obstacle_holds_a_robot_up_and_touching_is_seen_by_the_task_s_measure(name, episode):
+    robot = load_robot(name)
+    backend = MujocoBackend(robot, sensor_noise=False)
+    backend.reset(episode(robot, obstacles=AHEAD), seed=0)
+    gaps = []
+    for _ in range(60):
+        state = planar_of(backend.step(ahead(robot), 10).truth)
+        gaps.append(float(clearance(state, AHEAD, robot)))
+    assert min(gaps) < TOUCH  # it came there, and whoever judges collisions sees it
+    assert min(gaps) > -0.015  # it was not let in
+
+
+def test_obstacles_of_another_episode_stand_elsewhere_and_those_of_none_nowhere(episode):
+    robot = load_robot("turtlebot2")
+    backend = MujocoBackend(robot, sensor_noise=False)
+
+    def reached(obstacles):
+        backend.reset(episode(robot, obstacles=obstacles), seed=0)
+        return backend.step(ahead(robot), 400).truth.position_in_world[0]
+
+    free = reached(None)
+    assert reached(AHEAD) < 1.3 < free
+    compiled = backend.model
+    assert reached(AHEAD + (0.4, 0.0, 0.0) * (AHEAD[:, 2:] > 0.0)) == pytest.approx(1.613, abs=0.02)
+    assert reached(AHEAD * (1.0, 1.0, 0.0)) == pytest.approx(free, abs=1e-6)
+    assert backend.model is compiled  # moved, not built anew
+    bigger = AHEAD * (1.0, 1.0, 2.0)
+    assert reached(bigger) == pytest.approx(1.6 - 0.42 - robot.body.radius, abs=0.02)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_block_is_pushed_ahead_about_as_the_core_pushes_it(name, episode):
+    robot = load_robot(name)
+    places = []
+    for backend in (MujocoBackend(robot, sensor_noise=False, block=BLOCK), MockBackend(robot, block=BLOCK)):
+        sample = backend.reset(episode(robot, block=(1.1, 0.0)), seed=0)
+        np.testing.assert_allclose(sample.block, (1.1, 0.0), atol=1e-9)
+        for _ in range(40):
+            sample = backend.step(ahead(robot), 10)
+            if sample.block[0] > 1.5:
+                break
+        places.append(sample.block)
+    theirs, ours = places
+    assert theirs[0] == pytest.approx(ours[0], abs=0.15)
+    assert abs(theirs[1]) < 0.1
+    assert theirs[0] > 1.3
+
+
+def test_a_block_that_nobody_touches_stays_where_it_is(episode):
+    robot = load_robot("turtlebot2")
+    backend = MujocoBackend(robot, sensor_noise=False, block=BLOCK)
+    backend.reset(episode(robot, block=(1.0, 1.0)), seed=0)
+    sample = backend.step(ahead(robot), 100)
+    np.testing.assert_allclose(sample.block, (1.0, 1.0), atol=1e-4)
+
+
+def test_without_a_block_none_is_reported(episode):
+    robot = load_robot("turtlebot2")
+    assert MujocoBackend(robot).reset(episode(robot), seed=0).block is None
+    assert MockBackend(robot).reset(episode(robot), seed=0).block is None
