@@ -18,6 +18,7 @@ TARGETS = {
     "test",
     "check",
     "format",
+    "policies",
     "ros-build",
     "lock",
     "clean",
