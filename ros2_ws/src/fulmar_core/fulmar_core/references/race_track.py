@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 
+from fulmar_core.counter_rng import Draws
+from fulmar_core.references.race_corners import draw_corners
 from fulmar_core.references.spacing import Point, along_curve, positive
 
 HANDLE = 0.2  # of the distance to the next corner: RoboRAN tasks_cfg, `rad`
-SHARPEST_DEG = 12.5  # corners that turn back more closely are drawn again: same, [deg]
-GAP = 1.0 / 15.0  # least distance of corners over the size: 1 m on the public tracks
-_MOST_DRAWS = 10_000
 
 
 @dataclass(frozen=True)
 class RaceTrack:
-    """Corners drawn in a square, visited around their middle, joined by cubic Bézier curves.
+    """Corners around a middle, as the racing tasks draw them, joined by cubic Bézier curves.
 
     Figures of the public RoboRAN tracks: 9 to 13 corners in a square of 15 m. At each corner the track runs in the
     direction halfway between the ways in and out.
@@ -45,15 +43,10 @@ class RaceTrack:
 
     def corners(self) -> np.ndarray:
         """Corners in the order of the track, shape (n, 2) [m]."""
-        rng = np.random.Generator(np.random.Philox(key=self.seed))
-        count = int(rng.integers(*self.corner_counts, endpoint=True))
-        for _ in range(_MOST_DRAWS):
-            corners = rng.uniform(-0.5, 0.5, (count, 2))
-            offset = corners - corners.mean(axis=0)
-            corners = corners[np.argsort(np.arctan2(offset[:, 1], offset[:, 0]))]
-            if _is_drivable(corners):
-                return np.asarray(self.size * corners + np.array(self.centre))
-        raise ValueError(f"no track with {count} corners found for seed {self.seed}. Take another seed.")
+        fewest, most = self.corner_counts
+        draws = Draws.of_episode(self.seed, 0)
+        corners, count = draw_corners(draws, fewest=fewest, most=most, size=self.size)
+        return np.asarray(corners[0, : count[0]] + np.array(self.centre))
 
     def points(self, count: int) -> np.ndarray:
         """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
@@ -76,14 +69,3 @@ class RaceTrack:
             return np.asarray(r**3 * a + 3.0 * r * r * s * b + 3.0 * r * s * s * c + s**3 * d)
 
         return along_curve(curve, count, closed=True, centre=self.centre)
-
-
-def _is_drivable(corners: np.ndarray) -> bool:
-    """Corners lie apart, and none turns back on itself."""
-    gaps = np.linalg.norm(corners[:, None] - corners[None], axis=-1) + np.eye(len(corners))
-    way_out = np.roll(corners, -1, axis=0) - corners
-    way_in = np.roll(way_out, 1, axis=0)
-    cos = -np.sum(way_in * way_out, axis=1) / (
-        np.linalg.norm(way_in, axis=1) * np.linalg.norm(way_out, axis=1) + 1e-12
-    )
-    return bool(gaps.min() >= GAP and cos.max() <= math.cos(math.radians(SHARPEST_DEG)))
