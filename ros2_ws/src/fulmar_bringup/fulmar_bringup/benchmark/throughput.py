@@ -1,0 +1,222 @@
+"""How many control steps a second the core's batch makes, beside MuJoCo's own batch rollout.
+
+Both are measured in turns in one process, so that whatever else the machine does slows both; medians count. A step of
+the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward and, where episodes
+end, new ones. A step of MuJoCo is its physics alone, over the same control period; water, which MuJoCo would need a
+callback for, is left out, in MuJoCo's favour.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import mujoco.rollout
+import numpy as np
+from array_api_compat import array_namespace
+
+from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.episode import episode_steps
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import Task
+from sim_nodes.mujoco_model import Scene
+
+DIFFERENT = 16  # batches of random commands, used again and again
+SIMULATED, STRETCH = 64, 10  # robots in one rollout of MuJoCo, and control steps, each with its own command
+SEED = 1
+
+
+@dataclass(frozen=True)
+class Library:
+    """Where the arrays of the batch live."""
+
+    name: str  # numpy or torch
+    device: str = "cpu"  # cpu or cuda
+
+    def namespace(self) -> Any:
+        """The library's module."""
+        if self.name == "numpy":
+            return np
+        import torch
+
+        return torch
+
+    def finish(self) -> None:
+        """Wait until everything is computed."""
+        if self.device != "cpu":
+            import torch
+
+            torch.cuda.synchronize()
+
+    def array(self, values: np.ndarray) -> Array:
+        """Values in single precision, where they are needed."""
+        if self.name == "numpy":
+            return values.astype(np.float32)
+        import torch
+
+        return torch.as_tensor(values, dtype=torch.float32, device=self.device)
+
+    def numbers(self, truths: Array) -> np.ndarray:
+        """Where an array of truth values is true."""
+        return np.flatnonzero(truths if self.name == "numpy" else truths.cpu().numpy())
+
+
+class BatchPace:
+    """The core's batch at random commands, with everything that training asks of a step."""
+
+    def __init__(
+        self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, library: Library
+    ) -> None:
+        """Build the worlds; the first episodes end at random times."""
+        self._robot, self._task, self._library = robot, task, library
+        self._simulation = BatchSimulation(
+            robot,
+            task,
+            scenario,
+            worlds=worlds,
+            seed=SEED,
+            training=True,
+            xp=library.namespace(),
+            device=None if library.name == "numpy" else library.device,
+        )
+        self._horizon = episode_steps(task, self._simulation.control_dt)
+        rng = np.random.default_rng(SEED)
+        self._age = rng.integers(0, self._horizon, worlds)
+        self._commands = [library.array(_random_commands(robot, worlds, rng)) for _ in range(DIFFERENT)]
+        self._scale = library.array(robot.actuators.scale)
+        self._at = 0
+
+    def steps_per_s(self, seconds: float) -> float:
+        """Step for a while; returns how many steps of single worlds were made a second."""
+        worlds, began, count = self._age.size, time.perf_counter(), 0
+        while time.perf_counter() - began < seconds or not count:
+            self._step()
+            count += 1
+        self._library.finish()
+        return count * worlds / (time.perf_counter() - began)
+
+    def _step(self) -> None:
+        simulation, task, robot = self._simulation, self._task, self._robot
+        before, goal, previous = simulation.truth, simulation.goal, simulation.command
+        simulation.step(self._commands[self._at])
+        self._at = (self._at + 1) % DIFFERENT
+        after = simulation.truth
+        xp = array_namespace(after.x)
+        share, old = simulation.command / self._scale, previous / self._scale
+        change = share - old
+        costs = robot.costs.effort * xp.sum(xp.abs(share), axis=1)
+        costs = costs + robot.costs.change * xp.sum(change * change, axis=1)
+        self.reward = task.reward(before, after, goal) - costs
+        self._age += 1
+        ended = self._age >= self._horizon
+        errors, touching = task.errors(after, simulation.goal), task.collides(after, goal, robot)
+        if errors.position is not None:
+            ended[self._library.numbers(errors.position > robot.limits.geofence)] = True
+        if touching is not None:
+            ended[self._library.numbers(touching)] = True
+        self.observation = simulation.observe()
+        over = np.flatnonzero(ended)
+        if over.size:
+            simulation.reset(over)
+            self._age[over] = 0
+            self.observation = simulation.observe()
+
+
+class MujocoPace:
+    """MuJoCo's batch rollout of the same robot at random commands."""
+
+    def __init__(self, robot: Robot, *, threads: int) -> None:
+        """Compile the robot and draw commands.
+
+        Args:
+            robot: The robot.
+            threads: That MuJoCo may use.
+        """
+        scene = Scene(robot)
+        self._model, model, data = scene.model, scene.model, scene.data
+        if robot.hydrodynamics is not None:
+            model.opt.gravity[:] = 0.0  # what water would carry must not sink
+        self._datas = [mujoco.MjData(model) for _ in range(threads)]
+        held = robot.timing.substeps(robot.timing.control_hz) * scene.machine.steps_per_tick
+        rng = np.random.default_rng(SEED)
+        controls = np.empty((SIMULATED * STRETCH, model.nu))
+        for row, command in zip(controls, _random_commands(robot, len(controls), rng), strict=True):
+            scene.machine.drive(model, data, command, np.ones_like(command), (0.0, 0.0, 0.0))
+            row[:] = data.ctrl
+        self._controls = np.repeat(controls.reshape(SIMULATED, STRETCH, -1), held, axis=1)
+        spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        state = np.zeros(mujoco.mj_stateSize(model, spec))
+        mujoco.mj_resetData(model, data)
+        mujoco.mj_getState(model, data, state, spec)
+        self._states = np.tile(state, (SIMULATED, 1))
+
+    def steps_per_s(self, seconds: float) -> float:
+        """Roll out for a while; returns how many control steps of single robots were made a second."""
+        began, count = time.perf_counter(), 0
+        while time.perf_counter() - began < seconds or not count:
+            mujoco.rollout.rollout(
+                self._model, self._datas, self._states, self._controls, persistent_pool=True
+            )
+            count += SIMULATED * STRETCH
+        return count / (time.perf_counter() - began)
+
+
+def measure(
+    robots: list[Robot],
+    task: Task,
+    scenario: Scenario,
+    *,
+    worlds: int,
+    library: Library,
+    threads: int,
+    seconds: float,
+    rounds: int,
+    progress: Callable[[], None] = lambda: None,
+) -> dict[str, dict[str, float]]:
+    """Measure robots one after another.
+
+    Args:
+        robots: Which.
+        task: What the batch plays.
+        scenario: What its worlds are drawn from.
+        worlds: Of the batch, >= 1.
+        library: Of the batch.
+        threads: Of MuJoCo's rollout.
+        seconds: Of each measurement [s].
+        rounds: Measurements of each of the two, in turns.
+        progress: Told after every round.
+
+    Returns:
+        For each robot's name the medians `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`.
+    """
+    found = {}
+    for robot in robots:
+        paces = (
+            BatchPace(robot, task, scenario, worlds=worlds, library=library),
+            MujocoPace(robot, threads=threads),
+        )
+        for pace in paces:
+            pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
+        measured = []
+        for _ in range(rounds):
+            measured.append([pace.steps_per_s(seconds) for pace in paces])
+            progress()
+        batch, simulated = (float(value) for value in np.median(np.array(measured), axis=0))
+        found[robot.name] = {
+            "batch_steps_per_s": batch,
+            "mujoco_steps_per_s": simulated,
+            "ratio": batch / simulated,
+        }
+    return found
+
+
+def _random_commands(robot: Robot, count: int, rng: np.random.Generator) -> np.ndarray:
+    actuators = robot.actuators
+    return np.asarray(
+        actuators.limited(rng.uniform(-1.0, 1.0, (count, len(actuators.names))) * actuators.scale)
+    )

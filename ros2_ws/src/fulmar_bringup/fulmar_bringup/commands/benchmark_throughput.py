@@ -1,0 +1,121 @@
+"""`fulmar benchmark throughput`: how fast the batch simulates, beside MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fulmar_bringup.commands.arguments import JsonOption, ScenarioOption, TaskOption
+from fulmar_bringup.console import output, print_json
+from fulmar_bringup.progress import step_bar
+from fulmar_core.errors import ConfigError, UnknownNameError
+
+DEVICES, LIBRARIES = ("cpu", "cuda"), ("numpy", "torch")
+ROUNDS = 5
+
+
+def throughput(
+    robots: Annotated[
+        str | None,
+        typer.Option(metavar="R,...", help="Names with commas between; all by default."),
+    ] = None,
+    device: Annotated[
+        str, typer.Option(metavar="cpu|cuda", help="Where the batch is computed; cuda needs torch.")
+    ] = "cpu",
+    library: Annotated[
+        str | None,
+        typer.Option(metavar="numpy|torch", help="Array library of the batch; numpy on cpu, torch on cuda."),
+    ] = None,
+    worlds: Annotated[int, typer.Option(metavar="N", min=1, help="Worlds of the batch.")] = 4096,
+    task: TaskOption = "go_to_pose",
+    scenario: ScenarioOption = "randomised",
+    threads: Annotated[int, typer.Option(metavar="N", min=1, help="Threads of MuJoCo's rollout.")] = 2,
+    seconds: Annotated[
+        float, typer.Option(metavar="S", min=0.05, help="Time of each of the measurements [s].")
+    ] = 1.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
+
+    A step of the batch has all that training asks for: disturbances, odometry, observation, reward and new episodes.
+    MuJoCo's is physics alone. Both are measured in turns in this run; the medians are printed.
+
+    Try:
+
+    fulmar benchmark throughput --robots kingfisher,turtlebot2 --json
+    """
+    from fulmar_bringup.extras import require
+    from fulmar_core.disturbances.scenario import load_scenario
+    from fulmar_core.paths import config_names
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+
+    library = library or ("numpy" if device == "cpu" else "torch")
+    for kind, name, known in (("device", device, DEVICES), ("library", library, LIBRARIES)):
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    names = config_names("robots") if robots is None else [name.strip() for name in robots.split(",")]
+    chosen = [load_robot(name) for name in names]
+    the_task, the_scenario = load_task(task), load_scenario(scenario)
+    require("mujoco", *(["torch"] if library == "torch" else []))
+    _check_device(device, library)
+    from fulmar_bringup.benchmark.throughput import Library, measure
+
+    with step_bar("measuring", len(chosen) * ROUNDS) as progress:
+        done = iter(range(1, len(chosen) * ROUNDS + 1))
+        found = measure(
+            chosen,
+            the_task,
+            the_scenario,
+            worlds=worlds,
+            library=Library(library, device),
+            threads=threads,
+            seconds=seconds,
+            rounds=ROUNDS,
+            progress=lambda: progress(next(done)),
+        )
+    figures: dict[str, Any] = {
+        "robots": found,
+        "worlds": worlds,
+        "library": library,
+        "device": device,
+        "task": task,
+        "scenario": scenario,
+        "mujoco_threads": threads,
+    }
+    if as_json:
+        print_json(figures)
+    else:
+        _print(figures)
+
+
+def _check_device(device: str, library: str) -> None:
+    """Refuse devices that the library or the machine does not have."""
+    if device != "cuda":
+        return
+    if library != "torch":
+        raise ConfigError("--device cuda needs --library torch.")
+    import torch
+
+    if not torch.cuda.is_available():
+        raise ConfigError("--device cuda: torch sees no graphics card here.")
+
+
+def _print(figures: dict[str, Any]) -> None:
+    table = Table(
+        title=f"{figures['worlds']:,} worlds · {figures['task']} · {figures['scenario']} · "
+        f"{figures['library']} on {figures['device']}"
+    )
+    table.add_column("robot")
+    for column in ("batch [steps/s]", f"MuJoCo, {figures['mujoco_threads']} threads [steps/s]", "ratio"):
+        table.add_column(column, justify="right")
+    for name, found in figures["robots"].items():
+        table.add_row(
+            name,
+            f"{found['batch_steps_per_s']:,.0f}",
+            f"{found['mujoco_steps_per_s']:,.0f}",
+            f"{found['ratio']:.1f}",
+        )
+    output.print(table)
