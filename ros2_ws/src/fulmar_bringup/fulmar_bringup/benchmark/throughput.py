@@ -1,16 +1,19 @@
 """How many control steps a second the core's batch makes, beside MuJoCo's own batch rollout.
 
-Both are measured in turns in one process, so that whatever else the machine does slows both; medians count. A step of
-the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward and, where episodes
-end, new ones. A step of MuJoCo is its physics alone, over the same control period; water, which MuJoCo would need a
-callback for, is left out, in MuJoCo's favour.
+Both are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
+count. A step of the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward
+and, where episodes end, new ones; worlds are shared out among processes. A step of MuJoCo is its physics alone, over
+the same control period; MuJoCo's own drag in a fluid stands for the water, which it would need a callback for.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from typing import Any
 
 import mujoco
@@ -44,6 +47,10 @@ class Library:
             return np
         import torch
 
+        if self.device == "cpu":
+            torch.set_num_threads(
+                1
+            )  # worlds are shared out among processes; threads would only wait for each other
         return torch
 
     def finish(self) -> None:
@@ -70,9 +77,9 @@ class BatchPace:
     """The core's batch at random commands, with everything that training asks of a step."""
 
     def __init__(
-        self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, library: Library
+        self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, library: Library, first: int = 0
     ) -> None:
-        """Build the worlds; the first episodes end at random times."""
+        """Build the worlds, numbered from `first` on; the first episodes end at random times."""
         self._robot, self._task, self._library = robot, task, library
         self._simulation = BatchSimulation(
             robot,
@@ -80,6 +87,7 @@ class BatchPace:
             scenario,
             worlds=worlds,
             seed=SEED,
+            first=first,
             training=True,
             xp=library.namespace(),
             device=None if library.name == "numpy" else library.device,
@@ -127,6 +135,59 @@ class BatchPace:
             self.observation = simulation.observe()
 
 
+class SharedPace:
+    """Some processes that each step their share of the worlds at the same time."""
+
+    def __init__(self, processes: int) -> None:
+        """Start them; they wait for `take`."""
+        context = multiprocessing.get_context("spawn")
+        self._pipes, self._processes = [], []
+        for _ in range(processes):
+            ours, theirs = context.Pipe()
+            self._pipes.append(ours)
+            self._processes.append(context.Process(target=_serve, args=(theirs,), daemon=True))
+            self._processes[-1].start()
+            theirs.close()
+
+    def take(self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, library: Library) -> None:
+        """Share out the worlds of another robot."""
+        bounds = np.linspace(0, worlds, len(self._pipes) + 1).astype(int)
+        for pipe, first, last in zip(self._pipes, bounds, bounds[1:], strict=False):
+            pipe.send((robot, task, scenario, int(last - first), library, int(first)))
+        for pipe in self._pipes:
+            pipe.recv()
+
+    def steps_per_s(self, seconds: float) -> float:
+        """Step for a while; returns how many steps of single worlds were made a second by all together."""
+        for pipe in self._pipes:
+            pipe.send(seconds)
+        return sum(pipe.recv() for pipe in self._pipes)
+
+    def close(self) -> None:
+        """Let the processes end."""
+        for pipe in self._pipes:
+            pipe.close()
+        for process in self._processes:
+            process.join()
+
+
+def _serve(pipe: Connection) -> None:
+    """What a process does: build worlds, or step them, as it is told."""
+    pace: BatchPace | None = None
+    while True:
+        try:
+            order = pipe.recv()
+        except EOFError:
+            return
+        if isinstance(order, float):
+            assert pace is not None
+            pipe.send(pace.steps_per_s(order))
+        else:
+            robot, task, scenario, worlds, library, first = order
+            pace = BatchPace(robot, task, scenario, worlds=worlds, library=library, first=first)
+            pipe.send(None)
+
+
 class MujocoPace:
     """MuJoCo's batch rollout of the same robot at random commands."""
 
@@ -141,6 +202,7 @@ class MujocoPace:
         self._model, model, data = scene.model, scene.model, scene.data
         if robot.hydrodynamics is not None:
             model.opt.gravity[:] = 0.0  # what water would carry must not sink
+            model.opt.density, model.opt.viscosity = robot.hydrodynamics.hydrostatics.water_density, 1e-3
         self._datas = [mujoco.MjData(model) for _ in range(threads)]
         held = robot.timing.substeps(robot.timing.control_hz) * scene.machine.steps_per_tick
         rng = np.random.default_rng(SEED)
@@ -173,7 +235,7 @@ def measure(
     *,
     worlds: int,
     library: Library,
-    threads: int,
+    cores: int,
     seconds: float,
     rounds: int,
     progress: Callable[[], None] = lambda: None,
@@ -186,7 +248,7 @@ def measure(
         scenario: What its worlds are drawn from.
         worlds: Of the batch, >= 1.
         library: Of the batch.
-        threads: Of MuJoCo's rollout.
+        cores: Processes of the batch, and threads of MuJoCo's rollout.
         seconds: Of each measurement [s].
         rounds: Measurements of each of the two, in turns.
         progress: Told after every round.
@@ -195,23 +257,28 @@ def measure(
         For each robot's name the medians `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`.
     """
     found = {}
-    for robot in robots:
-        paces = (
-            BatchPace(robot, task, scenario, worlds=worlds, library=library),
-            MujocoPace(robot, threads=threads),
-        )
-        for pace in paces:
-            pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
-        measured = []
-        for _ in range(rounds):
-            measured.append([pace.steps_per_s(seconds) for pace in paces])
-            progress()
-        batch, simulated = (float(value) for value in np.median(np.array(measured), axis=0))
-        found[robot.name] = {
-            "batch_steps_per_s": batch,
-            "mujoco_steps_per_s": simulated,
-            "ratio": batch / simulated,
-        }
+    with ExitStack() as stack:
+        shared = None
+        if library.device == "cpu" and cores > 1:
+            shared = SharedPace(min(cores, worlds))
+            stack.callback(shared.close)
+        for robot in robots:
+            if shared is not None:
+                shared.take(robot, task, scenario, worlds=worlds, library=library)
+            batch = shared or BatchPace(robot, task, scenario, worlds=worlds, library=library)
+            paces = batch, MujocoPace(robot, threads=cores)
+            for pace in paces:
+                pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
+            measured = []
+            for _ in range(rounds):
+                measured.append([pace.steps_per_s(seconds) for pace in paces])
+                progress()
+            ours, theirs = (float(value) for value in np.median(np.array(measured), axis=0))
+            found[robot.name] = {
+                "batch_steps_per_s": ours,
+                "mujoco_steps_per_s": theirs,
+                "ratio": ours / theirs,
+            }
     return found
 
 

@@ -31,7 +31,9 @@ def throughput(
     worlds: Annotated[int, typer.Option(metavar="N", min=1, help="Worlds of the batch.")] = 4096,
     task: TaskOption = "go_to_pose",
     scenario: ScenarioOption = "randomised",
-    threads: Annotated[int, typer.Option(metavar="N", min=1, help="Threads of MuJoCo's rollout.")] = 2,
+    cores: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Processes of the batch, and threads of MuJoCo's rollout.")
+    ] = 2,
     seconds: Annotated[
         float, typer.Option(metavar="S", min=0.05, help="Time of each of the measurements [s].")
     ] = 1.0,
@@ -40,7 +42,7 @@ def throughput(
     """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
 
     A step of the batch has all that training asks for: disturbances, odometry, observation, reward and new episodes.
-    MuJoCo's is physics alone. Both are measured in turns in this run; the medians are printed.
+    MuJoCo's is physics alone. Both are measured in turns in this run, on the same cores; the medians are printed.
 
     Try:
 
@@ -71,7 +73,7 @@ def throughput(
             the_scenario,
             worlds=worlds,
             library=Library(library, device),
-            threads=threads,
+            cores=cores,
             seconds=seconds,
             rounds=ROUNDS,
             progress=lambda: progress(next(done)),
@@ -83,7 +85,7 @@ def throughput(
         "device": device,
         "task": task,
         "scenario": scenario,
-        "mujoco_threads": threads,
+        "cores": cores,
     }
     if as_json:
         print_json(figures)
@@ -106,10 +108,10 @@ def _check_device(device: str, library: str) -> None:
 def _print(figures: dict[str, Any]) -> None:
     table = Table(
         title=f"{figures['worlds']:,} worlds · {figures['task']} · {figures['scenario']} · "
-        f"{figures['library']} on {figures['device']}"
+        f"{figures['library']} on {figures['device']} · {figures['cores']} cores"
     )
     table.add_column("robot")
-    for column in ("batch [steps/s]", f"MuJoCo, {figures['mujoco_threads']} threads [steps/s]", "ratio"):
+    for column in ("batch, steps/s", "MuJoCo, steps/s", "ratio"):
         table.add_column(column, justify="right")
     for name, found in figures["robots"].items():
         table.add_row(

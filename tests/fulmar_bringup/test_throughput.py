@@ -1,0 +1,95 @@
+"""What `fulmar benchmark throughput` measures, on batches too small to measure well."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+
+pytest.importorskip("mujoco")
+
+from fulmar_bringup.benchmark.throughput import BatchPace, Library, MujocoPace, SharedPace
+from fulmar_bringup.commands.benchmark_throughput import throughput
+
+BOAT, TASK, RANDOMISED = load_robot("kingfisher"), load_task("go_to_pose"), load_scenario("randomised")
+NUMPY = Library("numpy")
+
+
+@pytest.fixture(scope="module")
+def command():
+    app = typer.Typer()
+    app.command()(throughput)
+    return lambda *words: CliRunner().invoke(app, words)
+
+
+@pytest.mark.parametrize("cores", ["1", "2"])
+def test_the_json_has_both_paces_of_each_robot_and_their_ratio(command, cores):
+    done = command(
+        "--robots", "kingfisher,turtlebot2", "--worlds", "16", "--seconds", "0.05", "--cores", cores, "--json"
+    )
+    assert done.exit_code == 0, done.output
+    figures = json.loads(done.stdout)
+    assert set(figures["robots"]) == {"kingfisher", "turtlebot2"}
+    for found in figures["robots"].values():
+        assert found["batch_steps_per_s"] > 0.0
+        assert found["ratio"] == pytest.approx(found["batch_steps_per_s"] / found["mujoco_steps_per_s"])
+    assert (figures["worlds"], figures["scenario"], figures["cores"]) == (16, "randomised", int(cores))
+
+
+def test_without_json_a_table_is_printed(command):
+    done = command("--robots", "jetbot", "--worlds", "8", "--seconds", "0.05", "--cores", "1")
+    assert "jetbot" in done.stdout
+    assert "ratio" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (("--device", "tpu"), UnknownNameError),
+        (("--library", "jax"), UnknownNameError),
+        (("--device", "cuda", "--library", "numpy"), ConfigError),
+        (("--robots", "kingfischer"), ConfigError),
+    ],
+)
+def test_what_does_not_exist_is_refused(command, words, error):
+    assert isinstance(command(*words).exception, error)
+
+
+def test_without_a_graphics_card_cuda_is_refused_in_words(command):
+    torch = pytest.importorskip("torch")
+    if torch.cuda.is_available():
+        pytest.skip("there is a graphics card")
+    assert "graphics card" in str(command("--device", "cuda").exception)
+
+
+def test_a_step_of_the_batch_observes_rewards_and_begins_new_episodes():
+    pace = BatchPace(BOAT, TASK, RANDOMISED, worlds=300, library=NUMPY)
+    begun = pace._simulation._repeats.sum()
+    pace.steps_per_s(0.2)
+    assert np.isfinite(pace.reward).all()
+    assert np.isfinite(pace.observation).all()
+    assert pace._simulation._repeats.sum() > begun
+
+
+def test_shared_worlds_are_shared_out_and_give_one_pace():
+    shared = SharedPace(2)
+    try:
+        shared.take(BOAT, TASK, RANDOMISED, worlds=9, library=NUMPY)
+        assert shared.steps_per_s(0.05) > 0.0
+    finally:
+        shared.close()
+
+
+@pytest.mark.parametrize("name", ["floating_platform", "kingfisher", "leatherback"])
+def test_mujoco_rolls_out_robots_that_move(name):
+    pace = MujocoPace(load_robot(name), threads=1)
+    assert pace.steps_per_s(0.01) > 0.0
+    assert np.ptp(pace._controls, axis=(0, 1)).max() > 0.0
