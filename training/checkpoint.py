@@ -79,6 +79,16 @@ def load_checkpoint(
         raise ConfigError(f"{path}: no checkpoint to resume from ({error.strerror}).") from error
     except Exception as error:  # pickle raises whatever its reader stumbles over
         raise ConfigError(f"{path}: is no checkpoint ({type(error).__name__}).") from error
+    try:
+        return _restored(content, settings, worlds), content["more"]
+    except (LookupError, AttributeError, TypeError, ValueError, RuntimeError, AssertionError) as error:
+        raise ConfigError(
+            f"{path}: was written by another version of Fulmar, or for another robot or task "
+            f"({type(error).__name__}: {str(error)[:80]}). Begin again in another folder."
+        ) from error
+
+
+def _restored(content: dict[str, Any], settings: Algorithm, worlds: BatchVecEnv) -> BaseAlgorithm:
     normaliser: VecNormalize = content["normaliser"]
     worlds.reset()
     worlds.set_state(content["worlds"])
@@ -96,4 +106,4 @@ def load_checkpoint(
     random.setstate(python)
     np.random.set_state(numpy)
     torch.set_rng_state(pytorch)
-    return learner, content["more"]
+    return learner

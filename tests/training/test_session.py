@@ -153,6 +153,14 @@ def test_a_run_folder_holds_settings_curves_and_a_checkpoint(tmp_path, quick_jud
     assert (tmp_path / CHECKPOINT_FILE).is_file()
 
 
+def test_a_checkpoint_of_another_version_is_refused_in_words(tmp_path, quick_judge, monkeypatch):
+    settings = small("differential_drive")
+    train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=1)
+    monkeypatch.setattr(BatchVecEnv, "set_state", lambda self, state: state["something newer"])
+    with pytest.raises(ConfigError, match=r"written by another version of Fulmar.*something newer"):
+        train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=2, resume=True)
+
+
 @pytest.mark.parametrize("content", [None, b"nothing of ours"])
 def test_there_must_be_a_checkpoint_to_resume_from(tmp_path, content):
     if content is not None:
