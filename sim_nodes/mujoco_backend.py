@@ -6,13 +6,12 @@ import mujoco
 import numpy as np
 
 from fulmar_core.backend import Sample
-from fulmar_core.counter_rng import NOISE
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.dynamics.pushing import Block
 from fulmar_core.episode import Episode
 from fulmar_core.errors import SafetyError
 from fulmar_core.robot import Robot
-from fulmar_core.sensors.imu import ImuSample, measure_imu
+from fulmar_core.sensors.imu import ImuSample, InertialUnit
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.push_block import PushBlock
@@ -36,7 +35,7 @@ class MujocoBackend:
         """
         self.robot = robot
         self._noisy, self._block = sensor_noise, block
-        self._rng = np.random.default_rng()
+        self._unit = InertialUnit(robot.sensors.imu)
         self._world = OneWorld(robot, noisy=sensor_noise)
         self._enter(Scene(robot, block=block))
 
@@ -67,7 +66,7 @@ class MujocoBackend:
         mujoco.mj_resetData(scene.model, scene.data)
         machine.place(scene.model, scene.data, episode.start)
         scene.place_things(episode.goal)
-        self._rng = np.random.default_rng((seed, number, NOISE))
+        self._unit.reset(seed, number)
         truth, imu = self._read()
         return self._sample(truth, imu, self._world.reset(episode, truth, seed=seed, number=number))
 
@@ -122,5 +121,5 @@ class MujocoBackend:
     def _sample(self, truth: RigidBodyState, imu: ImuSample, odometry: RigidBodyState) -> Sample:
         self._truth = truth
         if self._noisy:
-            imu = measure_imu(imu, self.robot.sensors.imu, self._rng)
+            imu = self._unit.measure(imu, self.data.time)
         return Sample(odometry, imu, truth, self._scene.block_place)

@@ -61,7 +61,7 @@ def test_limits_and_noises_have_to_mean_something():
     with pytest.raises(ValueError, match="greater than 0"):
         Limits(0.0, 1.0, 1.0)
     with pytest.raises(ValueError, match="must not be negative"):
-        ImuSpec(-1.0, 0.0)
+        ImuSpec(rate_hz=-1.0)
     with pytest.raises(ValueError, match="must not be negative"):
         Channel(std=-0.1)
     with pytest.raises(ValueError, match="must not be negative"):

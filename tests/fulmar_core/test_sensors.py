@@ -11,7 +11,6 @@ from fulmar_core.counter_rng import WORLD, Draws
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import load_robot
-from fulmar_core.sensors.imu import ImuSample, ImuSpec, measure_imu
 from fulmar_core.sensors.odometer import Channel, Odometer, OdometrySpec
 
 MANY = 20_000  # the sample deviation is then within 0.5 % of the true one (one sigma); we allow 3 %
@@ -178,21 +177,3 @@ def test_channels_and_rates_without_meaning_are_refused():
         Channel(quantum=-1.0)
     with pytest.raises(ValueError, match="must not be negative"):
         OdometrySpec(delay_s=-0.1)
-
-
-def test_the_inertial_unit_adds_its_two_noises_to_the_truth():
-    truth = ImuSample(np.array([0.0, 0.0, 9.81]), np.array([0.0, 0.0, 0.1]))
-    rng = np.random.default_rng(5)
-    samples = [measure_imu(truth, ImuSpec(0.02, 0.003), rng) for _ in range(4000)]
-    force = np.array([s.specific_force for s in samples]) - truth.specific_force
-    turn = np.array([s.angular_velocity for s in samples]) - truth.angular_velocity
-    assert force.std() == pytest.approx(0.02, rel=0.03)  # 12,000 numbers: one sigma is 0.65 %
-    assert turn.std() == pytest.approx(0.003, rel=0.03)
-    assert abs(np.corrcoef(force[:, 0], turn[:, 0])[0, 1]) < 0.06  # four sigma of independent noises
-
-
-def test_an_inertial_unit_without_noise_tells_the_truth():
-    truth = ImuSample(np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]))
-    measured = measure_imu(truth, ImuSpec(0.0, 0.0), np.random.default_rng(6))
-    assert measured.specific_force.tolist() == [1.0, 2.0, 3.0]
-    assert measured.angular_velocity.tolist() == [4.0, 5.0, 6.0]

@@ -99,8 +99,8 @@ class ImuWriter:
         self._message.header.frame_id = "imu_link"
         self._message.orientation_covariance[0] = UNKNOWN
         spec = robot.sensors.imu
-        self._message.linear_acceleration_covariance = np.eye(3).ravel() * spec.accelerometer_std**2
-        self._message.angular_velocity_covariance = np.eye(3).ravel() * spec.gyroscope_std**2
+        self._message.linear_acceleration_covariance = np.eye(3).ravel() * spec.accelerometer.std**2
+        self._message.angular_velocity_covariance = np.eye(3).ravel() * spec.gyroscope.std**2
 
     def write(self, sample: ImuSample, time_ns: int) -> Imu:
         """Fill the message; it is overwritten by the next call."""
