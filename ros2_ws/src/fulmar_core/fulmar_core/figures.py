@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 
 
@@ -43,6 +44,17 @@ FIGURES = {
     ),
     "time_to_first_goal_s": Figure(
         "time to first goal", "s", "Time at which the first waypoint is reached.", "less"
+    ),
+    "goals_bound": Figure(
+        "goals bound",
+        "",
+        "The most waypoints that physics allows in this very episode; which bound is told beside it.",
+    ),
+    "share_of_bound": Figure(
+        "share of the bound",
+        "-",
+        "Goals reached over the bound of the same episode; required shares are judged on its mean.",
+        "more",
     ),
     "velocity_error_m_s": Figure(
         "velocity error",
@@ -100,3 +112,22 @@ FIGURES = {
         "more",
     ),
 }
+
+
+SUCCESS = (
+    "Share of episodes that stayed inside every tolerance of the task for the whole closing window (4 s unless its "
+    "file says otherwise), or, where waypoints are counted, reached as many as the task requires; and that touched "
+    "nothing."
+)
+
+
+def meanings(width: int = 78) -> str:
+    """Every figure with its meaning, for a terminal that wide."""
+    indent = 2 + max(map(len, FIGURES))
+    return "\n".join(
+        textwrap.fill(meaning, width, initial_indent=f"{name:<{indent}}", subsequent_indent=" " * indent)
+        for name, meaning in [
+            ("success_rate", SUCCESS),
+            *((name, figure.meaning) for name, figure in FIGURES.items()),
+        ]
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -23,11 +22,14 @@ from fulmar_bringup.console import output, print_json
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
 from fulmar_core.episode import JUDGE_SEED, episode_steps
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.metrics import Trajectories
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.figures import FIGURES, meanings
 
 WAYS = ("batch", "mujoco", "ros")
-Progress = Callable[[int], None]
+EPILOG = f"""\b
+What the figures mean. Of all but the first: mean, median and 95th percentile over the episodes.
+{meanings()}
+"""
 
 
 def evaluate(
@@ -52,6 +54,17 @@ def evaluate(
         int | None,
         typer.Option(metavar="N", min=1, help="Pairs of processes through ros; one for each core."),
     ] = None,
+    episode_s: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=0.01, help="Length of an episode [s]; the task's own by default."),
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="The same, as a number of control steps.")
+    ] = None,
+    worlds: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Episodes at once in the batch; no figure depends on it."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Judge a controller over many episodes and print every figure.
@@ -62,13 +75,16 @@ def evaluate(
     Try:
 
     fulmar evaluate floating_platform go_to_pose --controller lqr --through ros
+
+    fulmar evaluate turtlebot2 go_through_positions --through batch --episodes 4096 --steps 1000
     """
+    from fulmar_bringup.evaluation import Trial, evaluate_trial
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, modules_of
     from fulmar_core.disturbances.scenario import load_scenario
-    from fulmar_core.metrics import summary
     from fulmar_core.robot import load_robot
+    from fulmar_core.rollout import WORLDS
     from fulmar_core.tasks import load_task
 
     if through not in WAYS:
@@ -77,6 +93,12 @@ def evaluate(
     the_robot, the_task = load_robot(robot), load_task(task)
     load_scenario(scenario)  # so that a wrong name is told before anything is started
     hz = checked_rate(the_robot, control_hz or the_robot.timing.control_hz)
+    if episode_s is not None and steps is not None:
+        raise ConfigError("--episode-s and --steps say the same thing. Give one of them.")
+    if worlds is not None and through != "batch":
+        raise ConfigError("--worlds belongs to --through batch.")
+    control_dt = the_robot.timing.substeps(hz) * the_robot.timing.physics_dt
+    duration_s = episode_s or (steps * control_dt if steps else the_task.episode_s)
     policy = chosen_policy(controller, policy, the_robot, the_task, hz)
     require(*modules_of(controller, "mock" if through == "batch" else "mujoco"))
     plan = RunPlan(
@@ -88,11 +110,13 @@ def evaluate(
         policy=str(policy.absolute()) if policy else "",
         scenario=scenario,
         seed=seed,
+        duration_s=duration_s,
         lockstep=True,
     )
+    trial = Trial(plan, through, episodes, worlds or WORLDS, jobs or _cores())
     began = time.monotonic()
-    with step_bar("judging", episodes * episode_steps(the_task, 1.0 / hz)) as progress:
-        run = _roll_out(plan, through, episodes, jobs or _cores(), progress)
+    with step_bar("judging", episodes * episode_steps(trial.task, control_dt)) as progress:
+        judged = evaluate_trial(trial, progress)
     wall_s = time.monotonic() - began
     figures = {
         "robot": robot,
@@ -102,44 +126,15 @@ def evaluate(
         "scenario": scenario,
         "seed": seed,
         "control_hz": hz,
-        **summary(run, the_task),
+        "episode_s": duration_s,
+        **judged,
         "wall_s": wall_s,
-        "steps_per_s": run.position_error.size / wall_s,
+        "steps_per_s": judged["control_steps"] / wall_s,
     }
     if as_json:
         print_json(figures)
     else:
         _print(figures)
-
-
-def _roll_out(plan: RunPlan, through: str, episodes: int, jobs: int, progress: Progress) -> Trajectories:
-    from fulmar_bringup.system import CONTROLLERS
-    from fulmar_core.disturbances.scenario import load_scenario
-    from fulmar_core.robot import load_robot
-    from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
-    from fulmar_core.tasks import load_task
-
-    if through == "ros":
-        from fulmar_bringup.ros_evaluation import roll_out_through_ros
-
-        return roll_out_through_ros(plan, episodes=episodes, jobs=jobs, progress=progress)
-    robot, task, scenario = load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario)
-    controller = CONTROLLERS[plan.controller].load(robot, task, plan.control_hz, plan.policy)
-    if through == "batch":
-        return roll_out_in_batch(
-            controller, robot, task, scenario, episodes=episodes, seed=plan.seed, progress=progress
-        )
-    from sim_nodes.mujoco_backend import MujocoBackend
-
-    return roll_out_in_backends(
-        controller,
-        lambda: MujocoBackend(robot, sensor_noise=scenario.sensor_noise),
-        task,
-        scenario,
-        episodes=episodes,
-        seed=plan.seed,
-        progress=progress,
-    )
 
 
 def _cores() -> int:
@@ -154,13 +149,16 @@ def _print(figures: dict[str, Any]) -> None:
     for column in ("", "mean", "median", "p95"):
         table.add_column(column, justify="left" if not column else "right")
     for name, value in figures.items():
-        if isinstance(value, dict):
+        if name in FIGURES:
             numbers = (
                 "–" if value[key] is None else f"{value[key]:.3f}" for key in ("mean", "median", "p95")
             )
             table.add_row(name, *numbers)
     output.print(table)
+    if "bound" in figures:
+        output.print(f"bound on goals: {figures['bound']}", markup=False)
     output.print(
-        f"success {figures['success_rate']:.3f} of {figures['episodes']} episodes (seed {figures['seed']}) "
-        f"through {figures['through']}; {figures['wall_s']:.1f} s, {figures['steps_per_s']:,.0f} steps/s"
+        f"success {figures['success_rate']:.3f} of {figures['episodes']} episodes of {figures['episode_s']:g} s "
+        f"(seed {figures['seed']}) through {figures['through']}; {figures['wall_s']:.1f} s, "
+        f"{figures['steps_per_s']:,.0f} steps/s"
     )

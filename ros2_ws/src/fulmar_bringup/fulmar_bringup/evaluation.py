@@ -1,0 +1,156 @@
+"""One controller judged over many episodes, in one of three ways; what `evaluate` and `benchmark` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fulmar_bringup.node_table import RunPlan
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import Episode, draw_episodes
+from fulmar_core.metrics import Trajectories, episode_metrics, successes, summarise
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.rollout import WORLDS, batches, roll_out_in_backends
+from fulmar_core.tasks import Task, load_task
+from fulmar_core.waypoint_score import shares_of_bound, waypoint_bound
+
+WAYS = ("batch", "mujoco", "ros")
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What to judge, and how."""
+
+    plan: RunPlan  # robot, task, controller, rate, scenario, seed; its duration is the length of an episode
+    through: str  # one of WAYS
+    episodes: int
+    worlds: int = WORLDS  # of a batch at once
+    jobs: int = 1  # pairs of processes, through ros
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return load_robot(self.plan.robot)
+
+    @property
+    def task(self) -> Task:
+        """The task, with the length of its episodes."""
+        task = load_task(self.plan.task)
+        return replace(task, episode_s=self.plan.duration_s) if self.plan.duration_s else task
+
+    def controller(self) -> Controller:
+        """The controller, made anew."""
+        from fulmar_bringup.system import CONTROLLERS
+
+        plan = self.plan
+        return CONTROLLERS[plan.controller].load(self.robot, self.task, plan.control_hz, plan.policy)
+
+    def drawn(self, numbers: np.ndarray) -> Episode:
+        """What the episodes of some numbers begin with."""
+        scenario = load_scenario(self.plan.scenario)
+        return draw_episodes(self.robot, self.task, scenario, seed=self.plan.seed, numbers=numbers)
+
+
+def runs_of(trial: Trial, progress: Progress = lambda steps: None) -> Iterator[Trajectories]:
+    """Run the episodes of a trial, in their order.
+
+    Args:
+        trial: What to run.
+        progress: Told how many control steps have been done.
+
+    Yields:
+        What happened, for the next so many episodes.
+
+    Raises:
+        ConfigError: An episode is shorter than one control step.
+        RunFailed: Through ros, the controller ended or refused to start.
+        LockstepError: Through ros, it did not answer in time.
+    """
+    plan, task = trial.plan, trial.task
+    if trial.through == "ros":
+        from fulmar_bringup.ros_evaluation import roll_out_through_ros
+
+        yield roll_out_through_ros(plan, episodes=trial.episodes, jobs=trial.jobs, progress=progress)
+        return
+    robot, scenario, controller = trial.robot, load_scenario(plan.scenario), trial.controller()
+    if trial.through == "batch":
+        yield from batches(
+            controller,
+            robot,
+            task,
+            scenario,
+            episodes=trial.episodes,
+            seed=plan.seed,
+            worlds=trial.worlds,
+            progress=progress,
+        )
+        return
+    from sim_nodes.mujoco_backend import MujocoBackend
+
+    yield roll_out_in_backends(
+        controller,
+        lambda: MujocoBackend.of(robot, task, scenario),
+        task,
+        scenario,
+        episodes=trial.episodes,
+        seed=plan.seed,
+        progress=progress,
+    )
+
+
+class Tally:
+    """Figures of episodes, gathered run by run: of a step nothing is kept."""
+
+    def __init__(self, task: Task) -> None:
+        """Begin empty."""
+        self._task = task
+        self._succeeded: list[np.ndarray] = []
+        self._figures: list[dict[str, np.ndarray]] = []
+        self.steps = 0
+
+    def add(self, run: Trajectories) -> None:
+        """Judge some more episodes."""
+        self._succeeded.append(successes(run, self._task))
+        self._figures.append(episode_metrics(run, self._task))
+        self.steps += run.x.size
+
+    @property
+    def succeeded(self) -> np.ndarray:
+        """Which episodes succeeded, shape (episodes,)."""
+        return np.concatenate(self._succeeded)
+
+    @property
+    def figures(self) -> dict[str, np.ndarray]:
+        """Every figure of every episode, shapes (episodes,)."""
+        return {
+            name: np.concatenate([figures[name] for figures in self._figures]) for name in self._figures[0]
+        }
+
+
+def evaluate_trial(trial: Trial, progress: Progress = lambda steps: None) -> dict[str, Any]:
+    """Run and judge a trial; arguments and errors as in `runs_of`.
+
+    Returns:
+        Success rate and every figure, JSON-ready. Where waypoints are counted, also what physics allows: `bound`, the
+        rule in words, and the shares of it.
+    """
+    tally = Tally(trial.task)
+    for run in runs_of(trial, progress):
+        tally.add(run)
+    figures = tally.figures
+    more: dict[str, Any] = {}
+    bound = waypoint_bound(
+        trial.robot, trial.task, trial.drawn(np.arange(trial.episodes)), trial.task.episode_s
+    )
+    if bound is not None:
+        figures["goals_bound"] = bound.goals
+        figures["share_of_bound"] = shares_of_bound(figures["goals_reached"], bound.goals)
+        most = float(np.mean(bound.goals))
+        share = float(np.mean(figures["goals_reached"])) / most if most > 0.0 else None
+        more = {"bound": bound.rule, "share_of_mean_bound": share}
+    return {**summarise(tally.succeeded, figures), **more, "control_steps": tally.steps}
