@@ -9,9 +9,11 @@ from types import FrameType
 
 import typer
 
+from fulmar_bringup.commands.benchmark import benchmark
 from fulmar_bringup.commands.bundle import bundle
 from fulmar_bringup.commands.demo import demo
 from fulmar_bringup.commands.doctor import doctor
+from fulmar_bringup.commands.evaluate import EPILOG as MEANINGS
 from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
 from fulmar_bringup.commands.list import list_names
@@ -37,7 +39,8 @@ app.command("list")(list_names)
 app.command()(run)
 app.command()(train)
 app.command()(export)
-app.command()(evaluate)
+app.command(epilog=MEANINGS)(evaluate)
+app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
 app.command()(report)
 app.command()(demo)

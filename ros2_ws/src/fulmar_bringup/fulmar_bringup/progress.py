@@ -45,6 +45,22 @@ def time_bar(what: str, total_s: float) -> contextlib.AbstractContextManager[Cal
 
 
 @contextlib.contextmanager
+def work_bar(what: str) -> Iterator[Callable[[float, float], None]]:
+    """Show progress through work of several kinds.
+
+    Args:
+        what: One word for the work.
+
+    Returns:
+        A context that gives a function to call with what is done so far, and of how much.
+    """
+    columns = (TextColumn(what), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=max(total, 1e-9))
+
+
+@contextlib.contextmanager
 def _bar(what: str, total: float, *more: ProgressColumn) -> Iterator[Callable[[float], None]]:
     columns = (TextColumn(what), BarColumn(), *more)
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:

@@ -1,0 +1,145 @@
+"""Which pairs are judged, with which controllers, and what their outcomes depend on."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import fulmar_core
+import policy_server
+import sim_nodes
+from fulmar_bringup.benchmark.unit import Unit
+from fulmar_bringup.evaluation import Trial
+from fulmar_bringup.node_table import RunPlan
+from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.paths import config_directory
+from fulmar_core.policy_bundle import read_passport
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from policy_server.shipped import policies_directory
+
+KINDS = ("policy", "classical")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A robot at a task, and who drives it."""
+
+    robot: str
+    task: str
+    kind: str  # one of KINDS
+    controller: str = ""  # empty: there is none
+    policy: str = ""  # folder of a bundle
+    reason: str = ""  # why there is none
+    sha256: str = ""  # of whatever defines the controller
+    passport: dict[str, Any] = field(default_factory=dict, hash=False)
+
+    @property
+    def missing(self) -> bool:
+        """Whether nobody can drive it."""
+        return not self.controller
+
+
+def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) -> Pair:
+    """Find who drives a robot at a task.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+        kind: policy: the bundle; classical: the first classical controller that takes both.
+        policies: Folder of bundles named <robot>_<task>; the shipped ones by default.
+
+    Returns:
+        The pair, perhaps with a reason why nobody does.
+    """
+    return _with_policy(robot, task, policies) if kind == "policy" else _classical(robot, task)
+
+
+def _with_policy(robot: str, task: str, policies: Path | None) -> Pair:
+    from policy_server.policy import Policy
+
+    folder = (policies or policies_directory()) / f"{robot}_{task}"
+    if not folder.is_dir():
+        return Pair(robot, task, "policy", reason="no policy is shipped")
+    try:
+        passport = read_passport(folder)
+        Policy(folder, load_robot(robot), load_task(task))
+    except BundleError as error:
+        return Pair(robot, task, "policy", reason=str(error))
+    return Pair(
+        robot,
+        task,
+        "policy",
+        "policy",
+        policy=str(folder.absolute()),
+        sha256=passport.sha256,
+        passport=passport.training,
+    )
+
+
+def _classical(robot: str, task: str) -> Pair:
+    from fulmar_bringup.system import CONTROLLERS
+
+    the_robot, the_task, reason = load_robot(robot), load_task(task), "no classical controller"
+    for name, entry in CONTROLLERS.items():
+        if name == "policy":
+            continue
+        try:
+            controller = entry.load(the_robot, the_task, the_robot.timing.control_hz, "")
+        except ConfigError as error:
+            reason = str(error)
+        else:
+            return Pair(robot, task, "classical", name, sha256=str(controller.metadata()["sha256"]))
+    return Pair(robot, task, "classical", reason=reason)
+
+
+def units_of(
+    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, jobs: int, worlds: int
+) -> list[Unit]:
+    """The work on one pair.
+
+    Args:
+        pair: The pair.
+        ways: Episodes in each way.
+        seed: Seed of the episodes.
+        scenario: Name of the scenario.
+        folder: Where outcomes are kept.
+        jobs: Pairs of processes through ros.
+        worlds: Episodes of a batch at once.
+    """
+    plan = RunPlan(
+        robot=pair.robot,
+        task=pair.task,
+        controller=pair.controller,
+        backend="mujoco",
+        control_hz=load_robot(pair.robot).timing.control_hz,
+        policy=pair.policy,
+        scenario=scenario,
+        seed=seed,
+        duration_s=load_task(pair.task).episode_s,
+        lockstep=True,
+    )
+    return [
+        Unit(Trial(plan, way, episodes, worlds, jobs), _hash(pair.sha256, code_hash(way)), folder)
+        for way, episodes in ways.items()
+    ]
+
+
+def code_hash(way: str) -> str:
+    """Hash of the code and the configuration that outcomes of one way depend on."""
+    packages = (fulmar_core, policy_server, *((sim_nodes,) if way != "batch" else ()))
+    files = [
+        path for package in packages for path in sorted(Path(str(package.__file__)).parent.rglob("*.py"))
+    ]
+    files += sorted(
+        path
+        for family in ("robots", "tasks", "scenarios", "controllers")
+        for path in (config_directory() / family).glob("*.yaml")
+    )
+    return _hash(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))
+
+
+def _hash(*parts: str) -> str:
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -1,0 +1,119 @@
+"""The benchmark after thesis Table 4.7: every pair judged, one document."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fulmar_bringup.benchmark.judged import Judged
+from fulmar_bringup.benchmark.pairs import Pair, find_pair, units_of
+from fulmar_bringup.benchmark.results import FORMAT, pair_entry
+from fulmar_bringup.benchmark.unit import Unit
+from fulmar_bringup.benchmark.work import Outcome, do_all
+from fulmar_bringup.provenance import fulmar_version, git_revision
+
+EPISODES = {"batch": 4096, "mujoco": 256, "ros": 16}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to judge."""
+
+    robots: Sequence[str]
+    tasks: Sequence[str]
+    kinds: Sequence[str]  # policy, classical
+    episodes: dict[str, int]  # in each way
+    seed: int
+    scenario: str
+    folder: Path  # outcomes are kept below it
+    policies: Path | None = None  # folder of bundles; the shipped ones by default
+    jobs: int = 2
+    fresh: bool = False  # judge again what was judged before
+    command: str = ""  # for the record
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The document, and what pictures are drawn from."""
+
+    document: dict[str, Any]
+    pairs: list[Pair]
+    outcomes: dict[Pair, dict[str, Judged]]
+
+
+def run_benchmark(
+    request: Request,
+    *,
+    progress: Callable[[float, float], None],
+    on_done: Callable[[Unit, Outcome, bool], None],
+) -> Findings:
+    """Judge every pair, but for what was judged before with the same code, configuration and controller.
+
+    Args:
+        request: What to judge.
+        progress: Told how much is done, and of how much.
+        on_done: Told of each unit: its outcome, and whether it was there before.
+
+    Returns:
+        What was found.
+    """
+    began = time.monotonic()
+    pairs = [
+        find_pair(robot, task, kind, request.policies)
+        for task in request.tasks
+        for robot in request.robots
+        for kind in request.kinds
+    ]
+    units = {
+        pair: units_of(
+            pair,
+            request.episodes,
+            seed=request.seed,
+            scenario=request.scenario,
+            folder=request.folder / "outcomes",
+            jobs=request.jobs,
+            worlds=max(request.episodes.get("batch", 1), 1),
+        )
+        for pair in pairs
+        if not pair.missing
+    }
+    outcomes: dict[Unit, Outcome] = {}
+    for unit in (unit for of_pair in units.values() for unit in of_pair):
+        before = None if request.fresh else unit.done_before()
+        if before is not None:
+            outcomes[unit] = before
+            on_done(unit, before, True)
+    left = [unit for of_pair in units.values() for unit in of_pair if unit not in outcomes]
+    total = sum(unit.cost for unit in left)
+    outcomes |= do_all(
+        left,
+        jobs=request.jobs,
+        progress=lambda done: progress(done, total),
+        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    )
+    by_pair = {pair: {unit.trial.through: outcomes[unit] for unit in units.get(pair, [])} for pair in pairs}
+    entries = [pair_entry(pair, by_pair[pair]) for pair in pairs]
+    asked = [entry for entry in entries if entry["kind"] == "policy"]
+    document = {
+        "benchmark": "roboran",
+        "format": FORMAT,
+        "fulmar_version": fulmar_version(),
+        "git_revision": git_revision(),
+        "command": request.command,
+        "seed": request.seed,
+        "scenario": request.scenario,
+        "episodes": dict(request.episodes),
+        "pairs": entries,
+        "asked": len(asked),
+        "met": sum(entry["met"] is True for entry in asked),
+        "open": sum(entry["met"] is None for entry in asked),
+        "wall_s": round(time.monotonic() - began, 1),
+    }
+    judged = {
+        pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, Judged)}
+        for pair, ways in by_pair.items()
+    }
+    return Findings(document, pairs, judged)

@@ -1,0 +1,129 @@
+"""Units of work done by several processes at once, with their progress told and their faults kept apart."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from fulmar_bringup.benchmark.judged import Judged
+from fulmar_bringup.benchmark.unit import Unit, judge
+from fulmar_core.errors import RunFailed
+
+Outcome = Judged | str  # a sentence where a unit failed
+Done = Callable[[Unit, Outcome], None]
+_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+
+
+def do_all(
+    units: list[Unit], *, jobs: int, progress: Callable[[float], None], on_done: Done
+) -> dict[Unit, Outcome]:
+    """Do units, the costliest first; those through ros after the others, as they use all cores themselves.
+
+    Args:
+        units: What to do.
+        jobs: Processes at once.
+        progress: Told how much is done, of the sum of their costs.
+        on_done: Called as each unit ends.
+
+    Returns:
+        The outcome of each.
+
+    Raises:
+        RunFailed: A process was ended from outside.
+    """
+    outcomes: dict[Unit, Outcome] = {}
+
+    def note(unit: Unit, outcome: Outcome) -> None:
+        outcomes[unit] = outcome
+        on_done(unit, outcome)
+
+    ordered = sorted(units, key=lambda unit: -unit.cost)
+    apart = [unit for unit in ordered if unit.trial.through == "ros"]
+    pooled = [unit for unit in ordered if unit.trial.through != "ros"]
+    if pooled:
+        _in_a_pool(pooled, min(jobs, len(pooled)), progress, note)
+    done = sum(unit.cost for unit in pooled)
+    for unit in apart:
+        note(unit, _outcome_of(unit, lambda steps, done=done: progress(done + steps)))
+        done += unit.cost
+    return outcomes
+
+
+def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], note: Done) -> None:
+    spawn = multiprocessing.get_context("spawn")
+    counts = spawn.Array("q", len(units), lock=False)
+    with (
+        _environment(_ONE_THREAD),
+        _ended_with_us(ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts,))) as pool,
+    ):
+        futures: dict[Future[Outcome], Unit] = {
+            pool.submit(_work, unit, index): unit for index, unit in enumerate(units)
+        }
+        pending = set(futures)
+        while pending:
+            done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+            progress(float(sum(counts)))
+            for future in done:
+                try:
+                    note(futures[future], future.result())
+                except BrokenProcessPool as error:
+                    raise RunFailed("a process of the benchmark was ended from outside") from error
+
+
+@contextlib.contextmanager
+def _ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
+    """Wait for the workers; after an error or Ctrl-C, end them."""
+    try:
+        yield pool
+    except BaseException:
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """Variables that children inherit."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+_counts: Any = None
+
+
+def _begin_worker(counts: Any) -> None:
+    global _counts
+    _counts = counts
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends its children
+
+
+def _work(unit: Unit, index: int) -> Outcome:
+    def progress(steps: int) -> None:
+        _counts[index] = steps
+
+    outcome = _outcome_of(unit, progress)
+    _counts[index] = int(unit.cost)
+    return outcome
+
+
+def _outcome_of(unit: Unit, progress: Callable[[int], None]) -> Outcome:
+    try:
+        return judge(unit, progress)
+    except Exception as error:  # noqa: BLE001 - the fault of one pair must not cost the others their figures
+        return f"{type(error).__name__}: {error}"

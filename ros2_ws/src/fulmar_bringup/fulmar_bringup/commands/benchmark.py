@@ -1,0 +1,18 @@
+"""`fulmar benchmark`: what was measured, beside what was published."""
+
+from __future__ import annotations
+
+import typer
+
+from fulmar_bringup.commands.benchmark_roboran import roboran
+from fulmar_bringup.commands.benchmark_throughput import throughput
+from fulmar_bringup.commands.benchmark_training import training
+
+benchmark = typer.Typer(
+    help="Measure policies, simulators and training beside published figures.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+benchmark.command()(roboran)
+benchmark.command()(throughput)
+benchmark.command()(training)
