@@ -123,6 +123,7 @@ def test_a_campaign_of_failures_has_no_best(job):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)
 def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path):
     pytest.importorskip("ray", reason="the extra 'cluster' is not installed")
     import ray

@@ -1,0 +1,184 @@
+"""`fulmar train`, `fulmar policies` and `fulmar benchmark training`: what is asked for, and what is told."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+pytest.importorskip("stable_baselines3")
+
+from fulmar_bringup.commands.benchmark_training import training
+from fulmar_bringup.commands.policies import policies
+from fulmar_bringup.commands.train import train
+from fulmar_core.errors import ConfigError
+from training.jobs import Outcome
+from training.run_folder import write_start
+from training.settings import StopAtSuccess
+
+PLATFORM = ("floating_platform", "go_to_pose")
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Jobs that commands wanted to run; nothing is run, and seed 2 fails."""
+    jobs = []
+
+    def run(self, some, watch):
+        jobs.extend(some)
+        return [_outcome(job) for job in some]
+
+    monkeypatch.setattr("training.executors.LocalExecutor.run", run)
+    return jobs
+
+
+def _outcome(job):
+    if job.seed == 2:
+        return Outcome(job, None, "no memory left")
+    record = {
+        "seed": job.seed,
+        "best": {"success_rate": 0.9, "score": 1.0},
+        "mujoco": {"success_rate": 0.8 + job.seed / 100.0},
+        "steps": 1000,
+        "wall_s": 2.0,
+        "steps_per_s": 500,
+        "curve": [{"wall_s": 4.0, "success_rate": 0.95}],
+    }
+    return Outcome(job, record)
+
+
+def call(command, *words):
+    app = typer.Typer()
+    app.command()(command)
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout
+
+
+def test_a_campaign_is_one_job_for_each_seed_and_the_best_is_named(asked, tmp_path):
+    code, told = call(train, *PLATFORM, "--seeds", 2, "--seed", 3, "--out", tmp_path / "c", "--updates", 7)
+    assert code == 0
+    assert [(job.seed, job.updates, job.episodes) for job in asked] == [(3, 7, 256), (4, 7, 256)]
+    assert [job.out.name for job in asked] == ["seed_3", "seed_4"]
+    assert "best: seed 4" in told
+    assert f"fulmar export {tmp_path / 'c' / 'seed_4'}" in told.replace("\n", " ").replace("  ", " ")
+
+
+def test_a_seed_that_fails_is_told_and_the_command_fails(asked, tmp_path):
+    code, told = call(train, *PLATFORM, "--seeds", 3, "--out", tmp_path / "c")
+    assert code == 1
+    assert "2  failed: no memory left" in told
+    code, told = call(train, *PLATFORM, "--seeds", 2, "--out", tmp_path / "d", "--json")
+    assert code == 1
+    assert json.loads(told)["failed"] == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "ROBOT and TASK are needed, or --resume RUN"),
+        (("floating_platform",), "ROBOT and TASK are needed"),
+        ((*PLATFORM, "--executor", "slurm"), "--executor slurm: must be local or ray"),
+        ((*PLATFORM, "--settings", "sac"), "sac needs actuators that move by degrees"),
+        (("--resume", "/nowhere"), "/nowhere: no training run to resume"),
+    ],
+)
+def test_what_cannot_be_trained_is_told(words, told):
+    with pytest.raises(ConfigError, match=told):
+        call(train, *words)
+
+
+@pytest.fixture
+def learned(monkeypatch):
+    """Jobs that were learned in this process; nothing is learned."""
+    jobs = []
+
+    def learn(job, watcher):
+        jobs.append(job)
+        return {"steps": 1000, "wall_s": 2.0}
+
+    monkeypatch.setattr("training.jobs.learn", learn)
+    monkeypatch.setattr("training.judge.judge_in_mujoco", lambda run, episodes: {"success_rate": 0.875})
+    return jobs
+
+
+def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):
+    words = (*PLATFORM, "--time-limit", 30, "--stop-at-success", 0.99, "--out", tmp_path / "run")
+    code, told = call(train, *words, "--episodes", 16)
+    assert code == 0
+    (job,) = learned
+    assert (job.time_limit_s, job.settings.stop_at_success) == (30.0, StopAtSuccess(0.99))
+    assert "success 0.875 of 16 episodes in MuJoCo" in told
+
+
+def test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path):
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+    from training.settings import load_training_settings, write_training_settings
+
+    settings = load_training_settings(load_robot("turtlebot2"), load_task("go_to_pose"), "td3")
+    write_training_settings(settings, tmp_path / "settings.yaml")
+    start = {"robot": "turtlebot2", "task": "go_to_pose", "seed": 5, "time_limit_s": 90.0, "updates": None}
+    write_start(tmp_path, start)
+    assert call(train, "--resume", tmp_path)[0] == 0
+    assert call(train, "--resume", tmp_path, "--updates", 9)[0] == 0
+    same, longer = learned
+    assert (same.robot, same.seed, same.settings, same.out) == ("turtlebot2", 5, settings, tmp_path)
+    assert (same.time_limit_s, same.updates) == (90.0, None)
+    assert (longer.time_limit_s, longer.updates) == (None, 9)
+
+
+def test_a_run_cannot_be_resumed_as_a_campaign(tmp_path, learned):
+    test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    with pytest.raises(ConfigError, match="exclude one another"):
+        call(train, "--resume", tmp_path, "--seeds", 2)
+
+
+@pytest.fixture
+def passports(monkeypatch):
+    """Every bundle says that it succeeded in 0.96 of its episodes."""
+    from types import SimpleNamespace
+
+    told = SimpleNamespace(
+        training={"mujoco": {"success_rate": 0.96}, "wall_s": 2.0, "steps": 1000, "recipe": ""}
+    )
+    monkeypatch.setattr("training.policies.read_passport", lambda folder: told)
+
+
+def test_policies_that_reach_less_than_they_have_to_are_told_and_the_command_fails(
+    asked, passports, tmp_path
+):
+    code, told = call(policies, "turtlebot2_go_to_position", "kingfisher_go_to_pose", "--out", tmp_path)
+    assert code == 1
+    assert [job.bundle for job in asked] == [
+        tmp_path / "kingfisher_go_to_pose",
+        tmp_path / "turtlebot2_go_to_position",
+    ]
+    lines = told.splitlines()
+    assert lines[1].split() == ["kingfisher_go_to_pose", "0.960", "0.90"]
+    assert lines[2].split() == ["turtlebot2_go_to_position", "0.960", "0.99", "too", "low"]
+
+
+def test_policies_can_be_made_one_by_one_and_told_as_json(asked, passports, tmp_path):
+    code, told = call(policies, "kingfisher_go_to_pose", "--out", tmp_path, "--json")
+    assert code == 0
+    (line,) = json.loads(told)["policies"]
+    assert (line["policy"], line["made"], line["good"]) == ("kingfisher_go_to_pose", True, True)
+
+
+def test_an_unknown_policy_is_told():
+    with pytest.raises(ConfigError, match="has no policy 'kingfisher_go_to_post'"):
+        call(policies, "kingfisher_go_to_post")
+
+
+def test_the_comparison_with_stock_ppo_prints_both_and_fails_if_a_run_does(asked, tmp_path):
+    code, told = call(training, "--seeds", 1, "--seconds", 8, "--out", tmp_path)
+    assert code == 0
+    assert "fast is 1.0 times as fast as stock" in told
+    assert told.count("0.950 – 0.950 – 0.950") == 4  # two kinds, two times
+    code, told = call(training, "--seeds", 2, "--seconds", 8, "--out", tmp_path / "again", "--json")
+    assert code == 1
+    assert json.loads(told)["failed"] == ["stock 2: no memory left", "fast 2: no memory left"]
