@@ -78,8 +78,8 @@ def test_as_many_terms_are_seen_as_the_public_tasks_have():
 
 def test_a_position_within_reach_is_done_whichever_way_one_looks():
     for yaw in (0.0, 2.0):
-        assert POSITIONS.advance(square(), body(0.14, 0.0, yaw), 0.0).done.tolist() == [1.0]
-    assert POSITIONS.advance(square(), body(0.16), 0.0).done.tolist() == [0.0]
+        assert POSITIONS.advance(square(), body(0.16, 0.0, yaw), 0.0).done.tolist() == [1.0]
+    assert POSITIONS.advance(square(), body(0.18), 0.0).done.tolist() == [0.0]
 
 
 def test_a_judge_counts_by_the_tolerance_and_a_controller_by_its_reach():
@@ -191,6 +191,23 @@ def test_looking_the_right_way_pays_near_a_pose(name):
         return float(TASKS[name].reward(body(-0.3, 0.0, 0.4), body(-0.3, 0.0, yaw), square())[0])
 
     assert reward(0.2) > reward(0.4) > reward(0.6)
+
+
+@WITH_HEADINGS
+def test_coming_in_along_the_heading_pays_and_being_in_front_of_a_pose_is_farther_than_behind_it(name):
+    def progress(a, b):
+        return float(TASKS[name].reward(body(*a), body(*b), square())[0])
+
+    # Nothing but the way differs: both look ahead, and both stand 1 m off.
+    assert (
+        progress((1.0, 0.0), (-1.0, 0.0))
+        > progress((-1.0, 0.0), (-1.0, 0.0))
+        > progress((-1.0, 0.0), (1.0, 0.0))
+    )
+    weight = TASKS[name].reward_weights.progress
+    bearing = TASKS[name].reward_weights.bearing
+    gain = progress((-1.0, 0.0), (-0.9, 0.0)) - progress((-1.0, 0.0), (-1.0, 0.0))
+    assert gain == pytest.approx(0.1 * weight, abs=0.02 + bearing)
 
 
 @EACH

@@ -194,6 +194,8 @@ def test_names_tell_what_is_in_the_columns():
             "yaw_rate": 0.1,
             "fine_block_to_place_x_in_body": 0.0,
             "fine_block_to_place_y_in_body": -1.0,
+            "behind_block": 0.0,
+            "beside_block": -1.0,
         },
         abs=1e-12,
     )
@@ -214,6 +216,14 @@ def test_going_behind_the_block_pays_more_than_going_in_front_of_it():
     goal, start = at((1.0, 0.0)), body(1.0, 1.0)
     behind, ahead = (float(TASK.reward(start, body(x, 1.0), goal)[0]) for x in (1.2, 0.8))
     assert behind > ahead
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "behind", "beside"), [(2.0, 0.0, 1.0, 0.0), (0.0, 0.0, -1.0, 0.0), (1.0, 1.0, 0.0, -1.0)]
+)
+def test_a_robot_sees_whether_it_stands_behind_the_block_or_beside_it(x, y, behind, beside):
+    seen = dict(zip(TASK.observation_names, TASK.observe(body(x, y, yaw=0.6), at((1.0, 0.0))), strict=True))
+    assert (seen["behind_block"][0], seen["beside_block"][0]) == pytest.approx((behind, beside), abs=1e-12)
 
 
 def test_a_judge_is_told_where_the_block_is():

@@ -9,7 +9,7 @@ from typing import ClassVar
 from array_api_compat import array_namespace
 
 from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
+from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.passing import PassingTask, WaypointReward, bearing_of, path_terms
 
@@ -54,6 +54,16 @@ class PosePassingTask(PassingTask):
         w, old, new = self.reward_weights, self.errors(before, goal), self.errors(after, goal)
         reached = self.reached(goal, after, self.reach)
         e, d = xp.abs(new.heading), new.position
-        plain = w.of(old.position - d, reached, bearing_of(after, goal.current), after)
+        target = goal.current
+        progress = _way_to(before, target, old.position) - _way_to(after, target, d)
+        plain = w.of(progress, reached, bearing_of(after, target), after)
         turned = xp.exp(-d) * (xp.abs(old.heading) - e)
         return plain + w.heading * xp.exp(-d / 0.5 - e / 0.25) + w.turn * turned
+
+
+def _way_to(state: PlanarState, target: Array, distance: Array) -> Array:
+    """How far it is to a pose by way of a point behind it, half as far off as the robot [m]."""
+    xp = array_namespace(state.x)
+    along, across = to_body(target[..., 2], target[..., 0] - state.x, target[..., 1] - state.y)
+    along = along - 0.5 * distance
+    return 0.5 * distance + xp.sqrt(along * along + across * across)

@@ -34,7 +34,8 @@ class PushReward:
     home: float  # for each step that the block is in its place
     push: float  # times metres the block comes nearer to its place
     robot: float  # times exp(-b / 0.25 m): RoboRAN, same file
-    approach: float  # times metres the robot comes nearer to where it has to stand for pushing
+    approach: float  # times metres the robot comes nearer to the block
+    behind: float  # times how much more it stands behind the block, seen from its place: from -1 to 1
     spin: float  # cost of the turn rate [per rad/s]
 
 
@@ -51,7 +52,6 @@ class PushBlock:
     training_block_distance: Range  # when learning [m]
     start_distance: Range  # of the robot from the block; farther off where it would touch it [m]
     goal_area: float  # side of the square that places are drawn from [m]
-    stand_off: float  # how far behind the block the robot is led [m]
     tolerance: Tolerance
     fine_distance: float  # where the magnified way of the block saturates [m]
     reward_weights: PushReward
@@ -67,6 +67,8 @@ class PushBlock:
         *MOTION_TERMS,
         "fine_block_to_place_x_in_body",
         "fine_block_to_place_y_in_body",
+        "behind_block",
+        "beside_block",
     )
 
     def __post_init__(self) -> None:
@@ -100,9 +102,21 @@ class PushBlock:
         block_x, block_y, block_distance = toward(state, goal.block)
         place_x, place_y, _ = toward(state, goal.current)
         dx, dy, distance = self._way(goal)
-        divisor = array_namespace(dx).clip(distance, self.fine_distance, None)
-        fine = to_body(state.yaw, dx / divisor, dy / divisor)
-        return block_x, block_y, block_distance, place_x, place_y, distance, *motion_terms(state), *fine
+        divisor = clip(distance, self.fine_distance, None)
+        fine_x, fine_y = to_body(state.yaw, dx / divisor, dy / divisor)
+        return (
+            block_x,
+            block_y,
+            block_distance,
+            place_x,
+            place_y,
+            distance,
+            *motion_terms(state),
+            fine_x,
+            fine_y,
+            block_x * fine_x + block_y * fine_y,
+            block_x * fine_y - block_y * fine_x,
+        )
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
         """The goal stays; the block is moved by what `pushed` says, or by the world."""
@@ -119,9 +133,12 @@ class PushBlock:
         """Reward of how the robot moved in one control step; see `TaskProtocol.reward`."""
         xp = array_namespace(after.x)
         w = self.reward_weights
+        far, was_behind = self._stance(before, goal)
+        near, is_behind = self._stance(after, goal)
         return (
-            w.robot * xp.exp(-toward(after, goal.block)[2] / 0.25)
-            + w.approach * (self._to_stand(before, goal) - self._to_stand(after, goal))
+            w.robot * xp.exp(-near / 0.25)
+            + w.approach * (far - near)
+            + w.behind * (is_behind - was_behind)
             - w.spin * xp.abs(after.yaw_rate)
         )
 
@@ -151,10 +168,11 @@ class PushBlock:
         dx, dy = target[..., 0] - goal.block[..., 0], target[..., 1] - goal.block[..., 1]
         return dx, dy, array_namespace(dx).sqrt(dx * dx + dy * dy)
 
-    def _to_stand(self, state: PlanarState, goal: Goal) -> Array:
-        """How far the robot is from behind the block, seen from its place; at its place there is no behind [m]."""
-        dx, dy, distance = self._way(goal)
-        xp = array_namespace(dx)
-        share = self.stand_off / clip(distance, self.fine_distance, None)
-        sx, sy = goal.block[..., 0] - share * dx - state.x, goal.block[..., 1] - share * dy - state.y
-        return xp.sqrt(sx * sx + sy * sy)
+    def _stance(self, state: PlanarState, goal: Goal) -> tuple[Array, Array]:
+        """Distance of the robot from the block [m], and 1 behind it, -1 in front of it, 0 where it is at its place."""
+        xp = array_namespace(state.x)
+        bx, by = goal.block[..., 0] - state.x, goal.block[..., 1] - state.y
+        b = xp.sqrt(bx * bx + by * by)
+        dx, dy, d = self._way(goal)
+        size = clip(b, 1e-3, None) * clip(d, self.fine_distance, None)
+        return b, (bx * dx + by * dy) / size
