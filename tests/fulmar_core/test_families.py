@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.ackermann import GRIP
 from fulmar_core.actuators.response import Response
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.robot import load_robot
 
 PROPELLERS = load_robot("kingfisher").actuators
@@ -86,7 +88,15 @@ def test_straight_ahead_both_wheels_roll_at_the_speed_of_the_base():
 
 
 def test_speed_and_steering_of_a_car_are_cut_each_by_itself():
-    assert CAR.limited(np.array([[9.0, -9.0], [-9.0, 0.1]])).tolist() == [[3.6, -0.785], [-3.6, 0.1]]
+    assert CAR.limited(np.array([[0.5, -9.0], [-9.0, 0.1]])).tolist() == [[0.5, -0.785], [-3.6, 0.1]]
+
+
+def test_a_car_steers_less_the_faster_it_goes_so_that_its_tyres_hold():
+    fast = np.array([[3.6, 0.785], [-3.6, -0.785], [2.0, 0.785]])
+    speed, steering = CAR.limited(fast).T
+    sideways = speed**2 * np.tan(steering) / CAR.wheelbase
+    np.testing.assert_allclose(np.abs(sideways), GRIP * CAR.friction * GRAVITY)
+    np.testing.assert_array_equal(np.sign(steering), np.sign(fast[:, 1]))
 
 
 @pytest.mark.parametrize("actuators", [PROPELLERS, DRIVE, CAR], ids=lambda a: a.kind)

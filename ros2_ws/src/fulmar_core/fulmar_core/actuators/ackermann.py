@@ -10,7 +10,10 @@ from array_api_compat import array_namespace, device
 
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import clip
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.rotation import Array
+
+GRIP = 0.6  # of what friction gives, in curves; the rest is for the motors, which push along the way; our value [-]
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,15 @@ class Ackermann:
         return np.zeros(2)
 
     def limited(self, command: Array) -> Array:
-        """Nearest command that the car can carry out, shape (..., 2)."""
+        """Nearest command that the car can carry out, shape (..., 2).
+
+        The faster it goes, the less it steers, so that its tyres do not slide: v² tan(angle) / wheelbase, what a curve
+        asks of them, stays below a share of their friction.
+        """
         xp = array_namespace(command)
         most = xp.asarray(self.scale, dtype=command.dtype, device=device(command))
-        return clip(command, -most, most)
+        within = clip(command, -most, most)
+        speed, steering = within[..., 0], within[..., 1]
+        grip = GRIP * self.friction * GRAVITY * self.wheelbase
+        widest = xp.atan(grip / clip(speed * speed, 1e-6, None))
+        return xp.stack((speed, clip(steering, -widest, widest)), axis=-1)
