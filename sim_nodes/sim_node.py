@@ -8,6 +8,8 @@ from fulmar_core.backend import Backend
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.robot import Robot
+from fulmar_core.tasks import load_task
+from fulmar_core.tasks.push_block import PushBlock
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node
@@ -17,14 +19,15 @@ BACKENDS = ("mujoco", "mock")
 
 def make_backend(robot: Robot, settings: PlantSettings) -> Backend:
     """Build the backend that the parameters name; only that one is imported."""
+    task = load_task(settings.task)
     if settings.backend == "mujoco":
         from sim_nodes.mujoco_backend import MujocoBackend
 
-        return MujocoBackend(robot, sensor_noise=load_scenario(settings.scenario).sensor_noise)
+        return MujocoBackend.of(robot, task, load_scenario(settings.scenario))
     if settings.backend == "mock":
         from sim_nodes.mock_backend import MockBackend
 
-        return MockBackend(robot)
+        return MockBackend(robot, block=task.block if isinstance(task, PushBlock) else None)
     raise UnknownNameError("simulated backend", settings.backend, BACKENDS)
 
 

@@ -13,8 +13,9 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.state import planar_pose, planar_state
+from fulmar_core.state import planar_state
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     COMMAND,
@@ -22,7 +23,8 @@ from fulmar_core.topics import (
     GOAL_POSE,
     ODOMETRY,
 )
-from fulmar_ros.convert import OdometryWriter, VectorWriter, goal_message
+from fulmar_ros.convert import OdometryWriter, VectorWriter
+from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 NAMESPACE = "/floating_platform"
@@ -76,7 +78,7 @@ class Neighbour:
 
     def give_goal(self) -> None:
         """Ask for a pose far away, so that valves open."""
-        self.goal_publisher.publish(goal_message(planar_pose(4.0, 0.0, 0.0), "goal_pose", 1))
+        self.goal_publisher.publish(goal_message(goal_at((4.0, 0.0, 0.0)), "goal_pose", 1))
 
     def odometry(
         self, stamp_ns: int, spoil: Callable[[Odometry], None] = lambda _message: None, x: float = 0.0

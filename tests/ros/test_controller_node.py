@@ -10,8 +10,8 @@ import pytest
 from nav_msgs.msg import Odometry
 
 from fulmar_core.controllers.lqr import Lqr
+from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot
-from fulmar_core.state import planar_pose
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.topics import (
     GOAL_POSE,
@@ -22,7 +22,7 @@ from fulmar_core.topics import (
 )
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.controller_settings import ControllerSettings
-from fulmar_ros.convert import goal_message
+from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.runtime import spinning
 from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
@@ -129,7 +129,7 @@ def test_a_controller_that_raises_commands_what_is_safe_and_ends(
 def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
     """Judged at once, not at the next measurement."""
     neighbour = stream.neighbour
-    neighbour.goal_publisher.publish(goal_message(planar_pose(300.0, 0.0, 0.0), "goal_pose", 2))
+    neighbour.goal_publisher.publish(goal_message(goal_at((300.0, 0.0, 0.0)), "goal_pose", 2))
     until(lambda: "geofence" in neighbour.said["controller"][1]["reason"])
     until(lambda: not neighbour.commands[-1].any())
 

@@ -9,6 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robot import Robot
+
 Source = Literal["plant", "controller", "operator", "every node"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
@@ -137,6 +140,46 @@ GOAL_POINT = Wire(
     "on demand",
     "goal without heading",
 )
+GOAL_PATH = Wire(
+    "goal_path",
+    "nav_msgs/msg/Path",
+    "operator",
+    "latched",
+    "on demand",
+    "waypoints in their order; after the last one the first comes again",
+)
+GOAL_VELOCITY = Wire(
+    "goal_velocity",
+    "geometry_msgs/msg/TwistStamped",
+    "operator",
+    "latched",
+    "on demand",
+    "velocity and turn rate to track, in `base_link`; it holds until the next one comes",
+)
+OBSTACLES = Wire(
+    "obstacles",
+    "visualization_msgs/msg/MarkerArray",
+    "operator",
+    "latched",
+    "on demand",
+    "cylinders in `odom` to keep off; `scale.x` is the diameter",
+)
+BLOCK = Wire(
+    "block/pose",
+    "geometry_msgs/msg/PoseStamped",
+    "plant",
+    "stream",
+    "with each odometry, where there is a block",
+    "place of the thing to push, stamped as the odometry",
+)
+VELOCITY_COMMAND = Wire(
+    "cmd_vel",
+    "geometry_msgs/msg/TwistStamped",
+    "controller",
+    "stream",
+    "control rate",
+    "for robots that take speed and turn rate: `linear.x` and `angular.z`, stamped as the observation it answers",
+)
 
 WIRES: tuple[Wire, ...] = (
     ODOMETRY,
@@ -145,6 +188,7 @@ WIRES: tuple[Wire, ...] = (
     ACTUATORS_STATE,
     CLOCK,
     COMMAND,
+    VELOCITY_COMMAND,
     OBSERVATION,
     ACTION,
     METADATA,
@@ -152,6 +196,15 @@ WIRES: tuple[Wire, ...] = (
     DIAGNOSTICS,
     GOAL_POSE,
     GOAL_POINT,
+    GOAL_PATH,
+    GOAL_VELOCITY,
+    OBSTACLES,
+    BLOCK,
 )
 
-GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT)}
+GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}
+
+
+def command_wire(robot: Robot) -> Wire:
+    """Where a robot's commands come in."""
+    return VELOCITY_COMMAND if isinstance(robot.actuators, DifferentialDrive) else COMMAND

@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import threading
 import time
 from collections.abc import Callable
 
 import numpy as np
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.observation import slewed
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.command_gate import Rejections, command_problem
 from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
 from fulmar_core.safety.watchdog import default_timeout
-from fulmar_core.state import Pose
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
-from fulmar_ros.convert import goal_of, measurement_of, stamp_ns
+from fulmar_ros.convert import measurement_of, stamp_ns
 from fulmar_ros.deadline import CONTROL_PRIORITY, Deadlines, Spread, take_priority
+from fulmar_ros.goal_messages import GoalMessage, goal_of, obstacles_of
+from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -66,13 +68,14 @@ class ControllerNode(LifecycleNode):
         hz = self.settings.control_rate(self.robot)
         timeout_s = self.settings.input_timeout_s or default_timeout(1.0 / hz) / min(self.settings.rate, 1.0)
         self._flags = Flags(input_timeout_ns=round(timeout_s * 1e9), geofence=self.robot.limits.geofence)
-        noisy = max(self.robot.sensors.odometry.position_std) > 0.0 and not self.settings.lockstep
+        noisy = self.robot.sensors.odometry.position.std > 0.0 and not self.settings.lockstep
         self._input_gate = InputGate(self.robot.limits, frozen_after=FROZEN_AFTER if noisy else 0)
         self._rejections = Rejections()
         self._newest: Measurement | None = None
-        self._goal: Pose | None = None
-        self._goal_stamp_ns = 0
+        self.mission = Mission(self.robot, self.task)
+        self._late: Odometry | None = None  # waits in lock step for the block of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
+        self._control_ns = round(1e9 / hz)
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
         self._inference_ms = Spread()
@@ -102,6 +105,8 @@ class ControllerNode(LifecycleNode):
             self.controller,
             on_odometry=self._on_odometry,
             on_goal=self._on_goal,
+            on_obstacles=self._on_obstacles,
+            on_block=self._on_block,
             lockstep=self.settings.lockstep,
         )
         metadata = self.controller.metadata()
@@ -184,25 +189,54 @@ class ControllerNode(LifecycleNode):
         with self._lock:
             return arbitrate(self._flags, time.monotonic_ns())
 
-    def _on_goal(self, message: PoseStamped | PointStamped) -> None:
+    def _on_goal(self, message: GoalMessage) -> None:
         goal, problem = goal_of(message)
         if goal is None:
             self.get_logger().warning(f"goal refused: {problem}")
             return
         with self._lock:
-            self._goal, self._goal_stamp_ns = goal, stamp_ns(message.header.stamp)
-            self._flags = dataclasses.replace(
-                self._flags, has_goal=True, goal_distance=_distance(self._newest, goal)
-            )
+            self.mission.give(goal, stamp_ns(message.header.stamp))
+            self._follow_mission()
             self.controller.reset()
             if self.settings.lockstep:
                 self._input_gate.forget()
         self._tell_status(self._decide())
 
+    def _on_obstacles(self, message: MarkerArray) -> None:
+        discs, problem = obstacles_of(message)
+        if discs is None:
+            self.get_logger().warning(f"obstacles refused: {problem}")
+            return
+        with self._lock:
+            stamp = stamp_ns(message.markers[0].header.stamp) if message.markers else 0
+            self.mission.see_obstacles(discs, stamp)
+            self._follow_mission()
+        self._tell_status(self._decide())
+
+    def _on_block(self, message: PoseStamped) -> None:
+        place = message.pose.position
+        if message.header.frame_id != "odom" or not np.isfinite((place.x, place.y)).all():
+            self.get_logger().warning("place of the block refused: it must be finite and in 'odom'")
+            return
+        with self._lock:
+            self.mission.see_block(np.array([place.x, place.y]), stamp_ns(message.header.stamp))
+            self._follow_mission()
+        late, self._late = self._late, None
+        if late is not None:
+            self._on_odometry(late)
+
+    def _follow_mission(self) -> None:
+        """Tell the arbiter what the mission says; call with the lock held."""
+        distance = self.mission.distance(self._newest.state) if self._newest else float("inf")
+        self._flags = dataclasses.replace(self._flags, has_goal=self.mission.complete, goal_distance=distance)
+
     def _on_odometry(self, message: Odometry) -> None:
         if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
             return  # the plant asks again
         measurement = measurement_of(message)
+        if self.settings.lockstep and self.mission.lacks_block_of(measurement.stamp_ns):
+            self._late = message
+            return
         if self.settings.lockstep and measurement.stamp_ns == self._answered_ns:
             self.wires.publish_command(self._answer, self._answered_ns)  # the answer got lost
             return
@@ -215,8 +249,7 @@ class ControllerNode(LifecycleNode):
                     self._follow(measurement, now)
                 self._newest = measurement
                 changes["last_input_ns"] = now
-                if self._goal is not None:
-                    changes["goal_distance"] = _distance(measurement, self._goal)
+                changes["goal_distance"] = self.mission.distance(measurement.state)
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
         if self.settings.lockstep:
             self._control(measurement)
@@ -240,31 +273,38 @@ class ControllerNode(LifecycleNode):
         """One control step on one measurement: decide, act, publish."""
         with self._lock:
             decision = arbitrate(self._flags, time.monotonic_ns())
-            goal = self._goal
+            observation = self._observe(measurement) if decision.may_act and measurement else None
         stamp = measurement.stamp_ns if measurement else 0
         command = self.robot.actuators.safe_command
-        if decision.may_act and measurement is not None and goal is not None:
-            command = self._act(measurement, goal)
+        if observation is not None:
+            command = self._act(observation, stamp)
         elif decision.mode is not Mode.IDLE:
             self.wires.publish_command(command, stamp)
         self._answered_ns, self._answer = stamp, command
         self._steps += 1
         self._tell_status(decision)
 
-    def _act(self, measurement: Measurement, goal: Pose) -> np.ndarray:
+    def _observe(self, measurement: Measurement) -> np.ndarray:
+        """What the controller sees of a measurement; targets that are reached give way to the next."""
+        if measurement.stamp_ns - self._answered_ns > 1.75 * self._control_ns:
+            # Nothing was commanded in between: by now the actuators are in their safe state.
+            self._answer = self.robot.actuators.safe_command
+        return self.mission.observe(measurement.state, measurement.stamp_ns, self._answer)
+
+    def _act(self, observation: np.ndarray, stamp: int) -> np.ndarray:
         began = time.perf_counter_ns()
-        observation = np.asarray(self.task.observe(measurement.state, goal))
         try:
             action = np.asarray(self.controller.act(observation), dtype=float)
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
-            return self._give_up(
-                f"the controller raised {type(error).__name__}: {error}", measurement.stamp_ns
-            )
+            return self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
         problem = command_problem(action, len(self.robot.actuators.names))
-        command = self.robot.actuators.safe_command if problem else self.robot.actuators.limited(action)
+        command = self.robot.actuators.safe_command
+        if not problem:
+            wanted = self.robot.actuators.limited(action)
+            command = slewed(wanted, self._answer, self.robot, self._control_ns / 1e9)
         self._inference_ms.add((time.perf_counter_ns() - began) / 1e6)
-        self.wires.publish_command(command, measurement.stamp_ns)
-        self.wires.publish_reasoning(observation, action, measurement.stamp_ns)
+        self.wires.publish_command(command, stamp)
+        self.wires.publish_reasoning(observation, action, stamp)
         fault = self._rejections.note(problem)
         if fault:
             self._set(latched_fault=fault)
@@ -288,7 +328,8 @@ class ControllerNode(LifecycleNode):
         changed = (
             decision.mode,
             decision.reason.split(" (")[0][:24],
-            self._goal_stamp_ns,
+            self.mission.goal_stamp_ns,
+            self.mission.obstacles_stamp_ns,
             self._rejections.total,
         )
         now = time.monotonic()
@@ -301,7 +342,9 @@ class ControllerNode(LifecycleNode):
             "mode": decision.mode.value,
             "reason": decision.reason,
             "sha256": self._sha256,
-            "goal_stamp_ns": str(self._goal_stamp_ns),
+            "goal_stamp_ns": str(self.mission.goal_stamp_ns),
+            "obstacles_stamp_ns": str(self.mission.obstacles_stamp_ns),
+            "goals_done": str(self.mission.done),
             "steps": str(self._steps),
             "observation_age_ms": f"{age_ms:.1f}",
             "control_rate_hz": f"{self._deadlines.rate_hz:.4f}",
@@ -311,10 +354,3 @@ class ControllerNode(LifecycleNode):
             **self._deadlines.period_error_ms.percentiles("period_error_ms"),
         }
         self.wires.health.publish(level, decision.reason or decision.mode.value, values)
-
-
-def _distance(measurement: Measurement | None, goal: Pose) -> float:
-    """From a measurement to a goal in the plane, infinite before the first measurement [m]."""
-    if measurement is None:
-        return math.inf
-    return math.dist(measurement.state.position_in_world[:2], goal.position_in_world[:2])

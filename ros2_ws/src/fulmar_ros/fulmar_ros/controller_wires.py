@@ -8,31 +8,43 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import (
     ACTION,
-    COMMAND,
+    BLOCK,
     DIAGNOSTICS,
     GOAL_WIRES,
     METADATA,
     OBSERVATION,
+    OBSTACLES,
     ODOMETRY,
     STATUS,
+    VELOCITY_COMMAND,
+    command_wire,
 )
-from fulmar_ros.convert import VectorWriter
+from fulmar_ros.convert import TwistWriter, VectorWriter
+from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 FLUSH = Duration(seconds=0.3)
+
+
+def sees_obstacles(task: Task) -> bool:
+    """Whether a controller of this task must be told what stands about."""
+    return isinstance(task, GoToPositionWithObstacles)
 
 
 class ControllerWires:
@@ -46,7 +58,9 @@ class ControllerWires:
         controller: Controller,
         *,
         on_odometry: Callable[[Odometry], None],
-        on_goal: Callable[[PoseStamped | PointStamped], None],
+        on_goal: Callable[[GoalMessage], None],
+        on_obstacles: Callable[[MarkerArray], None],
+        on_block: Callable[[PoseStamped], None],
         lockstep: bool,
     ) -> None:
         """Create every endpoint.
@@ -58,9 +72,14 @@ class ControllerWires:
             controller: Says what its observation holds.
             on_odometry: Told every odometry message.
             on_goal: Told every goal.
+            on_obstacles: Told all obstacles whenever they change.
+            on_block: Told where the block is.
             lockstep: Ask for lost odometry again: the plant waits for its answer.
         """
-        self._command = node.create_publisher(JointState, COMMAND.name, publisher_qos(COMMAND))
+        wire = command_wire(robot)
+        self._by_velocity = wire is VELOCITY_COMMAND
+        kind = TwistStamped if self._by_velocity else JointState
+        self._command = node.create_publisher(kind, wire.name, publisher_qos(wire))
         self._observation = node.create_publisher(JointState, OBSERVATION.name, publisher_qos(OBSERVATION))
         self._action = node.create_publisher(JointState, ACTION.name, publisher_qos(ACTION))
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
@@ -76,16 +95,28 @@ class ControllerWires:
             status,
             diagnostics,
         )
-        self._write_command = VectorWriter(robot.actuators.names)
+        self._write_command = self._command_writer()
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(controller.observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
         goal = GOAL_WIRES[task.goal_topic]
-        goal_type = PoseStamped if goal.type.endswith("PoseStamped") else PointStamped
-        self._subscriptions = (
+        self._subscriptions = [
             node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
-            node.create_subscription(goal_type, goal.name, on_goal, subscriber_qos(goal)),
-        )
+            node.create_subscription(TYPES[goal.name], goal.name, on_goal, subscriber_qos(goal)),
+        ]
+        if sees_obstacles(task):
+            self._subscriptions.append(
+                node.create_subscription(MarkerArray, OBSTACLES.name, on_obstacles, subscriber_qos(OBSTACLES))
+            )
+        if isinstance(task, PushBlock):
+            self._subscriptions.append(
+                node.create_subscription(
+                    PoseStamped, BLOCK.name, on_block, subscriber_qos(BLOCK, reliable=lockstep)
+                )
+            )
+
+    def _command_writer(self) -> TwistWriter | VectorWriter:
+        return TwistWriter() if self._by_velocity else VectorWriter(self._actuators.names)
 
     def subscribers(self) -> int:
         """Matched subscriptions of the command."""
@@ -97,7 +128,7 @@ class ControllerWires:
 
     def publish_safe(self, stamp: int) -> None:
         """Publish the safe command; with a message of its own, so that any thread may."""
-        self._command.publish(VectorWriter(self._actuators.names).write(self._actuators.safe_command, stamp))
+        self._command.publish(self._command_writer().write(self._actuators.safe_command, stamp))
 
     def destroy(self, node: LifecycleNode) -> None:
         """Give every endpoint back."""

@@ -6,21 +6,20 @@ everything else a control step does.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
 from fulmar_core.robot import Robot
-from fulmar_core.rotation import from_yaw, rotate, rotate_inverse
+from fulmar_core.rotation import rotate, rotate_inverse
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.sensors.odometry import OdometrySpec
-from fulmar_core.state import Pose, RigidBodyState
+from fulmar_core.sensors.odometer import OdometrySpec
+from fulmar_core.state import RigidBodyState
 
 NS = 1_000_000_000
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
@@ -53,8 +52,10 @@ class OdometryWriter:
         self._message.header.frame_id = frame
         self._message.child_frame_id = child_frame
         if spec is not None:
-            self._message.pose.covariance = _diagonal((*spec.position_std, *spec.rotation_std))
-            self._message.twist.covariance = _diagonal((*spec.velocity_std, *spec.angular_velocity_std))
+            place, heading = spec.position.std, spec.heading.std
+            self._message.pose.covariance = _diagonal((place, place, 0.0, 0.0, 0.0, heading))
+            speed, turn = spec.velocity.std, spec.yaw_rate.std
+            self._message.twist.covariance = _diagonal((speed, speed, 0.0, 0.0, 0.0, turn))
 
     def write(self, state: RigidBodyState, time_ns: int) -> Odometry:
         """Fill the message; it is overwritten by the next call.
@@ -132,51 +133,16 @@ class VectorWriter:
         return self._message
 
 
-def goal_message(goal: Pose, topic: str, time_ns: int) -> PoseStamped | PointStamped:
-    """A goal as the message of its topic.
+class TwistWriter:
+    """Speed and turn rate as TwistStamped."""
 
-    Args:
-        goal: Goal pose without a batch axis.
-        topic: `goal_pose` or `goal_point`.
-        time_ns: When it was given; controllers report it back [ns].
+    def __init__(self) -> None:
+        """Fill in what never changes."""
+        self._message = TwistStamped()
+        self._message.header.frame_id = "base_link"
 
-    Returns:
-        The message, in frame `odom`.
-    """
-    x, y, z = goal.position_in_world.tolist()
-    if topic == "goal_point":
-        point = PointStamped()
-        point.header.frame_id, point.header.stamp = "odom", stamp_of(time_ns)
-        point.point.x, point.point.y, point.point.z = x, y, z
-        return point
-    pose = PoseStamped()
-    pose.header.frame_id, pose.header.stamp = "odom", stamp_of(time_ns)
-    pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = x, y, z
-    q = pose.pose.orientation
-    q.x, q.y, q.z, q.w = goal.quat_xyzw.tolist()
-    return pose
-
-
-def goal_of(message: PoseStamped | PointStamped) -> tuple[Pose | None, str]:
-    """Read a goal.
-
-    Args:
-        message: From either goal topic.
-
-    Returns:
-        The pose and an empty text, or None and what is wrong with the message.
-    """
-    if message.header.frame_id != "odom":
-        return None, f"goal frame is '{message.header.frame_id}', must be 'odom'"
-    if isinstance(message, PointStamped):
-        p, quat = message.point, from_yaw(np.asarray(0.0))
-    else:
-        p, q = message.pose.position, message.pose.orientation
-        quat = np.array([q.x, q.y, q.z, q.w])
-    position = np.array([p.x, p.y, p.z])
-    if not (np.isfinite(position).all() and np.isfinite(quat).all()):
-        return None, "goal holds a value that is not finite"
-    norm = math.sqrt(float(quat @ quat))
-    if abs(norm - 1.0) > 0.01:
-        return None, f"goal quaternion has norm {norm:.3f}, must be 1"
-    return Pose(position, quat / norm), ""
+    def write(self, values: np.ndarray, time_ns: int) -> TwistStamped:
+        """Fill the message with (speed [m/s], turn rate [rad/s]); it is overwritten by the next call."""
+        self._message.header.stamp = stamp_of(time_ns)
+        self._message.twist.linear.x, self._message.twist.angular.z = (float(v) for v in values)
+        return self._message

@@ -9,14 +9,15 @@ import numpy as np
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from fulmar_core.backend import Backend, Sample
-from fulmar_core.disturbances.scenario import draw_world, load_scenario
-from fulmar_core.episode import WORLD, Episode, episode_rng
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.state import planar_state
+from fulmar_core.tasks import load_task
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_health import PlantHealth
@@ -62,6 +63,7 @@ class PlantNode(LifecycleNode):
         self.settings = read_parameters(self, PlantSettings)
         self.robot = load_robot(self.settings.robot)
         self._scenario = load_scenario(self.settings.scenario)
+        load_task(self.settings.task)  # a wrong name is told before anything starts
         self._make_backend, self._request_exit, self._simulated = make_backend, request_exit, simulated
         self._backend: Backend | None = None
         self._thread: threading.Thread | None = None
@@ -152,7 +154,7 @@ class PlantNode(LifecycleNode):
             LockstepError: If the controller does not answer in time.
         """
         assert self._backend is not None
-        sample = self._backend.reset(episode.start, episode.world, seed=seed, number=number)
+        sample = self._backend.reset(episode, seed=seed, number=number)
         self._lockstep.run(sample, steps, self._stop, on_step)
 
     def _make_loops(self, backend: Backend) -> None:
@@ -206,9 +208,12 @@ class PlantNode(LifecycleNode):
             self._fail(f"{type(error).__name__}: {error}")
 
     def _first_sample(self, backend: Backend) -> Sample:
-        x, y, heading = self.settings.start
-        world = draw_world(self.robot, self._scenario, episode_rng(self.settings.seed, 0, stream=WORLD))
-        return backend.reset(planar_state(x, y, np.deg2rad(heading)), world, seed=self.settings.seed)
+        x, y, heading = (np.asarray(float(value)) for value in self.settings.start)
+        episode = draw_episode(
+            self.robot, load_task(self.settings.task), self._scenario, seed=self.settings.seed, number=0
+        )
+        start = at_rest(x, y, np.deg2rad(heading))
+        return backend.reset(Episode(start, episode.goal, episode.world), seed=self.settings.seed)
 
     def _count(self, dt: float) -> int | None:
         """How many loops of `dt` seconds fill the duration; None for no end."""

@@ -16,6 +16,7 @@ class PlantSettings:
     """ROS parameters of a plant node."""
 
     robot: str = "floating_platform"
+    task: str = "go_to_position"  # what the robot is to do: it may bring obstacles, or something to push
     backend: str = "mujoco"
     scenario: str = "nominal"
     seed: int = 0

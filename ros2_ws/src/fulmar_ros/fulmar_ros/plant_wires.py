@@ -5,18 +5,30 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Sequence
 
 import numpy as np
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
+from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
 from fulmar_core.backend import Sample
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_core.topics import ACTUATORS_STATE, CLOCK, COMMAND, IMU, ODOMETRY, TRUTH
+from fulmar_core.topics import (
+    ACTUATORS_STATE,
+    BLOCK,
+    CLOCK,
+    IMU,
+    ODOMETRY,
+    TRUTH,
+    VELOCITY_COMMAND,
+    command_wire,
+)
 from fulmar_ros.convert import ImuWriter, OdometryWriter, VectorWriter, stamp_ns, stamp_of
 from fulmar_ros.deadline import Spread
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -53,14 +65,21 @@ class PlantWires:
         self._write_truth = OdometryWriter(None, frame="map")
         self._write_imu = ImuWriter(robot)
         self._write_state = VectorWriter(robot.actuators.names)
-        self._commands = node.create_subscription(
-            JointState, COMMAND.name, self._on_command, subscriber_qos(COMMAND, reliable=True)
+        self._names = robot.actuators.names
+        self._node = node
+        self._block: Publisher | None = None
+        wire = command_wire(robot)
+        qos = subscriber_qos(wire, reliable=True)
+        self._commands = (
+            node.create_subscription(TwistStamped, wire.name, self._on_velocity, qos)
+            if wire is VELOCITY_COMMAND
+            else node.create_subscription(JointState, wire.name, self._on_command, qos)
         )
 
     def destroy(self, node: LifecycleNode) -> None:
         """Give every endpoint back."""
         node.destroy_subscription(self._commands)
-        for publisher in (self._odometry, self._imu, self._state, self._truth, self._clock):
+        for publisher in (self._odometry, self._imu, self._state, self._truth, self._clock, self._block):
             if publisher is not None:
                 node.destroy_publisher(publisher)
 
@@ -79,6 +98,8 @@ class PlantWires:
         self._sent_ns.setdefault(time_ns, time.monotonic_ns())  # of a resent one, the first sending counts
         while len(self._sent_ns) > REMEMBERED:
             self._sent_ns.popitem(last=False)
+        if sample.block is not None:
+            self._publish_block(sample.block, time_ns)
         self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
         if resend:
             return
@@ -89,6 +110,16 @@ class PlantWires:
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
             self._clock.publish(Clock(clock=stamp_of(time_ns)))
             self._clock_ns = now
+
+    def _publish_block(self, place: np.ndarray, time_ns: int) -> None:
+        """Say where the block is; most robots push none, so that the endpoint is made when one is there."""
+        if self._block is None:
+            self._block = self._node.create_publisher(PoseStamped, BLOCK.name, publisher_qos(BLOCK))
+        message = PoseStamped()
+        message.header.frame_id, message.header.stamp = "odom", stamp_of(time_ns)
+        message.pose.position.x, message.pose.position.y = float(place[0]), float(place[1])
+        message.pose.orientation.w = 1.0
+        self._block.publish(message)
 
     def publish_truth(self, sample: Sample, time_ns: int) -> None:
         """Publish where the robot really is, if the backend knows and somebody listens."""
@@ -113,10 +144,16 @@ class PlantWires:
         return self.lock.wait_for(lambda: self._answered == time_ns, timeout_s)
 
     def _on_command(self, message: JointState) -> None:
+        self._take(message.name, message.effort, stamp_ns(message.header.stamp))
+
+    def _on_velocity(self, message: TwistStamped) -> None:
+        values = (message.twist.linear.x, message.twist.angular.z)
+        self._take(self._names, values, stamp_ns(message.header.stamp))
+
+    def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
         now = time.monotonic_ns()
-        stamp = stamp_ns(message.header.stamp)
         with self.lock:
-            taken = self._guard.offer(message.name, message.effort, now, stamp_ns=stamp)
+            taken = self._guard.offer(names, values, now, stamp_ns=stamp)
             sent = self._sent_ns.pop(stamp, None)
             if taken and sent is not None:
                 self.latency_ms.add((now - sent) / 1e6)

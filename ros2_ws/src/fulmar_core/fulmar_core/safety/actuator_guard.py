@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.robot import Actuators
 from fulmar_core.safety.command_gate import command_problem, name_problem
 from fulmar_core.safety.watchdog import Watchdog
 
@@ -17,7 +17,7 @@ class ActuatorGuard:
     Not thread-safe; the caller holds a lock.
     """
 
-    def __init__(self, actuators: Thrusters, watchdog: Watchdog) -> None:
+    def __init__(self, actuators: Actuators, watchdog: Watchdog) -> None:
         """Begin with the safe command."""
         self._actuators, self.watchdog = actuators, watchdog
         self.command = actuators.safe_command  # the newest that was taken, whatever the watchdog says

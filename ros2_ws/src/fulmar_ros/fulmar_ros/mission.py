@@ -1,0 +1,93 @@
+"""What a controller node has been told to do: goal, obstacles and block, and how far it has come."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fulmar_core.goal import Goal, stack_goals
+from fulmar_core.observation import Observer
+from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.robot import Robot
+from fulmar_core.state import RigidBodyState
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.push_block import PushBlock
+from fulmar_ros.controller_wires import sees_obstacles
+
+
+class Mission:
+    """Not thread-safe; the caller holds a lock. Computes with a batch of one, as evaluations do with many."""
+
+    def __init__(self, robot: Robot, task: Task) -> None:
+        """Begin without a goal."""
+        self._task, self._observer = task, Observer(robot, task)
+        self._goal: Goal | None = None
+        self._since_ns: int | None = None
+        self._obstacles: np.ndarray | None = None if sees_obstacles(task) else np.zeros((0, 3))
+        self._block: np.ndarray | None = None if isinstance(task, PushBlock) else np.zeros(2)
+        self._block_stamp_ns = 0
+        self.goal_stamp_ns = 0
+        self.obstacles_stamp_ns = 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything is known that the task needs."""
+        return self._goal is not None and self._obstacles is not None and self._block is not None
+
+    @property
+    def done(self) -> int:
+        """Targets reached since the goal was given."""
+        return 0 if self._goal is None else int(self._goal.done)
+
+    def give(self, goal: Goal, stamp_ns: int) -> None:
+        """Take a new goal; its time begins with the next observation."""
+        self._goal, self.goal_stamp_ns, self._since_ns = goal, stamp_ns, None
+
+    def see_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
+        """Take obstacles, shape (m, 3), instead of those known so far."""
+        self._obstacles, self.obstacles_stamp_ns = discs, stamp_ns
+
+    def see_block(self, place: np.ndarray, stamp_ns: int) -> None:
+        """Take the place of the block, shape (2,) [m]."""
+        self._block, self._block_stamp_ns = place, stamp_ns
+
+    def lacks_block_of(self, stamp_ns: int) -> bool:
+        """Whether the block of this stamp is still to come."""
+        return isinstance(self._task, PushBlock) and self._block_stamp_ns != stamp_ns
+
+    def distance(self, state: RigidBodyState) -> float:
+        """From a state to the current target; 0 where the task has none, infinite before everything is known [m]."""
+        if not self.complete:
+            return math.inf
+        error = self._task.errors(_batch(state), self._batched()).position
+        return 0.0 if error is None else float(error[0])
+
+    def observe(self, state: RigidBodyState, stamp_ns: int, previous_command: np.ndarray) -> np.ndarray:
+        """Go on to the next target if the current one is reached, and observe.
+
+        Args:
+            state: Measured state.
+            stamp_ns: When it was measured [ns].
+            previous_command: What was last commanded, shape (m,).
+
+        Returns:
+            What the controller sees, shape (n,).
+        """
+        assert self._goal is not None
+        body = _batch(state)
+        if self._since_ns is None:
+            self._since_ns = stamp_ns
+        else:
+            time_s = np.array([(stamp_ns - self._since_ns) / 1e9])
+            self._goal = self._task.advance(self._batched(), body, time_s)[0]
+        return np.asarray(self._observer(body, self._batched(), previous_command[None]))[0]
+
+    def _batched(self) -> Goal:
+        assert self._goal is not None and self._obstacles is not None and self._block is not None
+        goal = self._goal
+        return stack_goals([Goal(goal.targets, np.asarray(goal.done), self._obstacles, self._block)])
+
+
+def _batch(state: RigidBodyState) -> PlanarState:
+    return planar_of(state)[None]
