@@ -216,8 +216,11 @@ def test_failures_noise_delays_and_pushes_are_the_batch_s_own_in_every_backend(n
     np.testing.assert_allclose(mock.position_error, batch.position_error, rtol=0, atol=2e-3)
 
 
-@pytest.mark.parametrize(("name", "atol"), [("floating_platform", 0.02), ("kingfisher", 0.01)])
-def test_mujoco_floats_under_every_disturbance_as_the_batch_does(name, atol):
+@pytest.mark.parametrize(
+    ("name", "atol"),
+    [("floating_platform", 0.02), ("kingfisher", 0.01), ("turtlebot2", 0.1), ("jetbot", 0.2)],
+)
+def test_mujoco_moves_under_every_disturbance_as_the_batch_does(name, atol):
     robot, task = load_robot(name), replace(load_task("go_to_position"), episode_s=8.0)
     given = {"task": task, "scenario": load_scenario("randomised"), "episodes": 5, "seed": 3}
     batch = roll_out_in_batch(Swaying(robot), robot, **given)

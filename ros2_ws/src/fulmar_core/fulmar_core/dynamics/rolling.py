@@ -1,7 +1,7 @@
 """A planar body on wheels that do not slip sideways: it goes where it points.
 
 The wheels are driven by speed servos: the speed follows its target with the drive's lag, as fast as motors and friction
-allow, and a push from outside only counts along the way the wheels roll.
+allow. A push from outside only counts along the way the wheels roll, and only where it is more than the motors hold.
 """
 
 from __future__ import annotations
@@ -50,12 +50,13 @@ def rolling_step(
     wanted = target[0] * gain[0]
     wheels = 2.0 if isinstance(drive, DifferentialDrive) else 1.0
     most = wheels * drive.wheel_force / world.mass
-    acceleration = clip((wanted - speed) / lag, -most, most)
-    speed = speed + dt * (acceleration + (c * outside[0] + s * outside[1]) / world.mass)
+    along = (c * outside[0] + s * outside[1]) / world.mass
+    speed = speed + dt * clip((wanted - speed) / lag, along - most, along + most)
     if isinstance(drive, DifferentialDrive):
         fastest = drive.wheel_force * drive.track / world.yaw_inertia
-        turning = clip((target[1] * gain[1] - state.yaw_rate) / lag, -fastest, fastest)
-        yaw_rate = state.yaw_rate + dt * (turning + outside[2] / world.yaw_inertia)
+        twist = outside[2] / world.yaw_inertia
+        turning = clip((target[1] * gain[1] - state.yaw_rate) / lag, twist - fastest, twist + fastest)
+        yaw_rate = state.yaw_rate + dt * turning
     else:
         # Bicycle model (Rajamani, "Vehicle Dynamics and Control", 2012, §2.2), rear axle as reference.
         # Tyres push sideways with friction at most; beyond it the car goes wider than it steers.
