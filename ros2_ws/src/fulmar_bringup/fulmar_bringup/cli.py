@@ -17,6 +17,7 @@ from fulmar_bringup.commands.evaluate import EPILOG as MEANINGS
 from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
 from fulmar_bringup.commands.list import list_names
+from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
 from fulmar_bringup.commands.run import run
 from fulmar_bringup.commands.train import train
@@ -38,6 +39,7 @@ app = typer.Typer(
 app.command("list")(list_names)
 app.command()(run)
 app.command()(train)
+app.command()(policies)
 app.command()(export)
 app.command(epilog=MEANINGS)(evaluate)
 app.add_typer(benchmark, name="benchmark")
