@@ -286,7 +286,8 @@ def test_commands_are_cut_to_what_the_robot_can_follow(robot):
     simulation.step(np.tile(100.0 * scale, (5, 1)))
     first = simulation.command
     most = np.asarray(response.slew) * simulation.control_dt if response.slew else scale
-    np.testing.assert_allclose(first, np.tile(np.minimum(scale, most), (5, 1)), rtol=1e-6)
+    asked = robot.actuators.limited(100.0 * scale)
+    np.testing.assert_allclose(first, np.tile(np.minimum(asked, most), (5, 1)), rtol=1e-6)
     for _ in range(30):
         simulation.step(np.tile(100.0 * scale, (5, 1)))
     assert np.all(np.abs(simulation.command) <= scale + 1e-6)
