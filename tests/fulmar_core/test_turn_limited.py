@@ -1,0 +1,187 @@
+"""Bound on visits of robots that go where they point: exact where paper can tell, and never beaten."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fulmar_core.bounds import (
+    Motions,
+    bound_of,
+    goals_reached,
+    motions_of,
+    shortest_lengths,
+    top_speed_bound,
+    turn_limited_bound,
+)
+from fulmar_core.bounds.coarse_plan import coarse_plans
+from fulmar_core.bounds.fine_plan import refined
+from fulmar_core.bounds.leg_table import leg_table
+from fulmar_core.bounds.legs import best_words
+from fulmar_core.bounds.turn_course import TurnCourse
+from fulmar_core.robot import load_robot
+
+RADIUS = 0.2
+CAR = Motions(1.0, 0.5, ((1.0, 0.8), (-0.5, 0.8), (0.0, 0.8)))
+
+
+def courses(episodes: int, waypoints: int = 6, seed: int = 0) -> np.ndarray:
+    """Waypoints in a square of 6 m, 1 m apart at least, shape (episodes, waypoints, 2)."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(-3.0, 3.0, (episodes, 1, 2))
+    while places.shape[1] < waypoints:
+        new = rng.uniform(-3.0, 3.0, (episodes, 2))
+        near = np.linalg.norm(new - places[:, -1], axis=-1) < 1.0
+        new[near] = -places[near, -1] + 0.8 * np.sign(-places[near, -1])
+        places = np.concatenate((places, new[:, None]), axis=1)
+    return places
+
+
+def bound(waypoints, duration_s, motions=CAR, start=(0.0, 0.0), **more):
+    return turn_limited_bound(
+        np.array(start), waypoints, motions=motions, radius=RADIUS, duration_s=duration_s, **more
+    )
+
+
+def assert_last_goal_takes(seconds: float, waypoints, **more) -> None:
+    """The last waypoint is in time at `seconds`, and late at 5 % less."""
+    count = len(waypoints)
+    assert bound(waypoints, seconds * 1.001, loop=False, **more).goals == count
+    assert bound(waypoints, seconds * 0.95, loop=False, **more).goals == count - 1
+
+
+@pytest.mark.parametrize("distance", [1.0, 4.0])
+def test_a_straight_way_takes_its_length_at_top_speed(distance):
+    assert_last_goal_takes(distance - RADIUS, np.array([[distance, 0.0]]), start_yaw=np.array(0.0))
+
+
+def test_a_robot_goes_astern_where_that_is_faster_than_turning():
+    slow = Motions(1.0, 0.5, ((0.0, 0.2),))
+    assert_last_goal_takes(1.8 / 0.5, np.array([[-2.0, 0.0]]), start_yaw=np.array(0.0), motions=slow)
+
+
+def test_turning_on_the_spot_takes_its_angle_over_the_turn_rate():
+    crawler = Motions(1.0, 0.0, ((0.0, 0.5),))
+    angle = 2.0 - math.asin(RADIUS / 4.0)
+    seconds = angle / 0.5 + math.sqrt(4.0**2 - RADIUS**2)  # to where the disc is touched first, by a tangent
+    place = np.array([[4.0 * math.cos(2.0), 4.0 * math.sin(2.0)]])
+    direct = 2.0 / 0.5 + 4.0 - RADIUS
+    best = min(
+        abs(2.0 - math.asin(RADIUS * math.sin(a) / 4.0)) / 0.5
+        + 4.0 * math.cos(math.asin(RADIUS * math.sin(a) / 4.0))
+        - RADIUS * math.cos(a)
+        for a in np.linspace(0.0, 0.5 * math.pi, 200)
+    )
+    assert best <= min(seconds, direct) + 1e-9
+    assert_last_goal_takes(best, place, start_yaw=np.array(0.0), motions=crawler)
+
+
+def test_a_half_turn_of_a_car_takes_half_its_circle():
+    forward = Motions(1.0, 0.0, ((1.0, 0.8),))
+    times, _ = best_words(forward, np.array([0.0]), np.array([2.5]), np.array([math.pi]))
+    assert times[0, 0] == pytest.approx(math.pi / 0.8)
+
+
+def test_free_turning_is_travel_at_top_speed():
+    waypoints = courses(12, seed=1)
+    free = Motions(1.0, 1.0, ((0.0, 1e4),))
+    fastest = top_speed_bound(np.zeros(2), waypoints, radius=RADIUS, top_speed=1.0, duration_s=30.0)
+    np.testing.assert_allclose(bound(waypoints, 30.0, free).progress, fastest.progress, atol=1e-9)
+    course = TurnCourse(np.zeros((12, 2)), None, waypoints, RADIUS)
+    plan = coarse_plans(course, leg_table(free, 0), np.inf).plan_to(np.arange(12), np.full(12, 6))
+    _, times = refined(course, free, plan, np.full(12, 6))
+    lengths = shortest_lengths(np.zeros((2, 12)), waypoints.transpose(1, 2, 0), radius=RADIUS)
+    np.testing.assert_allclose(times[:, -1], lengths[-1], rtol=2e-3)  # what grids cost
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        Motions(1.3, 0.5, ((1.3, 0.8), (1.0, 0.8), (-0.5, 0.8), (0.0, 0.8))),
+        Motions(1.0, 0.8, ((1.0, 0.8), (-0.8, 0.8), (-0.5, 0.8), (0.0, 0.8))),
+        Motions(1.0, 0.5, ((1.0, 1.2), (-0.5, 1.2), (0.0, 1.2), (1.0, 0.8), (-0.5, 0.8))),
+    ],
+)
+def test_who_can_do_more_reaches_no_less(more):
+    waypoints = courses(12, seed=2)
+    assert np.all(bound(waypoints, 40.0, more).progress >= bound(waypoints, 40.0).progress - 0.05)
+
+
+def test_more_time_and_a_free_heading_reach_no_less():
+    waypoints, yaw = courses(8, seed=3), np.linspace(-3.0, 3.0, 8)
+    fixed = bound(waypoints, 30.0, start_yaw=yaw)
+    assert np.all(bound(waypoints, 40.0, start_yaw=yaw).goals >= fixed.goals)
+    assert np.all(bound(waypoints, 30.0).progress >= fixed.progress - 0.05)
+
+
+def drive(motions: Motions, waypoints, duration_s, *, width, gain, dt=0.05):
+    """Steer for the next waypoint: turn on the spot outside a cone, else go on an arc; shape (E, steps, 2)."""
+    episodes, rows = len(waypoints), np.arange(len(waypoints))
+    turns = np.array(sorted({(w, v) for v, w in motions.turns if v >= 0.0}))
+    fastest = np.array([max(v for w, v in turns if w >= rate) for rate in turns[:, 0]])
+    spot = max([w for v, w in motions.turns if v == 0.0])
+    x, yaw, done, seen = np.zeros((episodes, 2)), np.zeros(episodes), np.zeros(episodes, dtype=int), []
+    for _ in range(round(duration_s / dt)):
+        to = waypoints[rows, done % waypoints.shape[1]] - x
+        error = np.angle(np.exp(1j * (np.arctan2(to[:, 1], to[:, 0]) - yaw)))
+        away = np.abs(error) > width
+        rate = np.clip(gain * error, -1.0, 1.0) * np.where(away, spot, turns[-1, 0])
+        grid = np.concatenate(([0.0], turns[:, 0]))
+        ahead = np.interp(np.abs(rate), grid, np.concatenate(([motions.ahead], fastest)))
+        speed = np.where(away, 0.0, ahead)
+        middle = yaw + 0.5 * dt * rate
+        x = x + dt * speed[:, None] * np.stack((np.cos(middle), np.sin(middle)), axis=-1)
+        yaw = yaw + dt * rate
+        seen.append(x)
+        done += np.linalg.norm(waypoints[rows, done % waypoints.shape[1]] - x, axis=1) < RADIUS
+    return np.stack(seen, axis=1)
+
+
+@pytest.mark.parametrize("robot", ["turtlebot2", "kingfisher"])
+def test_no_steering_beats_the_bound(robot):
+    motions, waypoints = motions_of(load_robot(robot)), courses(16, seed=4)
+    most = bound(waypoints, 60.0, motions, start_yaw=np.zeros(16))
+    best = np.zeros(16, dtype=int)
+    for width, gain in ((0.3, 3.0), (0.8, 3.0), (1.5, 2.0)):
+        track = drive(motions, waypoints, 60.0, width=width, gain=gain)
+        best = np.maximum(best, goals_reached(track, waypoints, radius=RADIUS))
+    assert np.all(best <= most.goals)
+    assert np.mean(best / most.goals) > 0.45  # the bound is one, and not a sky
+
+
+def test_an_episode_alone_has_the_bound_that_it_has_in_a_batch():
+    waypoints, yaw = courses(3, seed=5), np.array([0.3, -1.0, 2.0])
+    together = bound(waypoints, 25.0, start_yaw=yaw)
+    alone = [bound(waypoints[i], 25.0, start_yaw=yaw[i]) for i in range(3)]
+    np.testing.assert_allclose(together.progress, [one.progress for one in alone], atol=1e-6)
+
+
+def test_a_boat_holds_what_drag_and_propellers_balance():
+    motions = motions_of(load_robot("kingfisher"))
+    assert motions.ahead == pytest.approx(math.sqrt(39.0 / 17.257603))
+    assert motions.astern == pytest.approx(math.sqrt(8.0 / 17.257603))
+    speed, rate = max(motions.turns, key=lambda turn: turn[1])
+    assert (5.83 + 17.33600724 * rate) * rate == pytest.approx(23.5 * 0.37765)
+    assert speed == pytest.approx(math.sqrt(15.5 / 17.257603))
+
+
+def test_each_family_has_its_bound():
+    waypoints = courses(1, seed=6)[0]
+    names = {
+        robot: bound_of(load_robot(robot), np.zeros(2), waypoints, RADIUS, 20.0).name
+        for robot in ("floating_platform", "kingfisher", "turtlebot2", "leatherback")
+    }
+    assert names == {
+        "floating_platform": "time_optimal",
+        "kingfisher": "turn_limited",
+        "turtlebot2": "turn_limited",
+        "leatherback": "turn_limited",
+    }
+
+
+@pytest.mark.parametrize("wrong", [(0.0, 0.5, ((0.0, 1.0),)), (1.0, -0.1, ((0.0, 1.0),)), (1.0, 0.5, ())])
+def test_what_cannot_move_or_turn_is_refused(wrong):
+    with pytest.raises(ValueError, match="'ahead' must be greater than 0"):
+        Motions(*wrong)
