@@ -41,7 +41,7 @@ def test_what_was_asked_for_and_who_did_it_come_along(reached):
     record = read_run(reached)
     assert record.info["goal"] == [0.0, 0.0, 0.0]
     assert record.controller["controller"] == "lqr"
-    assert [goal.pose.position_in_world.tolist() for goal in record.goals] == [[0.0, 0.0, 0.0]]
+    assert [goal.targets.tolist() for goal in record.goals] == [[[0.0, 0.0, 0.0]]]
     assert record.last_health("plant").values["watchdog_trips"] == "0"
     assert record.last_health("controller").values["mode"] == "active"
     assert record.last_health("nobody") is None
@@ -56,7 +56,7 @@ def test_a_goal_point_is_a_goal_too(tmp_path):
 
     bag = write_run(tmp_path / "bag", Plan(task="go_to_position", duration_s=1.0, goal=(1.0, 2.0, 0.0)))
     (goal,) = read_run(bag).goals
-    assert goal.pose.position_in_world.tolist() == [1.0, 2.0, 0.0]
+    assert goal.targets.tolist() == [[1.0, 2.0, 0.0]]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.999])

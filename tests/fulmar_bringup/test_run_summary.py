@@ -33,7 +33,7 @@ def test_a_run_that_reached_its_goal_says_so(reached):
     assert summary["final_heading_error_deg"] == pytest.approx(float(degrees))
     assert summary["duration_s"] == pytest.approx(40.0)
     assert summary["steps"] == 201
-    assert 5.0 < summary["time_to_target_s"] < 15.0
+    assert 4.0 < summary["time_to_target_s"] < 15.0
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
@@ -41,12 +41,12 @@ def test_times_count_from_the_first_state_as_they_do_for_steps_in_metrics(reache
     record = read_run(reached)
     position = np.hypot(*record.truth.position[:, :2].T)
     heading = np.abs(np.rad2deg(yaw_of(record.truth.quat_xyzw)))
-    outside = np.flatnonzero((position >= 0.05) | (heading > 5.0))
+    outside = np.flatnonzero((position > 0.1) | (heading > 10.0))
     judgement = judge(record)
-    assert judgement.time_to_target_s == pytest.approx(0.02 * (outside[-1] + 1), abs=1e-6)
+    assert judgement.figure("time_to_target_s") == pytest.approx(0.02 * (outside[-1] + 1), abs=1e-6)
     assert judgement.time_s[[0, -1]] == pytest.approx([0.02, 40.0])
     assert judgement.duration_s == pytest.approx(40.0)
-    np.testing.assert_allclose(judgement.run.position_error[0], position[1:])
+    np.testing.assert_allclose(judgement.run.position_error[0], position[1:], rtol=1e-6)
     np.testing.assert_allclose(judgement.run.actuators_in_use[0], record.applied.effort[:-1].mean(axis=1))
 
 
@@ -123,7 +123,7 @@ def test_a_silent_controller_shows_as_a_trip_and_a_miss(silenced):
 def test_a_run_shorter_than_the_window_is_no_success(tmp_path):
     at_goal = Plan(duration_s=3.0, start=(0.0, 0.0, 0.0))
     summary = summarise(read_run(write_run(tmp_path / "bag", at_goal)))
-    assert summary["final_position_error_m"] < 0.05
+    assert summary["final_position_error_m"] < 0.1
     assert summary["success"] is False
 
 
@@ -131,7 +131,7 @@ def test_leaving_the_tolerance_once_in_the_window_is_no_success(reached):
     record = read_run(reached)
     assert judge(record).success
     position = record.truth.position.copy()
-    position[-100, 0] += 0.06
+    position[-100, 0] += 0.15
     assert not judge(
         dataclasses.replace(record, truth=dataclasses.replace(record.truth, position=position))
     ).success
@@ -182,3 +182,71 @@ def test_a_record_without_a_task_or_a_goal_is_refused(reached):
         summarise(dataclasses.replace(record, info={}))
     with pytest.raises(BagError, match="holds no goal"):
         summarise(dataclasses.replace(record, goals=(), info={"task": "go_to_pose"}))
+    with pytest.raises(BagError, match="names no robot"):
+        summarise(dataclasses.replace(record, info={"task": "go_to_pose"}))
+
+
+DRIVEN = {"controller": "classical", "control_hz": 10.0, "start": None, "goal": None, "weights": None}
+NEW = ("goals_reached", "velocity_error_m_s", "yaw_rate_error_deg_s")
+
+
+def summary_of(folder, robot, task, **changes):
+    plan = Plan(**{**DRIVEN, "robot": robot, "task": task, "duration_s": 30.0, **changes})
+    return summarise(read_run(write_run(folder / "bag", plan)))
+
+
+def test_waypoints_are_counted_by_the_tolerance_of_the_task(tmp_path):
+    summary = summary_of(tmp_path, "turtlebot2", "go_through_positions", duration_s=60.0)
+    assert summary["goals_reached"] >= 3.0
+    assert summary["success"] is (summary["goals_reached"] >= 5.0)
+    assert summary["final_position_error_m"] is None
+    assert summary["time_to_target_s"] is None
+
+
+def test_gates_are_counted_from_the_robot_s_own_way(tmp_path):
+    plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "race_waypoints"}, duration_s=60.0)
+    record = read_run(write_run(tmp_path / "bag", plan))
+    as_gates = dataclasses.replace(record, info={**record.info, "task": "race_gates"})
+    assert judge(as_gates).figure("goals_reached") >= 1.0
+
+
+def test_a_velocity_is_judged_against_the_target_of_its_time(tmp_path):
+    plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "track_velocities"}, duration_s=30.0)
+    record = read_run(write_run(tmp_path / "bag", plan))
+    assert [goal.targets.shape for goal in record.goals] == [(1, 3)] * 3
+    judgement, summary = judge(record), summarise(record)
+    assert judgement.run.goals[0, [0, -1]].tolist() == [0.0, 2.0]
+    assert 0.0 < summary["velocity_error_m_s"] < 0.2
+    assert 0.0 < summary["yaw_rate_error_deg_s"] < 20.0
+    assert summary["final_position_error_m"] is summary["final_heading_error_deg"] is None
+
+
+def test_obstacles_of_the_bag_count_as_touched(tmp_path):
+    plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "go_to_position_with_obstacles"}, duration_s=20.0)
+    record = read_run(write_run(tmp_path / "bag", plan))
+    assert record.obstacles.shape[1] == 3
+    assert len(record.obstacles) > 0
+    assert summarise(record)["collided"] is False
+    x, y = record.truth.position[500, :2]
+    there = np.concatenate((record.obstacles, [[x, y, 0.2]]))
+    assert summarise(dataclasses.replace(record, obstacles=there))["collided"] is True
+
+
+def test_of_a_block_its_own_place_counts_and_not_the_robot_s(tmp_path):
+    plan = Plan(**{**DRIVEN, "robot": "floating_platform", "task": "go_to_position"}, duration_s=5.0)
+    record = read_run(write_run(tmp_path / "bag", plan))
+    stamps = record.truth.stamp_s
+    x, y = record.goals[0].targets[0, :2]
+    block = dataclasses.replace(
+        record.block, stamp_s=stamps, xy=np.tile([x + 0.03, y + 0.04], (len(stamps), 1))
+    )
+    info = {**record.info, "task": "push_block"}
+    summary = summarise(dataclasses.replace(record, info=info, block=block))
+    assert summary["final_position_error_m"] == pytest.approx(0.05, abs=1e-6)
+    assert summary["success"] is True
+
+
+def test_what_a_task_does_not_ask_is_none(reached):
+    summary = summarise(read_run(reached))
+    assert [summary[name] for name in NEW] == [None] * 3
+    assert summary["collided"] is False

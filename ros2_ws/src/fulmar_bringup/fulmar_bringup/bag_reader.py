@@ -12,20 +12,21 @@ import numpy as np
 import yaml
 from mcap.records import Channel, Message, Metadata, Schema
 
-from fulmar_bringup.run_record import Actuation, Goal, HealthSample, Motion, RunRecord
+from fulmar_bringup.run_record import Actuation, GivenGoal, HealthSample, Motion, Places, RunRecord
 from fulmar_core.errors import BagError
-from fulmar_core.rotation import from_yaw, rotate
-from fulmar_core.state import Pose
+from fulmar_core.rotation import rotate, yaw_of
 from fulmar_core.topics import (
     ACTUATORS_STATE,
+    BLOCK,
     COMMAND,
     DIAGNOSTICS,
-    GOAL_POINT,
-    GOAL_POSE,
+    GOAL_WIRES,
     METADATA,
+    OBSTACLES,
     ODOMETRY,
     STATUS,
     TRUTH,
+    VELOCITY_COMMAND,
     Wire,
 )
 from fulmar_ros.bag_metadata import METADATA_FILE
@@ -33,7 +34,20 @@ from fulmar_ros.bag_records import bag_file, read_records
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
 
-READ = (TRUTH, ODOMETRY, ACTUATORS_STATE, COMMAND, GOAL_POSE, GOAL_POINT, METADATA, STATUS, DIAGNOSTICS)
+READ = (
+    TRUTH,
+    ODOMETRY,
+    ACTUATORS_STATE,
+    COMMAND,
+    VELOCITY_COMMAND,
+    *GOAL_WIRES.values(),
+    OBSTACLES,
+    BLOCK,
+    METADATA,
+    STATUS,
+    DIAGNOSTICS,
+)
+ADD = 0  # action of a marker that is there
 Decoded = list[tuple[float, Any]]  # when it was recorded [s], and the message
 
 
@@ -118,16 +132,23 @@ def _decode(
 
 def _record(path: Path, info: dict[str, Any], decoded: dict[Wire, Decoded], warnings: list[str]) -> RunRecord:
     texts = [_json_object(message.data) for _, message in decoded[METADATA]]
-    goals = [_goal(log_s, m.header, m.pose.position, m.pose.orientation) for log_s, m in decoded[GOAL_POSE]]
-    goals += [_goal(log_s, m.header, m.point, None) for log_s, m in decoded[GOAL_POINT]]
+    goals = [
+        GivenGoal(_stamp_s(message.header), log_s, _targets(message, name))
+        for name, wire in GOAL_WIRES.items()
+        for log_s, message in decoded[wire]
+    ]
     return RunRecord(
         path=path,
         info=info,
         truth=_motion(decoded[TRUTH]),
         odom=_motion(decoded[ODOMETRY]),
         applied=_actuation(decoded[ACTUATORS_STATE], ACTUATORS_STATE, warnings),
-        commanded=_actuation(decoded[COMMAND], COMMAND, warnings),
+        commanded=_velocity_commands(decoded[VELOCITY_COMMAND])
+        if decoded[VELOCITY_COMMAND]
+        else _actuation(decoded[COMMAND], COMMAND, warnings),
         goals=tuple(sorted(goals, key=lambda goal: goal.log_s)),
+        obstacles=_discs(decoded[OBSTACLES]),
+        block=_places(decoded[BLOCK]),
         controller=next((text for text in reversed(texts) if text), {}),
         health=_health(decoded[STATUS] + decoded[DIAGNOSTICS]),
         warnings=tuple(warnings),
@@ -170,11 +191,49 @@ def _actuation(messages: Decoded, wire: Wire, warnings: list[str]) -> Actuation:
     )
 
 
-def _goal(log_s: float, header: Any, position: Any, orientation: Any) -> Goal:
-    quat = from_yaw(np.asarray(0.0))
-    if orientation is not None:
-        quat = np.array([orientation.x, orientation.y, orientation.z, orientation.w])
-    return Goal(_stamp_s(header), log_s, Pose(np.array([position.x, position.y, position.z]), quat))
+def _velocity_commands(messages: Decoded) -> Actuation:
+    effort = [(message.twist.linear.x, message.twist.angular.z) for _, message in messages]
+    return Actuation(
+        stamp_s=np.array([_stamp_s(message.header) for _, message in messages]),
+        log_s=np.array([log_s for log_s, _ in messages]),
+        names=("speed", "yaw_rate"),
+        effort=np.array(effort, dtype=float).reshape(-1, 2),
+    )
+
+
+def _targets(message: Any, topic: str) -> np.ndarray:
+    """Targets of a goal message, shape (k, 3)."""
+    if topic == "goal_velocity":
+        twist = message.twist
+        targets = [(twist.linear.x, twist.linear.y, twist.angular.z)]
+    elif topic == "goal_point":
+        targets = [(message.point.x, message.point.y, 0.0)]
+    else:
+        poses = message.poses if topic == "goal_path" else [message]
+        targets = [(*_xy(each.pose), _yaw(each.pose.orientation)) for each in poses]
+    return np.array(targets, dtype=float).reshape(-1, 3)
+
+
+def _xy(pose: Any) -> tuple[float, float]:
+    return pose.position.x, pose.position.y
+
+
+def _yaw(q: Any) -> float:
+    return float(yaw_of(np.array([q.x, q.y, q.z, q.w])))
+
+
+def _discs(messages: Decoded) -> np.ndarray:
+    """Obstacles of the last message, shape (m, 3)."""
+    markers = messages[-1][1].markers if messages else []
+    discs = [(*_xy(marker.pose), 0.5 * marker.scale.x) for marker in markers if marker.action == ADD]
+    return np.array(discs, dtype=float).reshape(-1, 3)
+
+
+def _places(messages: Decoded) -> Places:
+    return Places(
+        stamp_s=np.array([_stamp_s(message.header) for _, message in messages]),
+        xy=np.array([_xy(message.pose) for _, message in messages], dtype=float).reshape(-1, 2),
+    )
 
 
 def _health(messages: Decoded) -> tuple[HealthSample, ...]:

@@ -18,12 +18,11 @@ from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
 from fulmar_bringup.provenance import fulmar_version, git_revision
-from fulmar_bringup.run_record import Actuation, Motion, RunRecord
+from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.paths import config_path
-from fulmar_core.state import planar_pose
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 
@@ -121,9 +120,9 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
             )
 
     try:
-        x, y, heading = request.goal
-        goal = planar_pose(np.asarray(x), np.asarray(y), np.deg2rad(heading))
-        overseer.give_goal(goal, time_ns=SIMULATION_START_NS, alive=starting)
+        overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=starting)
+        if load_task(plan.task).goal_topic == "goal_velocity":
+            overseer.change_targets(request.mission, ahead_s=0.5 / plan.control_hz)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)
@@ -192,7 +191,7 @@ def _recording(request: RunRequest) -> dict[str, str]:
     info = {
         **{key: value for key, value in asdict(plan).items() if key not in ("start", "supervised")},
         "start": list(plan.start),
-        "goal": list(request.goal),
+        "goal": list(request.goal) if request.goal else None,
         "fulmar_version": fulmar_version(),
         "git_revision": git_revision(),
         "command": request.command,
@@ -222,6 +221,8 @@ def _nothing_recorded(request: RunRequest) -> RunRecord:
         applied=actuation,
         commanded=actuation,
         goals=(),
+        obstacles=np.empty((0, 3)),
+        block=Places(none, np.empty((0, 2))),
         controller={},
         health=(),
         warnings=(),

@@ -76,6 +76,7 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
     """
     parameters: dict[str, Parameter] = {
         "robot": plan.robot,
+        "task": plan.task,
         "backend": plan.backend,
         "scenario": plan.scenario,
         "seed": plan.seed,

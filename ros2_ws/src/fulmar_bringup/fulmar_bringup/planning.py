@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,8 @@ from fulmar_bringup.system import check_names, default_control_hz
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.goal import Goal
+from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, read_passport
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
@@ -20,6 +22,7 @@ from fulmar_core.tasks import Task, load_task
 from policy_server.shipped import shipped_policy
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
+PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
 
 
 @dataclass(frozen=True)
@@ -27,9 +30,10 @@ class RunRequest:
     """What to run, where to go, and where to record."""
 
     plan: RunPlan
-    goal: PoseTuple
+    goal: PoseTuple | None  # None: the task has more than one target, or none in space
     record: Path  # folder of the bag; must not exist
     command: str  # command line, for the record
+    mission: Goal = field(compare=False)  # everything that the task is about; `goal` is a part of it
 
 
 def plan_run(
@@ -58,8 +62,9 @@ def plan_run(
         controller: Name of the controller.
         backend: Name of the backend.
         policy: Bundle; the shipped one by default.
-        goal: x [m], y [m], heading [deg]; drawn from the seed by default.
-        start: Same; by default as far from the goal as the seed's episode begins.
+        goal: x [m], y [m], heading [deg]; drawn from the seed by default, always so for tasks with other goals.
+        start: Same; by default as far from the goal as the seed's episode begins. Where something stands about, it
+            stays where the seed has put it, and so does the start.
         duration_s: Simulated time; the task's episode by default [s].
         lockstep: Whether plant and controller wait for each other.
         rate: Simulated seconds a wall-clock second.
@@ -88,21 +93,11 @@ def plan_run(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
         )
     episode = draw_episode(the_robot, the_task, load_scenario(scenario), seed=seed, number=0)
-    drawn_goal = _tuple_of(episode.goal.position_in_world, episode.goal.quat_xyzw)
-    drawn_start = _tuple_of(episode.start.position_in_world, episode.start.quat_xyzw)
-    goal = goal or drawn_goal
-    if start is None:
-        start = (
-            goal[0] + drawn_start[0] - drawn_goal[0],
-            goal[1] + drawn_start[1] - drawn_goal[1],
-            drawn_start[2],
-        )
-    distance = math.hypot(start[0] - goal[0], start[1] - goal[1])
-    if distance > the_robot.limits.geofence:
-        raise ConfigError(
-            f"start and goal are {distance:.1f} m apart, the geofence of '{robot}' is {the_robot.limits.geofence:g} m. "
-            "Bring them nearer to each other."
-        )
+    mission, drawn_start = episode.goal, _pose_of_state(episode.start)
+    if goal is not None:
+        mission, drawn_start = _moved(the_task, mission, drawn_start, goal)
+    start = start or drawn_start
+    _check_distance(the_robot, the_task, mission, start)
     plan = RunPlan(
         robot=robot,
         task=task,
@@ -117,7 +112,48 @@ def plan_run(
         lockstep=lockstep,
         rate=rate,
     )
-    return RunRequest(plan, goal, record, command)
+    goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
+    return RunRequest(plan, goal, record, command, mission)
+
+
+def default_task(robot: str) -> str:
+    """What a robot does if nobody says: the hardest of the plain tasks that its own policy can."""
+    return "go_to_pose" if shipped_policy(robot, "go_to_pose") else "go_to_position"
+
+
+def _moved(task: Task, mission: Goal, start: PoseTuple, goal: PoseTuple) -> tuple[Goal, PoseTuple]:
+    """Put another target into a drawn mission, and move the start along where nothing stands about.
+
+    Raises:
+        ConfigError: The task has no single target in space.
+    """
+    if task.goal_topic not in PLACES:
+        raise ConfigError(
+            f"the targets of task '{task.name}' cannot be said in one --goal. Leave it out: --seed draws them. "
+            "Or publish your own while a system runs."
+        )
+    x, y, heading = goal
+    target = np.array([[x, y, math.radians(heading)]])
+    if not (mission.obstacles.size or mission.block.any()):
+        old = mission.current
+        start = (x + start[0] - float(old[0]), y + start[1] - float(old[1]), start[2])
+    return replace(mission, targets=target), start
+
+
+def _check_distance(robot: Robot, task: Task, mission: Goal, start: PoseTuple) -> None:
+    """Refuse a start beyond the geofence around the first target.
+
+    Raises:
+        ConfigError: If it is.
+    """
+    if task.goal_topic == "goal_velocity":
+        return
+    distance = math.dist(start[:2], mission.current[:2])
+    if distance > robot.limits.geofence:
+        raise ConfigError(
+            f"start and goal are {distance:.1f} m apart, the geofence of '{robot.name}' is "
+            f"{robot.limits.geofence:g} m. Bring them nearer to each other."
+        )
 
 
 def _check_finite(**values: PoseTuple | float | None) -> None:
@@ -186,12 +222,15 @@ def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: fl
     if folder is None:
         raise BundleError(
             f"no policy is shipped for '{robot.name}' and '{task.name}'. "
-            f"Train one with `fulmar train {robot.name} {task.name}`, or use --controller lqr."
+            f"Train one with `fulmar train {robot.name} {task.name}`, or use --controller classical."
         )
     check_fit(read_passport(folder), robot, task, control_hz, where=str(folder))
     return folder
 
 
-def _tuple_of(position: np.ndarray, quat_xyzw: np.ndarray) -> PoseTuple:
-    yaw = 2.0 * math.atan2(float(quat_xyzw[2]), float(quat_xyzw[3]))
-    return float(position[0]), float(position[1]), math.degrees(math.remainder(yaw, 2.0 * math.pi))
+def _pose_of_state(state: PlanarState) -> PoseTuple:
+    return _pose_of(np.array([state.x, state.y, state.yaw]))
+
+
+def _pose_of(target: np.ndarray) -> PoseTuple:
+    return float(target[0]), float(target[1]), math.degrees(float(wrapped(np.asarray(target[2]))))

@@ -26,12 +26,14 @@ from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
+from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.errors import LockstepError, RunFailed
-from fulmar_core.metrics import Trajectories, TrajectoryLog, join, select
+from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
+from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import Task, load_task
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import SWITCH_INTERVAL_S, end_with_parent, spinning
 from sim_nodes.sim_node import make_backend
@@ -49,7 +51,8 @@ def roll_out_through_ros(
     pairs as there are cores run at once, each in a ROS domain of its own. The episodes do not depend on how many.
 
     Args:
-        plan: Robot, task, controller, backend, rate and seed; its start and duration do not matter.
+        plan: Robot, task, controller, backend, rate and seed; its duration is the length of an episode, 0 the task's
+            own; its start does not matter.
         episodes: Number of episodes, >= 1.
         jobs: Number of pairs, >= 1.
         progress: Told how many control steps have been done.
@@ -179,7 +182,7 @@ def _episodes(
     numbers: range,
     progress: Progress,
 ) -> Trajectories:
-    robot, task, scenario = load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario)
+    robot, task, scenario = load_robot(plan.robot), _task_of(plan), load_scenario(plan.scenario)
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
     steps = episode_steps(task, control_dt)
     runs: list[Trajectories] = []
@@ -204,20 +207,31 @@ def _episodes(
         # The same instant twice would be the same goal: the clock moves on between episodes.
         plant.clock.advance(control_dt)
         overseer.give_goal(episode.goal, time_ns=plant.clock.now_ns, alive=alive)
-        log = TrajectoryLog(control_dt)
+        log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, episode.goal, control_dt)
+
+        def on_step(
+            sample: Sample, command: np.ndarray, log: TrajectoryLog = log, judge: Judge = judge
+        ) -> None:
+            nonlocal began
+            assert sample.truth is not None
+            truth, before = planar_of(sample.truth), judge.goal.done
+            goal = judge.see(truth, sample.block)
+            log.add(truth, goal, command)
+            if task.goal_topic == "goal_velocity" and goal.done != before:
+                began = time.monotonic()
+                overseer.give_goal(goal, time_ns=plant.clock.now_ns, alive=alive)
+
         try:
-            plant.run_episode(
-                episode,
-                number=number,
-                seed=plan.seed,
-                steps=steps,
-                on_step=lambda sample, command, log=log, goal=episode.goal: log.add(
-                    sample.truth, goal, command
-                ),
-            )
+            plant.run_episode(episode, number=number, seed=plan.seed, steps=steps, on_step=on_step)
         except LockstepError:
             raise_if_ended()  # a controller that has ended is a better reason than its silence
             raise
         runs.append(log.trajectories())
         progress(done * steps)
     return join(runs)
+
+
+def _task_of(plan: RunPlan) -> Task:
+    """The task, with the length of its episodes."""
+    task = load_task(plan.task)
+    return replace(task, episode_s=plan.duration_s) if plan.duration_s else task

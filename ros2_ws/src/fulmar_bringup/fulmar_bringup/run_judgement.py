@@ -1,4 +1,4 @@
-"""A recorded run seen through its task: errors over time, success, gas.
+"""A recorded run seen through its task: errors over time, success, use of the actuators.
 
 The rules themselves live in `fulmar_core.metrics`; here a record is only brought into their shape.
 """
@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bringup.run_record import Actuation, Motion, RunRecord
+from fulmar_bringup.run_record import Actuation, GivenGoal, Motion, Places, RunRecord
 from fulmar_core.errors import BagError
-from fulmar_core.metrics import Trajectories, episode_metrics, successes
-from fulmar_core.state import Pose, planar_pose
+from fulmar_core.goal import Goal
+from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targets, episode_metrics, successes
+from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.tasks.planar import planar_error
+from fulmar_core.trajectories import COLUMNS
 
 
 @dataclass(frozen=True)
@@ -25,18 +27,26 @@ class Judgement:
     As in `fulmar_core.metrics`, a step is the state at its end: the first state itself is none.
     """
 
+    robot: Robot
     task: Task
-    goal: Pose  # the last one that was given
+    targets: np.ndarray  # (k, 3) of the last goal that was given; see `fulmar_core.goal.Goal`
     time_s: np.ndarray  # (n,) ends of the steps: evenly spaced, simulated time [s]
     samples: np.ndarray  # (n,) index into `record.motion` of each time
-    run: Trajectories  # one episode of n steps
-    time_to_target_s: float | None  # from when on it stayed inside the tolerance; None: it did not
+    aims: np.ndarray  # (n, 3) target that counted at each time
+    block: np.ndarray  # (n, 2) where the thing to push was, NaN where there is none [m]
+    run: Trajectories  # one episode of n steps; without a record of the actuators, its shares are NaN
+    figures: dict[str, float]  # of `metrics.episode_metrics`; NaN or absent: there is none
     duration_s: float  # [s]
 
     @property
     def success(self) -> bool:
-        """Whether the whole closing window was recorded and spent inside the tolerance."""
+        """Whether the whole closing window was recorded and spent inside the tolerance, or enough targets reached."""
         return self.long_enough and bool(successes(self.run, self.task)[0])
+
+    @property
+    def counts(self) -> bool:
+        """Whether the task is about how many targets one reaches."""
+        return counts_targets(self.task)
 
     @property
     def long_enough(self) -> bool:
@@ -47,6 +57,11 @@ class Judgement:
     def window_start_s(self) -> float:
         """Where the closing window begins, which success is judged in [s]."""
         return max(0.0, self.duration_s - self.task.tolerance.hold_s)
+
+    def figure(self, name: str) -> float | None:
+        """A figure by its name in `figures.FIGURES`; None where there is none."""
+        value = self.figures.get(name, np.nan)
+        return float(value) if np.isfinite(value) else None
 
 
 def judge(record: RunRecord) -> Judgement | None:
@@ -66,32 +81,29 @@ def judge(record: RunRecord) -> Judgement | None:
     if len(motion) < 2 or motion.stamp_s[-1] <= motion.stamp_s[0]:
         return None
     task = load_task(_text(record, "task"))
-    time_s, samples = _even(motion)
     goals = _goals(record)
-    given_s = np.array([log_s for log_s, _ in goals])
-    current = np.clip(np.searchsorted(given_s, motion.log_s[samples], side="right") - 1, 0, None)
-    goal = Pose(
-        np.stack([pose.position_in_world for _, pose in goals])[current],
-        np.stack([pose.quat_xyzw for _, pose in goals])[current],
-    )
-    states = motion.states[samples]
-    error = planar_error(states, goal)
+    robot = load_robot(_text(record, "robot"))
+    time_s, samples = _even(motion)
+    states = planar_of(motion.states)
+    block = _block(record.block, motion.stamp_s[samples], states[samples])
+    goal = _goals_at(task, goals, record.obstacles, states, samples, motion.log_s[samples], block, time_s[0])
+    # Steps one after another have the shape of episodes side by side.
+    log = TrajectoryLog(robot, task, float(time_s[0]))
+    log.add(states[samples], goal, _applied(record.applied, robot, motion.stamp_s[0] + time_s - time_s[0]))
+    columns = log.trajectories()
     run = Trajectories(
-        position_error=error.position[None],
-        heading_error=error.heading[None],
-        speed=np.linalg.norm(states.velocity_in_world, axis=-1)[None],
-        yaw_rate=states.angular_velocity_in_body[None, :, 2],
-        actuators_in_use=_in_use(record.applied, motion.stamp_s[0] + time_s - time_s[0])[None],
-        control_dt=float(time_s[0]),
+        **{name: np.swapaxes(getattr(columns, name), 0, 1) for name in COLUMNS}, control_dt=float(time_s[0])
     )
-    reached_s = float(episode_metrics(run, task)["time_to_target_s"][0])
     return Judgement(
+        robot=robot,
         task=task,
-        goal=goals[-1][1],
+        targets=goals[-1].targets,
         time_s=time_s,
         samples=samples,
+        aims=goal.current,
+        block=block if len(record.block) else np.full((len(time_s), 2), np.nan),
         run=run,
-        time_to_target_s=reached_s if np.isfinite(reached_s) else None,
+        figures={name: float(values[0]) for name, values in episode_metrics(run, task).items()},
         duration_s=float(motion.stamp_s[-1] - motion.stamp_s[0]),
     )
 
@@ -103,10 +115,11 @@ def _text(record: RunRecord, key: str) -> str:
     return value
 
 
-def _goals(record: RunRecord) -> list[tuple[float, Pose]]:
-    """Goals with the time they came [s]; what was asked for if the bag has none."""
-    if record.goals:
-        return [(goal.log_s, goal.pose) for goal in record.goals]
+def _goals(record: RunRecord) -> list[GivenGoal]:
+    """Goals as they came; what was asked for if the bag has none."""
+    given = [goal for goal in record.goals if len(goal.targets)]
+    if given:
+        return given
     asked: Any = record.info.get("goal")
     try:
         x, y, heading_deg = (float(value) for value in asked)
@@ -114,7 +127,45 @@ def _goals(record: RunRecord) -> list[tuple[float, Pose]]:
         raise BagError(
             f"{record.path}: holds no goal, and its run information has {asked!r} for one."
         ) from None
-    return [(-np.inf, planar_pose(x, y, np.deg2rad(heading_deg)))]
+    return [GivenGoal(-np.inf, -np.inf, np.array([[x, y, np.deg2rad(heading_deg)]]))]
+
+
+def _goals_at(
+    task: Task,
+    given: list[GivenGoal],
+    obstacles: np.ndarray,
+    states: PlanarState,
+    samples: np.ndarray,
+    log_s: np.ndarray,
+    block: np.ndarray,
+    dt: float,
+) -> Goal:
+    """The goal that a judge counts at each step: its current target alone, shape (n,)."""
+    newest = np.searchsorted([goal.log_s for goal in given], log_s, side="right") - 1
+    aims, done = np.empty((len(samples), 3)), np.zeros(len(samples))
+    number, before, judge = -1, 0.0, None
+    last = states[0]
+    for step, (which, sample) in enumerate(zip(newest.clip(0), samples, strict=True)):
+        if judge is None or which != number:
+            if judge is not None:  # what was reached so far counts on; of velocities, one more is over
+                before += float(judge.goal.done) + (task.goal_topic == "goal_velocity")
+            place = np.array([last.x, last.y])
+            judge = Judge(task, Goal(given[which].targets, np.asarray(0.0), obstacles, place), dt)
+            number = which
+        last = states[sample]
+        goal = judge.see(last, block[step])
+        aims[step], done[step] = goal.current, before + goal.done
+    discs = np.broadcast_to(
+        obstacles if len(obstacles) else np.zeros((1, 3)), (len(samples), max(1, len(obstacles)), 3)
+    )
+    return Goal(aims[:, None, :], done, discs, block)
+
+
+def _block(block: Places, stamp_s: np.ndarray, states: PlanarState) -> np.ndarray:
+    """Where the thing to push is at some times, the robot's own place where there is none, shape (n, 2) [m]."""
+    if not len(block):
+        return np.stack((states.x, states.y), axis=-1)
+    return block.xy[np.clip(np.searchsorted(block.stamp_s, stamp_s + 1e-6, side="right") - 1, 0, None)]
 
 
 def _even(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
@@ -127,9 +178,9 @@ def _even(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     return time_s, samples
 
 
-def _in_use(applied: Actuation, stamp_s: np.ndarray) -> np.ndarray:
-    """Share of actuators in use from some times on, shape of `stamp_s`."""
-    if not len(applied):
-        return np.full(len(stamp_s), np.nan)
+def _applied(applied: Actuation, robot: Robot, stamp_s: np.ndarray) -> np.ndarray:
+    """What was applied from some times on, NaN where that is not known, shape (n, m)."""
+    if not len(applied) or len(applied.names) != len(robot.actuators.names):
+        return np.full((len(stamp_s), len(robot.actuators.names)), np.nan)
     newest = np.clip(np.searchsorted(applied.stamp_s, stamp_s + 1e-6, side="right") - 1, 0, None)
-    return np.mean(applied.effort != 0.0, axis=1)[newest]
+    return applied.effort[newest]

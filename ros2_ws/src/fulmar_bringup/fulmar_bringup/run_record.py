@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.state import Pose, RigidBodyState
+from fulmar_core.state import RigidBodyState
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,24 @@ class Actuation:
 
 
 @dataclass(frozen=True)
-class Goal:
+class Places:
+    """Where one thing was over time."""
+
+    stamp_s: np.ndarray  # (n,) [s]
+    xy: np.ndarray  # (n, 2) in the world [m]
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.stamp_s)
+
+
+@dataclass(frozen=True)
+class GivenGoal:
     """A goal as it was given."""
 
     stamp_s: float  # [s]
     log_s: float  # [s]
-    pose: Pose
+    targets: np.ndarray  # (k, 3) as in `fulmar_core.goal.Goal`
 
 
 @dataclass(frozen=True)
@@ -78,7 +90,9 @@ class RunRecord:
     odom: Motion
     applied: Actuation  # `actuators/state`
     commanded: Actuation  # `actuators/command`; the stamp is that of the observation it answers
-    goals: tuple[Goal, ...]
+    goals: tuple[GivenGoal, ...]
+    obstacles: np.ndarray  # (m, 3) x [m], y [m], radius [m]; those given last
+    block: Places  # the thing to push; empty where there is none
     controller: dict[str, Any]  # its metadata
     health: tuple[HealthSample, ...]
     warnings: tuple[str, ...]  # what could not be read

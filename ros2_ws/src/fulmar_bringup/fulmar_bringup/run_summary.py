@@ -12,6 +12,14 @@ from fulmar_bringup.run_record import HealthSample, RunRecord
 
 ASKED = ("robot", "task", "controller", "backend", "seed")
 PERCENTILES = ("p50", "p99", "max")
+FIGURES = (
+    "final_position_error_m",
+    "final_heading_error_deg",
+    "time_to_target_s",
+    "goals_reached",
+    "velocity_error_m_s",
+    "yaw_rate_error_deg_s",
+)  # of `metrics.episode_metrics`; None where the task does not ask
 Spread = dict[str, float | None]
 
 
@@ -35,9 +43,9 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         **{key: record.info.get(key) for key in ASKED},
         "steps": len(latencies_ms(record)),
         "duration_s": judgement.duration_s if judgement else 0.0,
-        **_errors(judgement),
         "success": judgement is not None and judgement.success,
-        "time_to_target_s": judgement.time_to_target_s if judgement else None,
+        **{name: judgement.figure(name) if judgement else None for name in FIGURES},
+        "collided": None if judgement is None else bool(judgement.figures["collided"]),
         "control_rate_hz": _own_rate_hz(record, wall_hz),
         "wall_control_rate_hz": wall_hz,
         "latency_ms": _known(_spread(plant, "latency_ms")) or percentiles(latencies_ms(record)),
@@ -45,7 +53,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "inference_ms": _spread(controller, "inference_ms"),
         "overruns": _total(plant, controller, "overruns"),
         "watchdog_trips": _total(plant, None, "watchdog_trips"),
-        "actuator_use": _finite(np.mean(judgement.run.actuators_in_use)) if judgement else None,
+        "actuator_use": _use(judgement),
         "bag": str(record.path),
     }
 
@@ -74,13 +82,11 @@ def percentiles(values: np.ndarray) -> Spread:
     return {"p50": float(p50), "p99": float(p99), "max": float(values.max())}
 
 
-def _errors(judgement: Judgement | None) -> Spread:
-    if judgement is None:
-        return {"final_position_error_m": None, "final_heading_error_deg": None}
-    return {
-        "final_position_error_m": _finite(judgement.run.position_error[0, -1]),
-        "final_heading_error_deg": _finite(abs(np.rad2deg(judgement.run.heading_error[0, -1]))),
-    }
+def _use(judgement: Judgement | None) -> float | None:
+    """Mean share of actuators in use."""
+    if judgement is None or np.isnan(judgement.run.shares).any():
+        return None
+    return _finite(np.mean(judgement.run.actuators_in_use))
 
 
 def _own_rate_hz(record: RunRecord, wall_hz: float | None) -> float | None:

@@ -1,4 +1,4 @@
-"""The operator's side of a run: gives the goal, starts the plant when all are ready, and watches.
+"""The operator's side of a run: gives goal and obstacles, starts the plant when all are ready, and watches.
 
 The only module of the bringup that speaks ROS while a run is on. What came of the run is read from its bag.
 """
@@ -12,20 +12,25 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PointStamped, PoseStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
+from visualization_msgs.msg import MarkerArray
 
 from fulmar_bringup.processes import child_environment
 from fulmar_core.errors import RunFailed
-from fulmar_core.state import Pose
+from fulmar_core.goal import Goal
+from fulmar_core.planar import at_rest
 from fulmar_core.tasks import Task
-from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, STATUS
-from fulmar_ros.convert import goal_message
+from fulmar_core.topics import CLOCK, DIAGNOSTICS, GOAL_WIRES, OBSTACLES, SIMULATION_START_NS, STATUS
+from fulmar_ros.controller_wires import sees_obstacles
+from fulmar_ros.convert import stamp_ns
+from fulmar_ros.goal_messages import TYPES, goal_message, obstacles_message
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
@@ -53,8 +58,12 @@ class Supervisor:
         self._changed = threading.Condition()
         self._error: Exception | None = None
         wire = GOAL_WIRES[task.goal_topic]
-        goal_type = PoseStamped if wire.type.endswith("PoseStamped") else PointStamped
-        self._goal = node.create_publisher(goal_type, wire.name, publisher_qos(wire))
+        self._goal = node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        self._obstacles = (
+            node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
+            if sees_obstacles(task)
+            else None
+        )
         node.create_subscription(
             DiagnosticArray,
             DIAGNOSTICS.name,
@@ -80,16 +89,44 @@ class Supervisor:
                 part.heard = time.monotonic()
                 self._changed.notify_all()
 
-    def give_goal(self, goal: Pose, *, time_ns: int, alive: Callable[[], None]) -> None:
-        """Publish a goal and wait until the controller has it.
+    def give_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
+        """Publish a goal, with the obstacles if the task has any, and wait until the controller has them.
 
         Args:
-            goal: The goal.
+            goal: The goal, without a batch axis.
             time_ns: Its stamp, by which the controller names it [ns].
             alive: Called while waiting; raises to give up.
         """
+        echoes = {"goal_stamp_ns": str(time_ns)}
+        if self._obstacles is not None:
+            self._obstacles.publish(obstacles_message(goal.obstacles, time_ns))
+            echoes["obstacles_stamp_ns"] = str(time_ns)
+        self._publish_goal(goal, time_ns)
+        self.wait_until(lambda: echoes.items() <= self.controller.values.items(), alive)
+
+    def change_targets(self, goal: Goal, *, ahead_s: float) -> None:
+        """Publish each further target of a goal by the plant's clock, when the time of the one before is over.
+
+        Args:
+            goal: The goal, whose first target has been given.
+            ahead_s: How much before its time a target is sent, so that it is there in time [s].
+        """
+        body = at_rest(*np.zeros((3,)))
+        done = int(goal.done)
+
+        def tick(clock: Clock) -> None:
+            nonlocal done
+            now_ns = stamp_ns(clock.clock)
+            time_s = np.asarray((now_ns - SIMULATION_START_NS) / 1e9 + ahead_s)
+            newest = self._task.advance(goal, body, time_s)
+            if int(newest.done) != done:
+                done = int(newest.done)
+                self._publish_goal(newest, now_ns)
+
+        self._node.create_subscription(Clock, CLOCK.name, tick, subscriber_qos(CLOCK))
+
+    def _publish_goal(self, goal: Goal, time_ns: int) -> None:
         self._goal.publish(goal_message(goal, self._task.goal_topic, time_ns))
-        self.wait_until(lambda: self.controller.values.get("goal_stamp_ns") == str(time_ns), alive)
 
     def start_plant(self, alive: Callable[[], None], last_words: Callable[[], str] = lambda: "") -> None:
         """Configure and activate the plant.

@@ -11,17 +11,17 @@ from fulmar_bringup.console import output, print_json
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.paths import config_names
 
-FAMILIES = ("robots", "tasks", "controllers", "systems", "policies")
+FAMILIES = ("robots", "tasks", "controllers", "systems", "policies", "goals")
 
 
 def list_names(
     family: Annotated[
         str | None,
-        typer.Argument(metavar="[robots|tasks|controllers|systems|policies]", help="All by default."),
+        typer.Argument(metavar="[robots|tasks|controllers|systems|policies|goals]", help="All by default."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the robots, tasks, controllers, systems and policies there are."""
+    """Show the robots, tasks, controllers, systems, policies and goal files there are."""
     if family is not None and family not in FAMILIES:
         raise UnknownNameError("family", family, FAMILIES)
     chosen = FAMILIES if family is None else (family,)
@@ -39,6 +39,7 @@ def list_names(
 def _entries(family: str) -> dict[str, str]:
     """Names and titles of one family."""
     from fulmar_bringup.system import CONTROLLERS, load_system
+    from fulmar_core.goal_files import load_goals
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
@@ -48,6 +49,8 @@ def _entries(family: str) -> dict[str, str]:
         return {name: load_robot(name).title for name in config_names("robots")}
     if family == "tasks":
         return {name: load_task(name).title for name in config_names("tasks")}
+    if family == "goals":
+        return {name: load_goals(name).title for name in config_names("goals")}
     if family == "systems":
         return {name: load_system(name).title for name in config_names("systems")}
     if family == "policies":

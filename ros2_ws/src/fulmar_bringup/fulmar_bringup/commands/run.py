@@ -16,7 +16,6 @@ from fulmar_bringup.commands.arguments import (
     RobotArgument,
     ScenarioOption,
     SeedOption,
-    TaskOption,
     read_pose,
 )
 from fulmar_bringup.console import console, output, print_json
@@ -25,12 +24,23 @@ from fulmar_core.errors import ConfigError
 
 def run(
     robot: RobotArgument,
-    task: TaskOption = "go_to_pose",
+    task: Annotated[
+        str | None,
+        typer.Option(
+            metavar="T",
+            help="A name from `fulmar list tasks`; go_to_pose by default, "
+            "or go_to_position where no policy for poses is shipped.",
+        ),
+    ] = None,
     controller: ControllerOption = "policy",
     backend: Annotated[str, typer.Option(metavar="B", help="mujoco, mock or hardware.")] = "mujoco",
     policy: PolicyOption = None,
     goal: Annotated[
-        str | None, typer.Option(metavar="x,y,deg", help="Where to go; drawn from the seed by default.")
+        str | None,
+        typer.Option(
+            metavar="x,y,deg",
+            help="Where to go; drawn from the seed by default, always so for tasks with many targets.",
+        ),
     ] = None,
     start: Annotated[
         str | None, typer.Option(metavar="x,y,deg", help="Where to begin; drawn from the seed by default.")
@@ -65,17 +75,19 @@ def run(
     fulmar run floating_platform --controller lqr --start 3,1,90 --goal 0,0,0
 
     fulmar run floating_platform --controller policy --lockstep --seed 7
+
+    fulmar run turtlebot2 --task go_through_positions --controller classical
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
     from fulmar_bringup.conductor import conduct
     from fulmar_bringup.extras import require
-    from fulmar_bringup.planning import plan_run
+    from fulmar_bringup.planning import default_task, plan_run
     from fulmar_bringup.system import modules_of
 
     request = plan_run(
         robot=robot,
-        task=task,
+        task=task or default_task(robot),
         controller=controller,
         backend=backend,
         policy=policy,
@@ -106,14 +118,28 @@ def default_record(robot: str, controller: str) -> Path:
     return Path("runs") / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{controller}"
 
 
+TOLD = {
+    "final_position_error_m": "{:.3f} m off",
+    "final_heading_error_deg": "{:.1f}° off",
+    "goals_reached": "{:.0f} targets reached",
+    "velocity_error_m_s": "velocity {:.3f} m/s off",
+    "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
+}
+
+
+def told_figure(summary: dict[str, Any], name: str) -> str:
+    """One figure in words, empty where there is none."""
+    return "" if summary[name] is None else TOLD[name].format(summary[name])
+
+
 def verdict(summary: dict[str, Any]) -> str:
     """One run in a few lines."""
     reached = "goal met" if summary["success"] else "goal missed"
     latency = summary["latency_ms"]
-    lines = [f"{summary['controller']}: {reached}"]
-    if summary["final_position_error_m"] is not None:
-        error, turn = summary["final_position_error_m"], summary["final_heading_error_deg"]
-        lines[0] += f", {100 * error:.1f} cm and {turn:.1f}° off after {summary['duration_s']:.0f} s"
+    told = [words for words in (told_figure(summary, name) for name in TOLD) if words]
+    told += ["touched an obstacle"] if summary["collided"] else []
+    after = [f"after {summary['duration_s']:.0f} s"] if told else []
+    lines = [f"{summary['controller']}: {', '.join([reached, *told, *after])}"]
     if latency["p50"] is not None:
         lines.append(
             f"  {summary['steps']} commands, latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms; "
