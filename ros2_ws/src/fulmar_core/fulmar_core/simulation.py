@@ -213,7 +213,7 @@ class BatchSimulation:
 
     def _repeats_now(self) -> np.ndarray:
         """How often each world has begun anew, as NumPy."""
-        return np.array(self._repeats.cpu() if self._on_torch else self._repeats)
+        return np.array(self._repeats.cpu().numpy() if self._on_torch else self._repeats)
 
     def _measure(self, restarted: Array | None) -> None:
         """Measure every world; where only some restarted, the others keep what they had."""
