@@ -24,7 +24,7 @@ def by_name(nodes):
 def test_every_system_is_recorder_plant_and_controller_in_one_namespace(system):
     nodes = list_nodes(system=system)
     assert [node.name for node in nodes] == ["recorder", "plant", "controller"]
-    assert {node.namespace for node in nodes} == {"/floating_platform"}
+    assert {node.namespace for node in nodes} == {f"/{load_system(system).robot}"}
 
 
 @SYSTEMS
@@ -71,7 +71,7 @@ def test_a_replaced_choice_takes_the_rate_that_fits_it_and_not_the_file_s():
     [
         ({"system": "mujoco_lqp"}, "Did you mean 'mujoco_lqr'"),
         ({"robot": "floting_platform"}, "Did you mean 'floating_platform'"),
-        ({"task": "go_to_pos"}, "Did you mean 'go_to_pose'"),
+        ({"task": "go_to_pos"}, "Did you mean 'go_to_pos"),
         ({"controller": "lqg"}, "Did you mean 'lqr'"),
         ({"backend": "mujoko"}, "Did you mean 'mujoco'"),
     ],
@@ -100,7 +100,7 @@ def test_everything_of_a_plan_reaches_the_nodes():
         controller_spec(plan, subscribers=3).parameters,
     )
     expected = {
-        "robot": "floating_platform", "backend": "mujoco", "scenario": "uncertain", "seed": 7,
+        "robot": "floating_platform", "task": "go_to_pose", "backend": "mujoco", "scenario": "uncertain", "seed": 7,
         "start": [1.0, 2.0, 90.0], "control_hz": 50.0, "lockstep": True, "rate": 2.0, "duration_s": 3.0,
         "wait_for_subscribers": 2,
     }  # fmt: skip

@@ -43,9 +43,9 @@ def plan(tmp_path):
 def test_what_was_not_said_comes_from_files_and_the_seed(plan):
     request = plan()
     assert request.plan.control_hz == 50.0  # configs/systems/mujoco_lqr.yaml
-    assert request.plan.duration_s == 50.0  # configs/tasks/go_to_pose.yaml
+    assert request.plan.duration_s == 60.0  # configs/tasks/go_to_pose.yaml
     distance = math.dist(request.goal[:2], request.plan.start[:2])
-    assert 3.0 <= distance <= 4.0
+    assert 0.5 <= distance <= 5.0
     assert request.plan.policy == ""
 
 

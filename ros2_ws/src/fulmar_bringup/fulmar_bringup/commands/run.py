@@ -39,7 +39,7 @@ def run(
         str | None,
         typer.Option(
             metavar="x,y,deg",
-            help="Where to go; drawn from the seed by default, always so for tasks with many targets.",
+            help="Where to go; drawn from the seed by default; so are many targets.",
         ),
     ] = None,
     start: Annotated[

@@ -8,10 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
-from fulmar_bringup.report.style import DASHED, INK, PAPER, quiet_grid
+from fulmar_bringup.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
 from fulmar_bringup.report.view import View, judged
 from fulmar_bringup.run_judgement import Judgement
-from fulmar_core.robot import load_robot
 from fulmar_core.rotation import yaw_of
 
 OUTLINES = 5  # of the body along the path
@@ -19,20 +18,28 @@ CLOSE_UP = 2.4  # half width of the close look, in tolerances
 
 
 def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
-    """Paths, start, goal, and the outline of the body at some instants."""
+    """Paths, start, targets, what stands about, and the outline of the body at some instants."""
     quiet_grid(axes)
     axes.set_aspect("equal")
     for order, (run, judgement) in enumerate(judged(runs)):
         motion = run.record.motion
         xy = motion.position[judgement.samples, :2]
         axes.plot(*xy.T, color=run.colour, label=run.label, zorder=4)
-        radius = load_robot(run.summary["robot"]).body.radius
+        radius = judgement.robot.body.radius
         for index in _instants(xy):
             yaw = float(yaw_of(motion.quat_xyzw[judgement.samples[index]]))
             _body(axes, xy[index], yaw, radius, run.colour)
         if order == 0:
             axes.text(xy[0, 0], xy[0, 1] + 1.15 * radius, "start", ha="center", va="bottom")
-        _goal(axes, judgement, radius, named=order == 0)
+            for x, y, disc in run.record.obstacles:
+                axes.add_patch(Circle((x, y), disc, facecolor=FAINT, alpha=0.55, linewidth=0, zorder=3))
+        if not np.isnan(judgement.block).all():
+            axes.plot(*judgement.block.T, color=run.colour, linestyle=DASHED, linewidth=1.2, zorder=4)
+            axes.plot(*judgement.block[-1], "s", color=run.colour, markersize=5, zorder=6)
+        if judgement.counts:
+            _waypoints(axes, judgement, named=order == 0)
+        elif has_place(judgement):
+            _goal(axes, judgement, radius, named=order == 0)
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     axes.margins(0.1)
@@ -46,8 +53,10 @@ def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
     for run, judgement in judged(runs):
         tolerance_cm = 100.0 * judgement.task.tolerance.position
         half_cm = CLOSE_UP * tolerance_cm
-        offset = run.record.motion.position[judgement.samples] - judgement.goal.position_in_world
-        x, y = 100.0 * offset[:, 0], 100.0 * offset[:, 1]
+        places = run.record.motion.position[judgement.samples, :2]
+        if not np.isnan(judgement.block).all():
+            places = judgement.block  # what shall be at the goal
+        x, y = 100.0 * (places - judgement.targets[-1, :2]).T
         late = judgement.time_s >= judgement.window_start_s
         axes.plot(x, y, color=run.colour, linewidth=1.0, alpha=0.35)
         axes.plot(x[late], y[late], color=run.colour, linewidth=1.8)
@@ -58,6 +67,28 @@ def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
     axes.set_ylim(-half_cm, half_cm)
     axes.set_xlabel("from the goal [cm]")
     axes.set_title("close to the goal")
+
+
+def has_place(judgement: Judgement) -> bool:
+    """Whether the goal is one place in the world."""
+    return judgement.task.goal_topic in ("goal_pose", "goal_point")
+
+
+def _waypoints(axes: Axes, judgement: Judgement, *, named: bool) -> None:
+    """Every waypoint with its number; those that were reached are filled."""
+    reached = int(judgement.run.goals[0, -1])
+    radius = judgement.task.tolerance.position
+    axes.plot(*judgement.targets[:, :2].T, color=FAINT, linestyle=DASHED, linewidth=0.7, zorder=1)
+    for number, (x, y, yaw) in enumerate(judgement.targets, start=1):
+        fill = FAINT if number <= reached else PAPER
+        axes.add_patch(Circle((x, y), radius, facecolor=fill, edgecolor=INK, linewidth=1.0, zorder=6))
+        if judgement.task.tolerance.heading_deg > 0.0:
+            tip = np.array([x + 2.5 * radius * np.cos(yaw), y + 2.5 * radius * np.sin(yaw)])
+            axes.plot([x, tip[0]], [y, tip[1]], color=INK, linewidth=1.0, zorder=6)
+        if named:
+            axes.annotate(
+                str(number), (x, y), xytext=(5, 5), textcoords="offset points", fontsize=8, zorder=7
+            )
 
 
 def _instants(xy: np.ndarray) -> list[int]:
@@ -76,13 +107,12 @@ def _body(axes: Axes, centre: np.ndarray, yaw: float, radius: float, colour: str
 
 
 def _goal(axes: Axes, judgement: Judgement, radius: float, *, named: bool) -> None:
-    x, y = judgement.goal.position_in_world[:2]
+    x, y, yaw = judgement.targets[-1]
     tolerance = judgement.task.tolerance
     axes.add_patch(
         Circle((x, y), tolerance.position, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=6)
     )
-    if tolerance.heading_deg < 180.0:
-        yaw = float(yaw_of(judgement.goal.quat_xyzw))
+    if tolerance.heading_deg > 0.0:
         axes.annotate(
             "",
             (x + 1.6 * radius * np.cos(yaw), y + 1.6 * radius * np.sin(yaw)),

@@ -13,7 +13,7 @@ from fulmar_bringup.run_judgement import Judgement, judge
 from fulmar_bringup.run_record import RunRecord
 from fulmar_bringup.run_summary import latencies_ms, summarise
 
-SPOKEN = {"lqr": "LQR", "policy": "policy"}
+SPOKEN = {"lqr": "LQR", "policy": "policy", "classical": "classical law"}
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,11 @@ class View:
     judgement: Judgement | None  # None: the record is too short to judge
     summary: dict[str, Any]
     latencies_ms: np.ndarray
+
+    @property
+    def binary(self) -> bool:
+        """Whether the actuators are valves, open or closed."""
+        return self.judgement is None or self.judgement.robot.actuators.binary
 
 
 def views(records: Sequence[RunRecord]) -> list[View]:

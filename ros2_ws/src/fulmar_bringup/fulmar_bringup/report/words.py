@@ -6,30 +6,42 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from fulmar_bringup.report.view import View
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.push_block import PushBlock
 
 Row = tuple[str, str, list[str]]  # what, an explanation, and the cell of each run
 
 
 def verdict(run: View) -> tuple[str, str]:
     """One word and one or two sentences on how a run went."""
-    judgement, summary = run.judgement, run.summary
+    judgement = run.judgement
     if judgement is None:
         return "No result", "The bag holds fewer than two states, so there is nothing to judge."
-    tolerance = judgement.task.tolerance
-    error = f"{_length(summary['final_position_error_m'])}"
-    if tolerance.heading_deg < 180.0:
-        error += f" and {_value(summary['final_heading_error_deg'], '°', 1)}"
-    if judgement.success:
-        reached = judgement.time_to_target_s
-        return "Reached", (
-            f"The goal was reached after {reached:.1f} s and held to the end. "
-            f"At the end of {judgement.duration_s:.0f} s the platform was {error} away."
-        )
     if not judgement.long_enough:
         return "Missed", f"The run ended after {judgement.duration_s:.1f} s, too early to judge."
+    touched = " It touched an obstacle." if judgement.figures["collided"] else ""
+    if judgement.counts:
+        reached, required = run.summary["goals_reached"] or 0, getattr(judgement.task, "required", 0)
+        word = "Reached" if judgement.success else "Missed"
+        return word, (
+            f"The robot reached {reached:.0f} targets in {judgement.duration_s:.0f} s; {required} make a success.{touched}"
+        )
+    if run.summary["velocity_error_m_s"] is not None:
+        return ("Kept" if judgement.success else "Missed"), (
+            f"Over {judgement.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off and the "
+            f"turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, changes of the target included."
+        )
+    what, error = _what(judgement.task), _length(run.summary["final_position_error_m"])
+    if run.summary["final_heading_error_deg"] is not None:
+        error += f" and {_value(run.summary['final_heading_error_deg'], '°', 1)}"
+    if judgement.success:
+        return "Reached", (
+            f"The goal was reached after {judgement.figure('time_to_target_s'):.1f} s and held to the end. "
+            f"At the end of {judgement.duration_s:.0f} s {what} was {error} away."
+        )
     return "Missed", (
-        f"The platform was not within the tolerance for all of the last {tolerance.hold_s:g} s. "
-        f"At the end of {judgement.duration_s:.0f} s it was {error} away."
+        f"{what.capitalize()} was not within the tolerance for all of the last {judgement.task.tolerance.hold_s:g} s. "
+        f"At the end of {judgement.duration_s:.0f} s it was {error} away.{touched}"
     )
 
 
@@ -37,13 +49,28 @@ def rule(runs: Sequence[View]) -> str:
     """What counts as success, for the first run that can be judged."""
     for run in runs:
         if run.judgement is not None:
-            tolerance = run.judgement.task.tolerance
-            heading = f" and {tolerance.heading_deg:g}°" if tolerance.heading_deg < 180.0 else ""
+            task, tolerance = run.judgement.task, run.judgement.task.tolerance
+            heading = f" and {tolerance.heading_deg:g}°" if tolerance.heading_deg > 0.0 else ""
+            if run.judgement.counts:
+                return (
+                    f"A target counts as reached within {100 * tolerance.position:g} cm{heading}, and a run that "
+                    f"reaches {getattr(task, 'required', 0)} of them as a success."
+                )
+            if tolerance.velocity > 0.0:
+                return (
+                    f"A run counts as kept if the velocity stays within {tolerance.velocity:g} m/s and the turn rate "
+                    f"within {tolerance.yaw_rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
+                )
             return (
-                f"A run counts as reached if the platform stays within {100 * tolerance.position:g} cm"
+                f"A run counts as reached if {_what(task)} stays within {100 * tolerance.position:g} cm"
                 f"{heading} of the goal for all of the last {tolerance.hold_s:g} s."
             )
     return ""
+
+
+def _what(task: Task) -> str:
+    """What shall be at the goal."""
+    return "the block" if isinstance(task, PushBlock) else "the robot"
 
 
 def table(runs: Sequence[View]) -> list[Row]:
@@ -55,12 +82,18 @@ def table(runs: Sequence[View]) -> list[Row]:
     def spread(key: str) -> Callable[[dict[str, Any]], str]:
         return lambda s: " / ".join(_value(s[key][name], "", 2) for name in ("p50", "p99", "max"))
 
-    return [
+    asked = [
         row("Final position error", "", lambda s: _length(s["final_position_error_m"])),
         row("Final heading error", "", lambda s: _value(s["final_heading_error_deg"], "°", 1)),
         row("Time to goal", "from when on it stayed", lambda s: _value(s["time_to_target_s"], " s", 1)),
+        row("Targets reached", "", lambda s: _value(s["goals_reached"], "", 0)),
+        row("Velocity error", "mean", lambda s: _value(s["velocity_error_m_s"], " m/s", 3)),
+        row("Turn rate error", "mean", lambda s: _value(s["yaw_rate_error_deg_s"], "°/s", 1)),
+    ]
+    return [
+        *(line for line in asked if any(cell != "–" for cell in line[2])),
         row("Length of the run", "simulated time", lambda s: _value(s["duration_s"], " s", 1)),
-        row("Valves in use", "average share of open valves", lambda s: _percent(s["actuator_use"])),
+        row("Actuators in use", "average share of them", lambda s: _percent(s["actuator_use"])),
         row("Commands", "answered measurements", lambda s: f"{s['steps']}"),
         row("Control rate", "in the robot's own time", lambda s: _value(s["control_rate_hz"], " Hz", 2)),
         row("Command rate", "wall-clock", lambda s: _value(s["wall_control_rate_hz"], " Hz", 2)),
