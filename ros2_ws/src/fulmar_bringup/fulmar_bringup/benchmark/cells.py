@@ -15,6 +15,12 @@ SPOKEN = {
     "go_through_positions": "Go through positions",
     "go_to_position_with_obstacles": "Go to position with obstacles",
 }
+LAWS = {
+    "lqr": "LQR",
+    "polar": "polar law",
+    "line_of_sight": "line of sight",
+    "pure_pursuit": "pure pursuit",
+}
 WAYS = {"batch": "batch", "mujoco": "MuJoCo", "ros": "ROS"}
 GOOD, BAD = "good", "bad"
 NOTHING = "–"
@@ -89,15 +95,10 @@ QUANTITIES = {
 }
 
 
-def controller_name(name: str | None) -> str:
-    """A controller's name for people."""
-    return "LQR" if name == "lqr" else (name or "classical").replace("_", " ")
-
-
 def head(entry: dict[str, Any]) -> str:
     """Title of a pair's column."""
     name = spoken(entry["robot"])
-    return name if entry["kind"] == "policy" else f"{name}, {controller_name(entry['controller'])}"
+    return name if entry["kind"] == "policy" else f"{name}, {LAWS.get(entry['law'], 'classical')}"
 
 
 def missing(entry: dict[str, Any]) -> str:

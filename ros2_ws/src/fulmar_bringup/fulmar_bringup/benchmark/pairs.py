@@ -31,6 +31,7 @@ class Pair:
     task: str
     kind: str  # one of KINDS
     controller: str = ""  # empty: there is none
+    law: str = ""  # of a classical controller
     policy: str = ""  # folder of a bundle
     reason: str = ""  # why there is none
     sha256: str = ""  # of whatever defines the controller
@@ -48,7 +49,7 @@ def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) ->
     Args:
         robot: Name of the robot.
         task: Name of the task.
-        kind: policy: the bundle; classical: the first classical controller that takes both.
+        kind: policy: the bundle; classical: the law of the robot's family.
         policies: Folder of bundles named <robot>_<task>; the shipped ones by default.
 
     Returns:
@@ -82,17 +83,14 @@ def _with_policy(robot: str, task: str, policies: Path | None) -> Pair:
 def _classical(robot: str, task: str) -> Pair:
     from fulmar_bringup.system import CONTROLLERS
 
-    the_robot, the_task, reason = load_robot(robot), load_task(task), "no classical controller"
-    for name, entry in CONTROLLERS.items():
-        if name == "policy":
-            continue
-        try:
-            controller = entry.load(the_robot, the_task, the_robot.timing.control_hz, "")
-        except ConfigError as error:
-            reason = str(error)
-        else:
-            return Pair(robot, task, "classical", name, sha256=str(controller.metadata()["sha256"]))
-    return Pair(robot, task, "classical", reason=reason)
+    the_robot, the_task, name = load_robot(robot), load_task(task), "classical"
+    try:
+        controller = CONTROLLERS[name].load(the_robot, the_task, the_robot.timing.control_hz, "")
+    except ConfigError as error:
+        return Pair(robot, task, name, reason=str(error))
+    told = controller.metadata()
+    law = str(getattr(controller, "law", name))
+    return Pair(robot, task, name, name, law=law, sha256=str(told["sha256"]))
 
 
 def units_of(

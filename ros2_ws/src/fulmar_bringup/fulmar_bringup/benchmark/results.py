@@ -45,6 +45,7 @@ def pair_entry(pair: Pair, outcomes: dict[str, Judged | str]) -> dict[str, Any]:
         "task": pair.task,
         "kind": pair.kind,
         "controller": pair.controller or None,
+        "law": pair.law or None,
         "status": "missing" if pair.missing else "failed" if faults or not judged else "judged",
         "reason": pair.reason or "; ".join(faults) or None,
         "sha256": pair.sha256 or None,

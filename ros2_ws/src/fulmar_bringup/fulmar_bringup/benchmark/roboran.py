@@ -96,24 +96,44 @@ def run_benchmark(
     )
     by_pair = {pair: {unit.trial.through: outcomes[unit] for unit in units.get(pair, [])} for pair in pairs}
     entries = [pair_entry(pair, by_pair[pair]) for pair in pairs]
-    asked = [entry for entry in entries if entry["kind"] == "policy"]
-    document = {
-        "benchmark": "roboran",
-        "format": FORMAT,
-        "fulmar_version": fulmar_version(),
-        "git_revision": git_revision(),
-        "command": request.command,
-        "seed": request.seed,
-        "scenario": request.scenario,
-        "episodes": dict(request.episodes),
-        "pairs": entries,
-        "asked": len(asked),
-        "met": sum(entry["met"] is True for entry in asked),
-        "open": sum(entry["met"] is None for entry in asked),
-        "wall_s": round(time.monotonic() - began, 1),
-    }
+    document = document_of(
+        entries,
+        episodes=request.episodes,
+        seed=request.seed,
+        scenario=request.scenario,
+        command=request.command,
+        wall_s=time.monotonic() - began,
+    )
     judged = {
         pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, Judged)}
         for pair, ways in by_pair.items()
     }
     return Findings(document, pairs, judged)
+
+
+def document_of(
+    entries: list[dict[str, Any]],
+    *,
+    episodes: dict[str, int],
+    seed: int,
+    scenario: str,
+    command: str,
+    wall_s: float,
+) -> dict[str, Any]:
+    """The whole document; docs/evaluation.md names its keys."""
+    asked = [entry for entry in entries if entry["kind"] == "policy"]
+    return {
+        "benchmark": "roboran",
+        "format": FORMAT,
+        "fulmar_version": fulmar_version(),
+        "git_revision": git_revision(),
+        "command": command,
+        "seed": seed,
+        "scenario": scenario,
+        "episodes": dict(episodes),
+        "pairs": entries,
+        "asked": len(asked),
+        "met": sum(entry["met"] is True for entry in asked),
+        "open": sum(entry["met"] is None for entry in asked),
+        "wall_s": round(wall_s, 1),
+    }

@@ -35,7 +35,9 @@ def roboran(
     ] = "batch,mujoco",
     controllers: Annotated[
         str,
-        typer.Option(metavar="K,...", help="policy: the shipped bundles. classical: what else fits a pair."),
+        typer.Option(
+            metavar="K,...", help="policy: the shipped bundles. classical: the laws of the families."
+        ),
     ] = "policy",
     policies: Annotated[
         Path | None,
@@ -113,7 +115,9 @@ def roboran(
             console.print(f"{name}: failed: {outcome}", markup=False, soft_wrap=True)
         else:
             how = "judged before" if before else f"{outcome.about['wall_s']:.1f} s"
-            console.print(f"{name}: success {outcome.succeeded.mean():.3f} ({how})", markup=False, soft_wrap=True)
+            console.print(
+                f"{name}: success {outcome.succeeded.mean():.3f} ({how})", markup=False, soft_wrap=True
+            )
 
     with work_bar("judging") as progress:
         findings = run_benchmark(request, progress=progress, on_done=tell)

@@ -14,7 +14,7 @@ from fulmar_bringup.benchmark.report.scene_picture import draw_courses, draw_sce
 from fulmar_bringup.benchmark.report.spread_picture import draw_spreads
 from fulmar_bringup.benchmark.report.time_picture import draw_errors_over_time, draw_goals_over_time
 from fulmar_bringup.benchmark.report.velocity_picture import draw_velocities
-from fulmar_bringup.benchmark.report.view import View, sentence, views
+from fulmar_bringup.benchmark.report.view import View, views
 from fulmar_bringup.benchmark.roboran import Findings
 from fulmar_bringup.report.pictures import Picture
 from fulmar_core.metrics import counts_targets
@@ -60,6 +60,7 @@ def pictures_of(findings: Findings, task: str) -> list[tuple[str, Picture]]:
         _with_obstacles(runs, add)
     else:
         _to_a_place(runs, add)
+    tracks = runs[0].task.tolerance.velocity > 0.0
     shares = "share_of_bound" in runs[0].main.figures
     add(
         "map",
@@ -69,9 +70,9 @@ def pictures_of(findings: Findings, task: str) -> list[tuple[str, Picture]]:
         the darker a field, the more is left to gain."""
         if shares
         else f"""
-        The share of failed episodes over what they begin with. Pale fields have no failures; a dark corner tells which
-        starts the controller cannot do. The number above each panel counts the failures in
-        {sentence(task)}; where it is small, single episodes make the colours.""",
+        The share of failed episodes over {"the last wanted velocity" if tracks else "where they begin"}. Pale fields
+        have no failures, white ones too few episodes; a dark corner tells what the controller cannot do. The number
+        above each panel counts all failures; where it is small, single episodes make the colours.""",
         draw_map(runs),
     )
     add(

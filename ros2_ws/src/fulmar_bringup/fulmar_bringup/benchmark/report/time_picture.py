@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
 from fulmar_bringup.benchmark.report.view import View, panels
 from fulmar_bringup.benchmark.thesis import CONTROL_HZ, GOAL_STEPS, thesis_row
@@ -33,7 +33,7 @@ def draw_errors_over_time(runs: Sequence[View]) -> Figure:
             one.yaxis.set_minor_locator(NullLocator())
             one.set_ylim(2e-3, 12.0)
         else:
-            one.set_ylim(0.0, 0.7)
+            one.set_ylim(bottom=0.0)
         one.set_xlabel("time [s]")
     axes[0, 0].set_ylabel("distance to goal" if runs[0].task.tolerance.position else "velocity error [m/s]")
     return figure
@@ -67,6 +67,7 @@ def draw_goals_over_time(runs: Sequence[View]) -> Figure:
         one.axvline(episode_s, color=FAINT, linestyle=DASHED, linewidth=0.8)
         one.set_xlim(0.0, end * 1.04)
         one.set_ylim(bottom=0.0)
+        one.yaxis.set_major_locator(MaxNLocator("auto", integer=True))
         one.set_xlabel("time [s]")
     axes[0, 0].set_ylabel("waypoints reached")
     return figure

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fulmar_bringup.benchmark.cells import head, spoken
+from fulmar_bringup.benchmark.cells import head
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.roboran import Findings
 from fulmar_bringup.report.style import INK, OTHER_COLOURS
@@ -94,8 +94,3 @@ def panels(
 def told(axes: Axes, text: str) -> None:
     """Write a line between a panel and its title."""
     axes.text(0.0, 1.015, text, transform=axes.transAxes, fontsize=8.5, va="bottom", color=INK)
-
-
-def sentence(task: str) -> str:
-    """A task's name inside a sentence."""
-    return spoken(task).lower()

@@ -1,0 +1,53 @@
+"""`fulmar evaluate`: episodes of any length, in batches of any size."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from fulmar_bringup.cli import app
+from fulmar_core.errors import ConfigError
+from fulmar_core.figures import FIGURES, SUCCESS, meanings
+
+POSE = "evaluate floating_platform go_to_pose --controller lqr --through batch"
+TIMING = {"wall_s", "steps_per_s"}
+
+
+def evaluate(words: str) -> dict:
+    result = CliRunner().invoke(app, [*words.split(), "--json"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+def test_no_figure_depends_on_how_many_worlds_run_at_once():
+    few, many = (evaluate(f"{POSE} --episodes 9 --episode-s 6 --worlds {worlds}") for worlds in (3, 64))
+    assert {k: v for k, v in few.items() if k not in TIMING} == {
+        k: v for k, v in many.items() if k not in TIMING
+    }
+
+
+def test_the_length_of_an_episode_is_seconds_or_control_steps():
+    seconds, steps = (evaluate(f"{POSE} --episodes 2 {length}") for length in ("--episode-s 4", "--steps 20"))
+    assert seconds["episode_s"] == steps["episode_s"] == 4.0
+    assert seconds["control_steps"] == steps["control_steps"] == 40
+    assert evaluate(f"{POSE} --episodes 1")["episode_s"] == 60.0
+
+
+def test_a_length_said_twice_and_worlds_elsewhere_are_refused():
+    with pytest.raises(ConfigError, match="Give one of them"):
+        CliRunner().invoke(app, f"{POSE} --steps 20 --episode-s 4".split(), catch_exceptions=False)
+    with pytest.raises(ConfigError, match="belongs to --through batch"):
+        CliRunner().invoke(
+            app,
+            ["evaluate", "floating_platform", "go_to_pose", "--controller", "lqr", "--worlds", "4"],
+            catch_exceptions=False,
+        )
+
+
+def test_the_help_tells_what_every_figure_means():
+    text = CliRunner().invoke(app, ["evaluate", "--help"]).output
+    assert all(name in text for name in FIGURES)
+    assert " ".join(SUCCESS.split()[:9]) in " ".join(text.split())
+    assert max(map(len, meanings(70).splitlines())) <= 70
