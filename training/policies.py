@@ -28,7 +28,7 @@ class ShippedPolicy:
     robot: str
     task: str
     seed: int
-    time_limit_s: float  # wall-clock of its training [s]
+    updates: int  # of its training; not a time, so that a busy machine makes the same policy as an idle one
     success: float  # what it has to reach in MuJoCo [-]
 
     @property
@@ -64,7 +64,7 @@ def load_policy_table() -> PolicyTable:
 
 
 def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
-    """Hash of everything a policy is made from: robot, task, scenario, settings, seed and time."""
+    """Hash of everything a policy is made from: robot, task, scenario, settings, seed and number of updates."""
     ingredients = {
         "robot": asdict(load_robot(policy.robot)),
         "task": asdict(load_task(policy.task)),
@@ -98,7 +98,7 @@ def policy_job(
         policy.seed,
         settings,
         runs / f"{policy.name}_{made_from[:8]}",
-        time_limit_s=policy.time_limit_s,
+        updates=policy.updates,
         episodes=episodes,
         bundle=bundles / policy.name,
         recipe=made_from,

@@ -25,7 +25,7 @@ from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.upcoming import UpcomingEpisodes
 
 _MOVING = (
-    "truth", "measured", "goal", "world", "command", "_strength", "_repeats", "_steps", "_actuation", "_odometer",
+    "truth", "measured", "goal", "world", "command", "_strength", "_repeats", "_steps", "_actuation", "_odometer", "_noise_keys",
 )  # fmt: skip
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
@@ -90,6 +90,7 @@ class BatchSimulation:
         self._numbers = self._whole(first + np.arange(worlds))
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
+        self._noise_keys = world_keys(seed, self._numbers, self._repeats, ACTUATOR_NOISE)
         self._latest_s = longest_delay(robot, scenario)
         self._off_centre = may_be_off_centre(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0
@@ -124,9 +125,19 @@ class BatchSimulation:
         """Time of one control step [s]."""
         return self.substeps * self.robot.timing.physics_dt
 
-    def observe(self) -> Array:
-        """What controllers see now, shape (worlds, n)."""
-        return self.observer(self.measured, self.goal, self.command)
+    def observe(self, worlds: np.ndarray | None = None) -> Array:
+        """What controllers see now.
+
+        Args:
+            worlds: Numbers of the worlds to look at; all by default.
+
+        Returns:
+            Shape (worlds, n).
+        """
+        if worlds is None:
+            return self.observer(self.measured, self.goal, self.command)
+        index = self._whole(worlds)
+        return self.observer(self.measured[index], self.goal[index], self.command[index])
 
     def reset(self, worlds: Sequence[int] | np.ndarray | range) -> None:
         """Begin a new episode in some worlds.
@@ -140,6 +151,9 @@ class BatchSimulation:
         index = self._whole(which)
         self._repeats[index] = self._repeats[index] + 1
         self._steps[index] = 0
+        some = world_keys(self.seed, self._numbers[index], self._repeats[index], ACTUATOR_NOISE)
+        for every, new in zip(self._noise_keys, some, strict=True):
+            every[index] = new
         self._upcoming.begin(which, index, self._repeats_now(), self.truth, self.goal, self.world)
         self._actuation.reset(index, self._safe[:, :1])
         self.command = self._xp.asarray(self.command, copy=True)
@@ -157,8 +171,7 @@ class BatchSimulation:
         self.command = slewed(wanted, self.command, self.robot, self.control_dt)
         noise = None
         if self._noisy:
-            keys = world_keys(self.seed, self._numbers, self._repeats, ACTUATOR_NOISE)
-            bits = words(keys, self._steps, self.command.shape[1])
+            bits = words(self._noise_keys, self._steps, self.command.shape[1])
             noise = 2.0 * uniform_from(bits, self._dtype) - 1.0
         by_actuator = xp.stack([self.command[:, i] for i in range(self.command.shape[1])])
         self._actuation.begin(by_actuator, self.world, noise)

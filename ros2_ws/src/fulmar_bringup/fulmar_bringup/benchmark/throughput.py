@@ -132,7 +132,7 @@ class BatchPace:
         if over.size:
             simulation.reset(over)
             self._age[over] = 0
-            self.observation = simulation.observe()
+            self.observation[over] = simulation.observe(over)
 
 
 class SharedPace:

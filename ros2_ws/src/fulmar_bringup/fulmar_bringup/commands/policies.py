@@ -13,6 +13,8 @@ from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.exit_codes import FAILED
 
+UPDATES_A_MINUTE = 400  # of one run on one idle core, for the estimate
+
 
 def policies(
     names: Annotated[
@@ -29,7 +31,7 @@ def policies(
 ) -> None:
     """Make the shipped policies of configs/policies.yaml: train, judge in MuJoCo, export.
 
-    A bundle that was made from the same robot, task, scenario, settings, seed and time is left as it is; a run that
+    A bundle that was made from the same robot, task, scenario, settings, seed and updates is left as it is; a run that
     was broken off is resumed. So the command can be repeated until everything is there.
 
     Try:
@@ -62,9 +64,9 @@ def policies(
         if not names or policy.name in names
     ]
     missing = [job for job in jobs if not is_made(job)]
-    left = sum(job.time_limit_s or job.settings.time_limit_s for job in missing) / table.at_once
+    left = sum(job.updates or 0 for job in missing) / table.at_once
     console.print(
-        f"{len(missing)} of {len(jobs)} policies to make, about {left / 60.0:.0f} minutes and the judging"
+        f"{len(missing)} of {len(jobs)} policies to make, about {left / UPDATES_A_MINUTE:.0f} minutes and the judging"
     )
     with JobBars(missing) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)

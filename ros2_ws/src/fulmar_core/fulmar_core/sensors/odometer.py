@@ -8,7 +8,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from fulmar_core.arrays import clip
-from fulmar_core.counter_rng import NOISE, normal_from, uniform_from, words, world_keys
+from fulmar_core.counter_rng import NOISE, Keys, normal_from, uniform_from, words, world_keys
 from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
@@ -79,6 +79,7 @@ class Odometer:
         self._used = {part for part in Channel.__dataclass_fields__ if np.any(spec.column(part) != 0.0)}
         self._past: list[Array] = []  # readings, newest first
         self._held: Array | None = None
+        self._keys: Keys | None = None
 
     def measure(
         self,
@@ -98,7 +99,8 @@ class Odometer:
             numbers: Number of each world, shape (n,).
             repeats: How often each began anew, shape (n,).
             steps: How many measurements each had in this episode, shape (n,); 0 forgets its past.
-            only: Numbers of worlds that began anew since the last call, which alone are measured again.
+            only: Numbers of worlds that began anew since the last call, which alone are measured again; without this
+                word no world may begin anew.
 
         Returns:
             Measured state, shapes (n,).
@@ -109,7 +111,9 @@ class Odometer:
         if only is not None:
             return self._restart(truth[only], world[only], numbers[only], repeats[only], only)
         columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
-        bits = words(world_keys(self._seed, numbers, repeats, NOISE), steps, 7)
+        if self._keys is None:
+            self._keys = world_keys(self._seed, numbers, repeats, NOISE)
+        bits = words(self._keys, steps, 7)
         reading = self._disturbed(columns, world, bits)
         if self._depth > 1:
             reading = self._delayed(reading, world)
@@ -129,6 +133,9 @@ class Odometer:
         xp = array_namespace(truth.x)
         columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
         keys = world_keys(self._seed, numbers, repeats, NOISE)
+        assert self._keys is not None
+        for every, some in zip(self._keys, keys, strict=True):
+            every[only] = some
         reading = self._disturbed(columns, world, words(keys, 0, 7))
         # Copies: who was given these readings keeps them.
         self._held, *self._past = (xp.asarray(old, copy=True) for old in (self._held, *self._past))
