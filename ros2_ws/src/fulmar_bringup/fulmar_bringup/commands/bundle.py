@@ -30,7 +30,7 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
     for key, value in passport.items():
         if key == "training":
             continue
-        text = ", ".join(value) if isinstance(value, tuple) else str(value)
+        text = ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
         output.print(f"{key:<{width}}  {text}", markup=False, soft_wrap=True)
     for key, value in passport["training"].items():
         if not isinstance(value, dict):

@@ -84,6 +84,8 @@ def draw_progress(rows: Sequence[Axes], runs: Sequence[View]) -> None:
         _reached(rows[0], runs)
     for axes, strip in zip(rows[-len(chosen) :], chosen, strict=True):
         _errors(axes, runs, strip)
+    for axes in rows[:-1]:
+        axes.tick_params(labelbottom=False)
     rows[-1].set_xlabel("time [s]")
     for _, judgement in judged(runs)[:1]:
         hold_s = judgement.task.tolerance.hold_s

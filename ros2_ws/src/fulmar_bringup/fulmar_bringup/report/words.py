@@ -24,12 +24,13 @@ def verdict(run: View) -> tuple[str, str]:
         reached, required = run.summary["goals_reached"] or 0, getattr(judgement.task, "required", 0)
         word = "Reached" if judgement.success else "Missed"
         return word, (
-            f"The robot reached {reached:.0f} targets in {judgement.duration_s:.0f} s; {required} make a success.{touched}"
+            f"The robot reached {reached:.0f} targets in {judgement.duration_s:.0f} s; "
+            f"{required} make a success.{touched}"
         )
     if run.summary["velocity_error_m_s"] is not None:
         return ("Kept" if judgement.success else "Missed"), (
-            f"Over {judgement.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off and the "
-            f"turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, changes of the target included."
+            f"Over {judgement.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off "
+            f"and the turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, changes of the target included."
         )
     what, error = _what(judgement.task), _length(run.summary["final_position_error_m"])
     if run.summary["final_heading_error_deg"] is not None:
