@@ -68,9 +68,22 @@ def export(run: Path, out: Path) -> Passport:
         }
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
         | {key: record[key] for key in ("recipe",) if key in record}
+        | {"curve": _curve(record)}
         | _verdict(record),
     )
     return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
+
+
+def _curve(record: dict[str, Any]) -> list[dict[str, float]]:
+    """Success at each check on held-out episodes, for pictures."""
+    return [
+        {
+            "wall_s": round(check["wall_s"], 1),
+            "steps": check["steps"],
+            "success_rate": round(check["success_rate"], 4),
+        }
+        for check in record.get("curve", ())
+    ]
 
 
 def _verdict(record: dict[str, Any]) -> dict[str, Any]:
