@@ -11,6 +11,7 @@ from rich.table import Table
 from fulmar_bringup.benchmark.cells import BAD, GOOD, head, missing, rows, spoken
 
 _MARKS = {GOOD: "[green]{} ✓[/]", BAD: "[bold red]{} ✗[/]", "": "{}"}
+_PLACES = {"batch": "the batch", "mujoco": "MuJoCo", "ros": "ROS"}
 _WIDTH = 140  # where nobody looks at a terminal, lines need not fit one
 
 
@@ -46,9 +47,11 @@ def verdict(document: dict[str, Any]) -> str:
 
 def notes(document: dict[str, Any]) -> list[str]:
     """What one has to know to read the tables."""
-    ways = ", ".join(f"{way} {episodes:,} episodes" for way, episodes in document["episodes"].items())
+    ways = ", ".join(
+        f"{episodes:,} episodes in {_PLACES[way]}" for way, episodes in document["episodes"].items()
+    )
     lines = [
-        f"{ways}, scenario {document['scenario']}, seed {document['seed']}. In brackets: the thesis (Tables 4.6 and "
+        f"{ways}; scenario {document['scenario']}, seed {document['seed']}. In brackets: the thesis (Tables 4.6 and "
         "4.7, its times from control steps at 10 Hz; its control variation is another sum). Figures below the line of "
         "training are means over the episodes of the first way.",
     ]

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from fulmar_bringup.benchmark.cells import head, spoken
 from fulmar_bringup.benchmark.report.view import ROBOT_COLOURS, WIDTH
-from fulmar_bringup.report.style import ALARM, FAINT, INK, quiet_grid
+from fulmar_bringup.report.style import ALARM, FAINT, INK, PAPER, quiet_grid
 
 _ROW = 0.27  # height of a row [inch]
 
@@ -84,6 +84,7 @@ def _row(axes: Any, at: float, entry: dict[str, Any]) -> None:
             color=ALARM,
             va="center",
             fontsize=8.5,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 1.0},
         )
     thesis = entry["thesis"]
     if thesis["success"] is not None and entry["judged_figure"] == "success_rate":

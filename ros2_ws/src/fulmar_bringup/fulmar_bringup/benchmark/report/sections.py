@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
-from fulmar_bringup.benchmark.report.curve_picture import curves, draw_curves
+from fulmar_bringup.benchmark.report.curve_picture import curve_of, draw_curves
 from fulmar_bringup.benchmark.report.headline_picture import draw_headline
 from fulmar_bringup.benchmark.report.map_picture import draw_map
 from fulmar_bringup.benchmark.report.path_picture import draw_paths
@@ -42,7 +42,7 @@ def pictures_of(findings: Findings, task: str) -> list[tuple[str, Picture]]:
     def add(name: str, title: str, caption: str, figure: Figure) -> None:
         drawn.append((f"{task}_{name}", Picture(title, _words(caption), figure)))
 
-    learned = [run for run in runs if curves(run)]
+    learned = [run for run in runs if curve_of(run)]
     if learned:
         add(
             "learning",

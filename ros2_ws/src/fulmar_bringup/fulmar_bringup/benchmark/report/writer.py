@@ -28,7 +28,9 @@ def write_report(findings: Findings, out: Path) -> Path:
         sections = [(task, pictures_of(findings, task)) for task in tasks]
         for name, picture in [("at_a_glance", first), *(named for _, drawn in sections for named in drawn)]:
             (folder / f"{name}.png").write_bytes(as_png(picture.figure, dpi=110))
-            picture.figure.set_layout_engine("none")  # it is laid out now; again would take as long as drawing
+            picture.figure.set_layout_engine(
+                "none"
+            )  # it is laid out now; again would take as long as drawing
         html = page(
             findings.document, first, [(task, [picture for _, picture in drawn]) for task, drawn in sections]
         )
