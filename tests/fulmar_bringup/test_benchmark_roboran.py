@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -45,6 +46,13 @@ def test_the_document_is_one_json_object_with_an_entry_for_each_pair(judged, fol
     assert {verdict["name"] for verdict in policy["verdicts"]} >= {"batch", "mujoco", "batch_minus_mujoco"}
     assert classical["verdicts"] == [], "nothing is asked of it"
     assert document["open"] == 1, "MuJoCo was left out"
+
+
+def test_every_key_is_written_down(judged):
+    text = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text()
+    document = json.loads(judged.stdout)
+    keys = {*document, *document["pairs"][0], *document["pairs"][0]["verdicts"][0]}
+    assert [key for key in sorted(keys) if f"`{key}`" not in text] == []
 
 
 def test_what_was_judged_before_is_taken_from_the_folder(judged, folder):
