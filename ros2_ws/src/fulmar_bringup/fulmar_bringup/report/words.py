@@ -30,7 +30,8 @@ def verdict(run: View) -> tuple[str, str]:
     if run.summary["velocity_error_m_s"] is not None:
         return ("Kept" if judgement.success else "Missed"), (
             f"Over {judgement.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off "
-            f"and the turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, changes of the target included."
+            f"and the turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, "
+            "changes of the target included."
         )
     what, error = _what(judgement.task), _length(run.summary["final_position_error_m"])
     if run.summary["final_heading_error_deg"] is not None:
