@@ -25,7 +25,8 @@ from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.upcoming import UpcomingEpisodes
 
 _MOVING = (
-    "truth", "measured", "goal", "world", "command", "_strength", "_repeats", "_steps", "_actuation", "_odometer", "_noise_keys",
+    "truth", "measured", "goal", "world", "command",
+    "_strength", "_repeats", "_steps", "_actuation", "_odometer", "_noise_keys",
 )  # fmt: skip
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 

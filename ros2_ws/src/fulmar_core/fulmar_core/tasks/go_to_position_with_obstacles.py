@@ -33,7 +33,7 @@ class GoToPositionWithObstacles:
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PositionReward
     collision_cost: float  # of touching, which ends an episode of training
-    nearness_cost: float  # times exp(-clearance / 0.15 m), so that keeping off is learned before the first touch
+    nearness_cost: float  # times exp(-clearance / 0.15 m): learned before the first touch
 
     goal_topic: ClassVar[str] = "goal_point"
 
