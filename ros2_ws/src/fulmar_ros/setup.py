@@ -19,5 +19,10 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    entry_points={"console_scripts": ["recorder_node = fulmar_ros.recorder_node:main"]},
+    entry_points={
+        "console_scripts": [
+            "recorder_node = fulmar_ros.recorder_node:main",
+            "goal_node = fulmar_ros.goal_node:main",
+        ]
+    },
 )

@@ -16,6 +16,7 @@ from fulmar_bringup.commands.doctor import doctor
 from fulmar_bringup.commands.evaluate import EPILOG as MEANINGS
 from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
+from fulmar_bringup.commands.goals import goals
 from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
@@ -38,6 +39,7 @@ app = typer.Typer(
 )
 app.command("list")(list_names)
 app.command()(run)
+app.command()(goals)
 app.command()(train)
 app.command()(policies)
 app.command()(export)

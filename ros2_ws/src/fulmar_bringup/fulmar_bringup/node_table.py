@@ -106,6 +106,24 @@ def recorder_spec(
     )
 
 
+def goals_spec(robot: str, goals: str, *, as_path: bool = False, control_hz: float = 10.0) -> NodeSpec:
+    """The node that tells goals from a file; no system has it by itself.
+
+    Args:
+        robot: Who is to do it.
+        goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`.
+        as_path: Tell all positions or poses at once.
+        control_hz: Velocities come so often along a path [Hz].
+    """
+    parameters: dict[str, Parameter] = {
+        "goals": goals,
+        "robot": robot,
+        "control_hz": control_hz,
+        "as_path": as_path,
+    }
+    return NodeSpec("goals", "fulmar_ros", "goal_node", "fulmar_ros.goal_node", f"/{robot}", parameters)
+
+
 def list_nodes(
     *,
     system: str | None = None,

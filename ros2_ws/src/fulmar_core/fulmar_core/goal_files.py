@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, cast
 
 import numpy as np
@@ -115,10 +116,10 @@ GoalFile = Positions | Poses | Velocities | FollowedPath
 
 
 def load_goals(name: str) -> GoalFile:
-    """Read `configs/goals/<name>.yaml`.
+    """Read `configs/goals/<name>.yaml`, or a file anywhere.
 
     Args:
-        name: Name of a file there.
+        name: Name of a file there, or a path that ends in `.yaml`.
 
     Returns:
         The goals.
@@ -126,4 +127,5 @@ def load_goals(name: str) -> GoalFile:
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
     """
-    return cast(GoalFile, load_config(GoalFile, config_path("goals", name)))  # type: ignore[arg-type]
+    path = Path(name) if name.endswith(".yaml") else config_path("goals", name)
+    return cast(GoalFile, load_config(GoalFile, path))  # type: ignore[arg-type]

@@ -1,0 +1,213 @@
+"""What of a goal file is to be told when: from where a robot is and the time, the goal that now counts."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Protocol
+
+import numpy as np
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.goal import Goal, goal_at
+from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities
+from fulmar_core.planar import PlanarState
+from fulmar_core.references.look_ahead import LookAhead, Progress, body_target, steered_target
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import load_task
+from fulmar_core.tasks.terms import Tolerance, pose_errors
+
+HOLD_S = 1.0  # within the tolerance for so long, a target is reached rather than passed
+SIDEWAYS = ("thrusters",)  # actuators that move a robot to any side
+STANDSTILL = goal_at((0.0, 0.0, 0.0))  # as a velocity
+
+
+class GoalSequence(Protocol):
+    """Goals that follow each other; told the state again and again until it is done."""
+
+    topic: str  # where the goals belong, one of `topics.GOAL_WIRES`
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing further comes."""
+
+    @property
+    def progress(self) -> str:
+        """How far it has come, for people."""
+
+    def step(self, state: PlanarState, time_s: float) -> Goal:
+        """Take note of a state.
+
+        Args:
+            state: Measured, without a batch axis.
+            time_s: When, since the first one; never less than before [s].
+
+        Returns:
+            The goal that counts from now on, without a batch axis.
+        """
+
+
+class Waypoints:
+    """Positions or poses, each when the one before is reached, or all in one goal."""
+
+    def __init__(
+        self, topic: str, targets: np.ndarray, tolerance: Tolerance, *, hold_s: float, at_once: bool
+    ) -> None:
+        """Begin with the first.
+
+        Args:
+            topic: Where the goals belong.
+            targets: x, y, yaw, shape (n, 3) [m, m, rad].
+            tolerance: Within which a target is reached; a heading of 0 does not count.
+            hold_s: How long a robot must stay there [s].
+            at_once: Whether the goal has all targets; it then is done after one round.
+        """
+        self.topic = topic
+        self._goals = [_goal(*targets)] if at_once else [_goal(target) for target in targets]
+        self._targets, self._tolerance, self._hold_s = targets, tolerance, hold_s
+        self._reached = 0
+        self._inside_since: float | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether the last one is reached."""
+        return self._reached == len(self._targets)
+
+    @property
+    def progress(self) -> str:
+        """How many are reached."""
+        return f"{self._reached} of {len(self._targets)} targets reached"
+
+    def step(self, state: PlanarState, time_s: float) -> Goal:
+        """The first target that is not reached, or all; see `GoalSequence.step`."""
+        if not self.done:
+            self._judge(state, time_s)
+        return self._goals[min(self._reached, len(self._goals) - 1)]
+
+    def _judge(self, state: PlanarState, time_s: float) -> None:
+        errors = pose_errors(state, self._targets[self._reached], heading=True)
+        inside = float(errors.position) <= self._tolerance.position
+        if self._tolerance.heading_deg:
+            inside &= abs(math.degrees(float(errors.heading))) <= self._tolerance.heading_deg
+        if not inside:
+            self._inside_since = None
+            return
+        if self._inside_since is None:
+            self._inside_since = time_s
+        if time_s - self._inside_since >= self._hold_s:
+            self._reached, self._inside_since = self._reached + 1, None
+
+
+class Schedule:
+    """Velocities by the clock, and standstill after the last."""
+
+    topic = "goal_velocity"
+
+    def __init__(self, velocities: np.ndarray, ends: np.ndarray) -> None:
+        """Begin with the first.
+
+        Args:
+            velocities: In the body's frame, shape (n, 3) [m/s, m/s, rad/s].
+            ends: When each is over, shape (n,) [s].
+        """
+        self._goals, self._ends = [_goal(velocity) for velocity in velocities], ends
+        self._over = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether the time of the last one is over."""
+        return self._over == len(self._ends)
+
+    @property
+    def progress(self) -> str:
+        """How many are over."""
+        return f"{self._over} of {len(self._ends)} velocities over"
+
+    def step(self, state: PlanarState, time_s: float) -> Goal:
+        """The velocity of this time; see `GoalSequence.step`."""
+        # A microsecond early, for times that were added up.
+        self._over = int(np.searchsorted(self._ends, time_s + 1e-6, side="right"))
+        return STANDSTILL if self.done else self._goals[self._over]
+
+
+class Following:
+    """Velocities that lead along a path, and standstill at its end."""
+
+    topic = "goal_velocity"
+
+    def __init__(self, file: FollowedPath, *, sideways: bool) -> None:
+        """Follow.
+
+        Args:
+            file: Path, speed and gains.
+            sideways: Whether the robot moves to any side without turning; others turn towards their aim.
+        """
+        self._file, self._sideways = file, sideways
+        self._planner: LookAhead = file.planner()
+        self._on_path: Progress | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether the path is at its end, or its rounds are."""
+        return self._on_path is not None and self._planner.is_done(self._on_path)
+
+    @property
+    def progress(self) -> str:
+        """How many rounds of a closed path are over, or whether an open one is."""
+        if not self._planner.closed:
+            return "the path is at its end" if self.done else "on the path"
+        laps = 0 if self._on_path is None else self._on_path.laps
+        return f"{laps} rounds" if self._planner.loops == 0 else f"{laps} of {self._planner.loops} rounds"
+
+    def step(self, state: PlanarState, time_s: float) -> Goal:
+        """The velocity towards the aim; see `GoalSequence.step`."""
+        position = np.array([float(state.x), float(state.y)])
+        if self._on_path is None:
+            self._on_path = self._enter(position)
+        velocity, self._on_path = self._planner.aim(self._on_path, position)
+        yaw = float(state.yaw)
+        if self._sideways:
+            return _goal(body_target(velocity, yaw))
+        most = math.radians(self._file.max_yaw_rate_deg)
+        return _goal(steered_target(velocity, yaw, gain=self._file.turn_gain, max_yaw_rate=most))
+
+    def _enter(self, position: np.ndarray) -> Progress:
+        """An open path is entered at its beginning, a closed one where it is nearest: its rounds begin there."""
+        if self._planner.closed:
+            points = np.roll(self._planner.points, -self._planner.nearest(position).index, axis=0)
+            self._planner = dataclasses.replace(self._planner, points=points)
+        return Progress()
+
+
+def _goal(*targets: np.ndarray) -> Goal:
+    return goal_at(*((float(x), float(y), float(turn)) for x, y, turn in targets))
+
+
+def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> GoalSequence:
+    """Everything that a goal file asks of a robot.
+
+    Tolerances are those of the tasks that take such goals.
+
+    Args:
+        goals: What to do.
+        robot: Who is to do it.
+        as_path: Tell all positions or poses at once, for tasks that pass through them.
+
+    Raises:
+        ConfigError: `as_path` with velocities, or with a path that is followed by velocities.
+    """
+    if isinstance(goals, Positions | Poses):
+        last = "positions" if isinstance(goals, Positions) else "poses"
+        if as_path:
+            tolerance = load_task(f"go_through_{last}").tolerance
+            return Waypoints("goal_path", goals.targets(), tolerance, hold_s=0.0, at_once=True)
+        tolerance = load_task(f"go_to_{last.removesuffix('s')}").tolerance
+        topic = "goal_point" if isinstance(goals, Positions) else "goal_pose"
+        return Waypoints(topic, goals.targets(), tolerance, hold_s=HOLD_S, at_once=False)
+    if as_path:
+        raise ConfigError(
+            f"'{goals.title}' tells velocities one after the other; only positions and poses can be told as a path."
+        )
+    if isinstance(goals, Velocities):
+        return Schedule(goals.targets(), goals.ends())
+    return Following(goals, sideways=robot.actuators.kind in SIDEWAYS)

@@ -1,0 +1,205 @@
+"""The node `goals`: tells a robot, from a file, where to go or how to move, and watches how far it comes."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from fulmar_core.exit_codes import DONE
+from fulmar_core.goal import Goal
+from fulmar_core.goal_files import load_goals
+from fulmar_core.goal_sequence import STANDSTILL, goal_sequence
+from fulmar_core.paths import config_names
+from fulmar_core.planar import planar_of
+from fulmar_core.robot import load_robot
+from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.tasks import load_task
+from fulmar_core.topics import GOAL_WIRES, ODOMETRY
+from fulmar_ros.convert import measurement_of
+from fulmar_ros.goal_messages import TYPES, goal_message
+from fulmar_ros.parameters import read_parameters
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import RequestExit, run_node
+
+PATIENCE_S = 3.0  # for the first odometry and for somebody who listens, before a person is told
+WATCH_S = 0.1
+FLUSH = Duration(seconds=0.5)
+
+
+@dataclass(frozen=True)
+class GoalSettings:
+    """ROS parameters of the goal node."""
+
+    goals: str = "lab_pose"  # name of a file in configs/goals, or a path that ends in .yaml
+    robot: str = "floating_platform"
+    control_hz: float = 10.0  # goals come at most so often in the robot's own time [Hz]
+    as_path: bool = False  # tell all positions or poses at once
+    input_timeout_s: float = (
+        0.5  # of wall-clock time without usable odometry, before a robot shall stand still [s]
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values without meaning."""
+        for name in ("control_hz", "input_timeout_s"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} = {getattr(self, name):g} must be finite and greater than 0.")
+
+
+class GoalNode(Node):
+    """Publishes a goal when it differs from the last one, in the time of the odometry that it answers."""
+
+    def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
+        """Read the parameters and the goals, and wait for odometry.
+
+        Args:
+            request_exit: Ends the process, once everything is done.
+            cli_args: ROS arguments of this node alone, where it shares a process.
+
+        Raises:
+            FulmarError: If a parameter or a file is wrong.
+        """
+        super().__init__("goals", cli_args=cli_args)
+        self._settings = read_parameters(self, GoalSettings)
+        robot = load_robot(self._settings.robot)
+        goals = load_goals(self._settings.goals)
+        self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
+        self._request_exit = request_exit
+        self._gate = InputGate(robot.limits, frozen_after=0)  # whether a sensor is stuck, controllers judge
+        self._lock = threading.Lock()
+        self._told: Goal | None = None
+        self._newest: Measurement | None = None
+        self._time_ns, self._told_at_ns = 0, 0  # of the sequence; it stands still while no odometry comes
+        self._period_ns = round(1e9 / self._settings.control_hz)
+        self._progress = self._sequence.progress
+        self._problem, self._stale, self._over, self._heard = "", False, False, False
+        self._began = self._usable_at = time.monotonic()
+        wire = GOAL_WIRES[self._sequence.topic]
+        self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        self.create_subscription(
+            Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
+        )
+        self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.get_logger().info(f"{goals.title}: goals for {robot.name} on {self._publisher.topic_name}")
+
+    def _on_odometry(self, message: Odometry) -> None:
+        measurement = measurement_of(message)
+        with self._lock:
+            problem = self._gate.problem(measurement)
+            if problem or self._over:
+                self._problem = problem or ""
+                return
+            self._resume(measurement)
+            goal = self._sequence.step(planar_of(measurement.state), self._time_ns / 1e9)
+            self._tell_progress()
+            if self._is_due(goal):
+                self._tell(goal)
+            if self._sequence.done:
+                self._over = True
+                self.get_logger().info(self._farewell())
+                self._request_exit(DONE)
+
+    def _resume(self, measurement: Measurement) -> None:
+        """Go on with the sequence's time; gaps do not count."""
+        if self._newest is not None:
+            ahead_ns = measurement.stamp_ns - self._newest.stamp_ns
+            if not self._stale and ahead_ns > 0:
+                self._time_ns += ahead_ns
+        if self._stale:
+            self.get_logger().info("odometry is back: going on")
+        self._newest, self._usable_at = measurement, time.monotonic()
+        self._problem, self._stale = "", False
+
+    def _is_due(self, goal: Goal) -> bool:
+        if self._told is None:
+            return True
+        if np.array_equal(goal.targets, self._told.targets):
+            return False
+        return self._sequence.done or self._time_ns - self._told_at_ns >= self._period_ns
+
+    def _tell(self, goal: Goal) -> None:
+        assert self._newest is not None
+        self._publisher.publish(goal_message(goal, self._sequence.topic, self._newest.stamp_ns))
+        self._told, self._told_at_ns = goal, self._time_ns
+
+    def _tell_progress(self) -> None:
+        if self._sequence.progress != self._progress:
+            self._progress = self._sequence.progress
+            self.get_logger().info(self._progress)
+
+    def _farewell(self) -> str:
+        if self._sequence.topic == "goal_path":
+            return "done: one round is over; the controller goes round until another goal comes"
+        if self._sequence.topic == "goal_velocity":
+            return "done: the robot is told to stand still"
+        return "done: the robot stays until another goal comes"
+
+    def _watch(self) -> None:
+        """Notice silence, of the odometry and of whoever should listen; by a steady clock."""
+        with self._lock:
+            now = time.monotonic()
+            limit_s = self._settings.input_timeout_s if self._newest else PATIENCE_S
+            late = now - self._usable_at > limit_s
+            if late and not self._stale and not self._over:
+                self._stale = True
+                self._pause()
+        if not self._heard and now - self._began > PATIENCE_S:
+            self._heard = True  # told once
+            self._tell_who_listens()
+
+    def _pause(self) -> None:
+        topic = self.resolve_topic_name(ODOMETRY.name)
+        reason = self._problem or f"nothing comes on {topic}"
+        if self._newest is None:
+            self.get_logger().warning(f"waiting for odometry: {reason}")
+            return
+        stands = self._stand_still()
+        then = "the robot is told to stand still" if stands else "the goal stays as it is"
+        self.get_logger().warning(
+            f"no usable odometry for {self._settings.input_timeout_s:g} s ({reason}): {then}"
+        )
+
+    def _stand_still(self) -> bool:
+        """End a velocity that was told; other goals need no end."""
+        if self._sequence.topic != "goal_velocity" or self._told is None:
+            return False
+        self._tell(STANDSTILL)
+        return True
+
+    def _tell_who_listens(self) -> None:
+        topic = self._publisher.topic_name
+        listeners = {info.node_name for info in self.get_subscriptions_info_by_topic(topic)} - {"recorder"}
+        if not listeners:
+            tasks = [name for name in config_names("tasks") if _topic_of(name) == self._sequence.topic]
+            self.get_logger().warning(
+                f"nobody listens on {topic}; a controller does with one of the tasks {', '.join(tasks)}"
+            )
+
+    def stop(self) -> None:
+        """Last words: a robot that was told a velocity is told to stand still."""
+        with self._lock:
+            if not self._over:
+                self._stand_still()
+            self._over = True
+        self._publisher.wait_for_all_acked(FLUSH)
+
+
+def _topic_of(task: str) -> str:
+    return load_task(task).goal_topic
+
+
+def main() -> None:
+    """Tell goals until they are done, or until told to stop."""
+    sys.exit(run_node(GoalNode))
+
+
+if __name__ == "__main__":
+    main()

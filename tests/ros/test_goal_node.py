@@ -1,0 +1,218 @@
+"""The goal node against hand-made odometry, and in a loop with a plant and a controller."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+import rclpy
+from geometry_msgs.msg import PointStamped, TwistStamped
+from nav_msgs.msg import Path
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.topics import GOAL_WIRES
+from fulmar_ros.convert import stamp_ns
+from fulmar_ros.goal_messages import TYPES
+from fulmar_ros.goal_node import GoalNode
+from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.runtime import spinning
+from tests.conftest import RosDomain
+from tests.ros.cli import start_fulmar
+from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
+
+VELOCITIES = """
+kind: velocities
+title: ahead, then turning
+velocities:
+  - { velocity: [0.3, 0.0, 0.0], hold_s: 0.4 }
+  - { velocity: [0.0, 0.0, 90.0], hold_s: 0.4 }
+"""
+POSITIONS = """
+kind: positions
+title: here, then there
+positions: [[1.0, 0.0], [1.0, 1.0]]
+"""
+LINE = """
+kind: path
+title: a wave ahead
+path: { kind: sine, length: 4.0, amplitude: 0.1, cycles: 1 }
+speed: 0.25
+look_ahead: 0.2
+"""
+PATIENT = {"input_timeout_s": 5.0}  # a busy machine may hold up the odometry
+
+
+class Ears:
+    """Keeps every goal that is told."""
+
+    def __init__(self, neighbour: Neighbour) -> None:
+        self.points: list[PointStamped] = []
+        self.paths: list[Path] = []
+        self.velocities: list[TwistStamped] = []
+        kept: dict[str, list[Any]] = {
+            "goal_point": self.points,
+            "goal_path": self.paths,
+            "goal_velocity": self.velocities,
+        }
+        for topic, messages in kept.items():
+            qos = subscriber_qos(GOAL_WIRES[topic], depth=50)
+            neighbour.node.create_subscription(TYPES[topic], topic, messages.append, qos)
+
+    @property
+    def moves(self) -> list[tuple[float, float, float]]:
+        """Velocities as numbers."""
+        twists = [message.twist for message in self.velocities]
+        return [(t.linear.x, t.linear.y, t.angular.z) for t in twists]
+
+
+@pytest.fixture
+def ears(neighbour: Neighbour) -> Ears:
+    return Ears(neighbour)
+
+
+@contextlib.contextmanager
+def goal_node(tmp_path, text: str, **parameters: object) -> Iterator[tuple[GoalNode, list[int]]]:
+    """A goal node for a file; and the codes with which it asks to end."""
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", f"goals:={file}"]
+    for name, value in parameters.items():
+        arguments += ["-p", f"{name}:={value}"]
+    codes: list[int] = []
+    node = GoalNode(codes.append, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        yield node, codes
+        node.stop()
+
+
+@contextlib.contextmanager
+def streaming(neighbour: Neighbour, spoil: Callable[[Any], None] = lambda _message: None) -> Iterator[Stream]:
+    """Odometry at 50 Hz."""
+    odometry = Stream(neighbour)
+    odometry.spoil = spoil
+    try:
+        yield odometry
+    finally:
+        odometry.stop()
+
+
+def test_velocities_come_by_the_odometry_s_clock_and_end_in_standstill(
+    tmp_path, neighbour: Neighbour, ears: Ears
+) -> None:
+    """Twenty milliseconds a message, whatever the wall clock says."""
+    with goal_node(tmp_path, VELOCITIES, **PATIENT) as (_, codes):
+        with streaming(neighbour):
+            until(lambda: codes == [0] and len(ears.moves) == 3)
+        assert ears.moves == [(0.3, 0.0, 0.0), (0.0, 0.0, pytest.approx(math.pi / 2)), (0.0, 0.0, 0.0)]
+        first, second, last = (stamp_ns(message.header.stamp) for message in ears.velocities)
+        assert 400_000_000 <= second - first < 600_000_000
+        assert 800_000_000 <= last - first < 1_000_000_000
+        assert {message.header.frame_id for message in ears.velocities} == {"base_link"}
+
+
+def test_positions_come_when_the_one_before_is_reached_and_each_once(
+    tmp_path, neighbour: Neighbour, ears: Ears
+) -> None:
+    """The robot is put there by hand."""
+    places = iter([(0.0, 0.0)] * 20 + [(1.0, 0.0)] * 70 + [(1.0, 1.0)] * 10_000)
+
+    def put(message: Any) -> None:
+        message.pose.pose.position.x, message.pose.pose.position.y = next(places)
+
+    with goal_node(tmp_path, POSITIONS) as (_, codes), streaming(neighbour, put):
+        until(lambda: codes == [0] and len(ears.points) == 2)
+    assert [(m.point.x, m.point.y) for m in ears.points] == [(1.0, 0.0), (1.0, 1.0)]
+    assert not ears.velocities
+
+
+def test_as_a_path_all_positions_come_in_one_message(tmp_path, neighbour: Neighbour, ears: Ears) -> None:
+    """For tasks that pass through them."""
+    with goal_node(tmp_path, POSITIONS, as_path="true"), streaming(neighbour):
+        until(lambda: bool(ears.paths))
+    assert [(p.pose.position.x, p.pose.position.y) for p in ears.paths[0].poses] == [(1.0, 0.0), (1.0, 1.0)]
+
+
+def test_along_a_path_velocities_come_at_the_rate_that_was_asked_for(
+    tmp_path, neighbour: Neighbour, ears: Ears
+) -> None:
+    """Steered for a robot that cannot move sideways."""
+
+    def drift(message: Any) -> None:
+        message.pose.pose.position.y = 1e-10 * stamp_ns(message.header.stamp)
+
+    with (
+        goal_node(tmp_path, LINE, robot="turtlebot2", control_hz=5.0, **PATIENT),
+        streaming(neighbour, drift),
+    ):
+        until(lambda: len(ears.velocities) >= 4)
+    stamps = [stamp_ns(message.header.stamp) for message in ears.velocities[:4]]
+    assert all(200_000_000 <= b - a < 400_000_000 for a, b in itertools.pairwise(stamps))
+    assert all(ahead == pytest.approx(0.25) and left == 0.0 for ahead, left, _ in ears.moves[:4])
+
+
+def test_silence_of_the_odometry_becomes_standstill_and_its_return_goes_on(
+    tmp_path, neighbour: Neighbour, ears: Ears
+) -> None:
+    """The time of silence does not count."""
+    with goal_node(tmp_path, VELOCITIES.replace("hold_s: 0.4", "hold_s: 30.0")) as (_, codes):
+        with streaming(neighbour):
+            until(lambda: len(ears.moves) == 1)
+        until(lambda: len(ears.moves) == 2)
+        assert not any(ears.moves[1])
+        with streaming(neighbour):
+            until(lambda: len(ears.moves) == 3)
+        assert ears.moves[2] == ears.moves[0]
+        assert not codes
+
+
+def test_unbelievable_odometry_counts_as_silence(tmp_path, neighbour: Neighbour, ears: Ears) -> None:
+    """As for a controller."""
+
+    def spoil(message: Any) -> None:
+        message.header.frame_id = "map"
+
+    with (
+        goal_node(tmp_path, VELOCITIES.replace("hold_s: 0.4", "hold_s: 30.0")),
+        streaming(neighbour) as odometry,
+    ):
+        until(lambda: len(ears.moves) == 1)
+        odometry.spoil = spoil
+        until(lambda: len(ears.moves) == 2)
+    assert not any(ears.moves[1])
+
+
+def test_whoever_stops_the_node_stops_the_robot(tmp_path, neighbour: Neighbour, ears: Ears) -> None:
+    """Ctrl-C in the middle of a velocity."""
+    with goal_node(tmp_path, VELOCITIES.replace("hold_s: 0.4", "hold_s: 30.0")), streaming(neighbour):
+        until(lambda: len(ears.moves) == 1)
+    until(lambda: len(ears.moves) == 2)
+    assert not any(ears.moves[1])
+
+
+def test_a_file_that_is_wrong_is_named(tmp_path, ros_domain: RosDomain, neighbour: Neighbour) -> None:
+    """Before anything is told."""
+    with pytest.raises(ConfigError, match=r"mine\.yaml"), goal_node(tmp_path, "kind: dances\ntitle: no\n"):
+        pass
+    assert rclpy.ok()
+
+
+@pytest.mark.slow
+def test_a_simulated_platform_goes_where_the_command_tells_it(
+    tmp_path, neighbour: Neighbour, plant: Any, controller: Any, ros_domain: RosDomain
+) -> None:
+    """`fulmar goals` in a process of its own, with a plant and an LQR that go to poses."""
+    (tmp_path / "near.yaml").write_text("kind: poses\ntitle: near\nposes: [[0.3, 0.0, 0.0]]\n")
+    command = start_fulmar(
+        "goals", "near.yaml", "--robot", "floating_platform", env=ros_domain.env, cwd=tmp_path
+    )
+    try:
+        _, words = command.communicate(timeout=60.0)
+    finally:
+        if command.poll() is None:
+            command.kill()
+    assert command.returncode == 0, words
+    assert "1 of 1 targets reached" in words
