@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_bringup.benchmark import bound_file, work
 from fulmar_bringup.benchmark import unit as units
-from fulmar_bringup.benchmark import work
 from fulmar_bringup.benchmark.judged import QUANTILES, Judged
 from fulmar_bringup.benchmark.pairs import code_hash, find_pair, units_of
 from fulmar_bringup.benchmark.required import LEAST, judged_figure, verdicts
@@ -142,6 +142,19 @@ def test_waypoints_are_counted_over_an_episode_over_a_thousand_steps_and_over_as
     np.testing.assert_allclose(figures["share_of_bound"], figures["goals_reached"] / figures["goals_bound"])
     assert np.all(figures["share_of_bound"] <= 1.0)
     assert outcome.about["thousand_steps_s"] == 200.0
+
+
+def test_a_bound_is_computed_once_and_kept(tmp_path, monkeypatch):
+    trial = unit_of(tmp_path, robot="turtlebot2", task="go_through_positions").trial
+    drawn = trial.drawn(np.arange(2))
+    first = bound_file.cached_bound(trial, drawn, 20.0, tmp_path)
+    monkeypatch.setattr(bound_file, "waypoint_bound", lambda *_: pytest.fail("computed again"))
+    again = bound_file.cached_bound(trial, drawn, 20.0, tmp_path)
+    np.testing.assert_array_equal(again.goals, first.goals)
+    np.testing.assert_array_equal(again.goals_at_top_speed, first.goals_at_top_speed)
+    assert (again.name, again.rule) == (first.name, first.rule)
+    with pytest.raises(pytest.fail.Exception):
+        bound_file.cached_bound(trial, drawn, 21.0, tmp_path)
 
 
 def test_the_hash_of_the_code_knows_the_simulator_only_where_it_is_used():

@@ -35,6 +35,17 @@ def test_the_length_of_an_episode_is_seconds_or_control_steps():
     assert evaluate(f"{POSE} --episodes 1")["episode_s"] == 60.0
 
 
+def test_waypoints_are_told_with_what_physics_allows(monkeypatch):
+    monkeypatch.setattr("fulmar_bringup.evaluation.BOUNDED_EPISODES", 2)
+    words = "evaluate turtlebot2 go_through_positions --controller classical --through batch --episodes 3"
+    found = evaluate(f"{words} --episode-s 20")
+    assert found["bound_episodes"] == 2
+    assert found["goals_reached"]["mean"] <= found["goals_bound"]["mean"] + 1.0
+    assert 0.0 < found["share_of_bound"]["mean"] <= 1.0
+    assert 0.0 < found["share_of_mean_bound"] <= 1.0
+    assert "rad/s" in found["bound"]
+
+
 def test_a_length_said_twice_and_worlds_elsewhere_are_refused():
     with pytest.raises(ConfigError, match="Give one of them"):
         CliRunner().invoke(app, f"{POSE} --steps 20 --episode-s 4".split(), catch_exceptions=False)

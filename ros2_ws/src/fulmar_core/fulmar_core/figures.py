@@ -48,13 +48,22 @@ FIGURES = {
     "goals_bound": Figure(
         "goals bound",
         "",
-        "The most waypoints that physics allows in this very episode; which bound is told beside it.",
+        "The most waypoints that physics allows in this very episode, by the bound that fits the robot, which is told "
+        "beside it.",
     ),
     "share_of_bound": Figure(
         "share of the bound",
         "-",
         "Goals reached over the bound of the same episode; required shares are judged on its mean.",
         "more",
+    ),
+    "goals_at_top_speed": Figure(
+        "bound at top speed",
+        "",
+        "The most waypoints if nothing but the top speed held the robot: no turning, no slew.",
+    ),
+    "share_at_top_speed": Figure(
+        "share of that bound", "-", "Goals reached over the bound at top speed of the same episode.", "more"
     ),
     "velocity_error_m_s": Figure(
         "velocity error",

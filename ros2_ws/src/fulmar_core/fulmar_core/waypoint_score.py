@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.bounds import time_optimal_bound, top_speed_bound
+from fulmar_core.bounds import bound_of, top_speed_bound
 from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -21,48 +19,64 @@ BOUNDED = ("go_through_positions", "go_through_poses", "race_waypoints", "race_w
 class WaypointBound:
     """The most waypoints that a robot can reach, and what that is made of."""
 
-    goals: np.ndarray  # (episodes,) whole waypoints
-    rule: str  # in words
+    goals: np.ndarray  # (episodes,) whole waypoints, by the bound that fits the robot
+    goals_at_top_speed: (
+        np.ndarray | None
+    )  # (episodes,) if nothing but its top speed held it; None: it has none
+    name: str  # time_optimal, turn_limited or top_speed
+    rule: str  # the same in words
 
 
-def waypoint_bound(robot: Robot, task: Task, drawn: Episode, duration_s: float) -> WaypointBound | None:
-    """Bound the waypoints of some episodes.
+def has_bound(task: Task) -> bool:
+    """Whether waypoints of a task can be bounded."""
+    return task.kind in BOUNDED
 
-    A robot with thrusters gets the time-optimal bound of a point mass: its force in the strongest direction over its
-    nominal mass, whichever way it faces, and no time for turning. Any other gets the bound at its top speed: no time
-    for speeding up, for turning, or for slew. Pushes and other masses of a scenario are not in it.
+
+def waypoint_bound(robot: Robot, task: Task, drawn: Episode, duration_s: float) -> WaypointBound:
+    """Bound the waypoints of some episodes; `bounds.bound_of` says what is in the bound.
 
     Args:
-        robot: The robot.
-        task: The task; its tolerance is how near counts.
+        robot: The robot; its body is the nominal one, in a still world.
+        task: One that `has_bound`; its tolerance is how near counts.
         drawn: The episodes, with their batch axis.
         duration_s: How long they last [s].
-
-    Returns:
-        The bound; None for tasks that do not count waypoints.
     """
-    if task.kind not in BOUNDED:
-        return None
     start = np.stack((drawn.start.x, drawn.start.y), axis=-1)
     places, radius = np.asarray(drawn.goal.targets)[..., :2], task.tolerance.position
-    if isinstance(robot.actuators, Thrusters):
-        acceleration = robot.performance.force / robot.body.mass
-        velocity = np.stack((drawn.start.vx, drawn.start.vy), axis=-1)
-        bound = time_optimal_bound(
-            start,
-            velocity,
-            places,
-            radius=radius,
-            acceleration=acceleration,
-            top_speed=math.inf,
-            duration_s=duration_s,
-        )
-        return WaypointBound(bound.goals, f"time-optimal at {acceleration:.3f} m/s², turning not counted")
-    speed = robot.performance.top_speed
-    bound = top_speed_bound(start, places, radius=radius, top_speed=speed, duration_s=duration_s)
-    return WaypointBound(bound.goals, f"at the top speed of {speed:g} m/s, slew and turning not counted")
+    found = bound_of(
+        robot,
+        start,
+        places,
+        radius,
+        duration_s,
+        start_yaw=np.asarray(drawn.start.yaw),
+        start_velocity=np.stack((drawn.start.vx, drawn.start.vy), axis=-1),
+    )
+    fastest = None
+    if found.name != "time_optimal":
+        speed = robot.performance.top_speed
+        fastest = top_speed_bound(start, places, radius=radius, top_speed=speed, duration_s=duration_s).goals
+    return WaypointBound(found.bound.goals, fastest, found.name, found.rule)
 
 
-def shares_of_bound(goals: np.ndarray, bound: np.ndarray) -> np.ndarray:
-    """Waypoints reached as shares of the bound, shape (episodes,); NaN where not even one can be reached [-]."""
-    return np.where(bound > 0, goals / np.maximum(bound, 1), np.nan)
+def bound_figures(goals: np.ndarray, bound: WaypointBound) -> dict[str, np.ndarray]:
+    """Figures of episodes against their bound.
+
+    Args:
+        goals: Waypoints reached, shape (episodes,).
+        bound: Of the first episodes, perhaps of all.
+
+    Returns:
+        Figures by name, shapes (episodes,); NaN beyond the episodes that were bounded.
+    """
+    figures = {"goals_bound": bound.goals, "share_of_bound": _shares(goals, bound.goals)}
+    if bound.goals_at_top_speed is not None:
+        figures["goals_at_top_speed"] = bound.goals_at_top_speed
+        figures["share_at_top_speed"] = _shares(goals, bound.goals_at_top_speed)
+    missing = len(goals) - len(bound.goals)
+    return {name: np.append(values, np.full(missing, np.nan)) for name, values in figures.items()}
+
+
+def _shares(goals: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Goals over their bound; NaN where not even one can be reached."""
+    return np.where(bound > 0, goals[: len(bound)] / np.maximum(bound, 1), np.nan)

@@ -83,6 +83,8 @@ QUANTITIES = {
     "go_through_positions": (
         Quantity("goals in 60 s", "", "goals_reached", "", 2),
         Quantity("bound in 60 s", "", "goals_bound", "", 2),
+        Quantity("bound at top speed in 60 s", "", "goals_at_top_speed", "", 2),
+        Quantity("share of that", "", "share_at_top_speed", "", 3),
         Quantity("goals in 1,000 steps", "", "goals_in_1000_steps", "goals", 2),
         Quantity("goals in 100 s", "", "goals_in_100_s", "goals", 2),
         *_COMMON,

@@ -12,6 +12,7 @@ from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.pairs import Pair
 from fulmar_bringup.benchmark.required import judged_figure, verdicts
 from fulmar_bringup.benchmark.thesis import thesis_row
+from fulmar_bringup.evaluation import share_of_mean
 from fulmar_core.metrics import summarise
 
 FORMAT = 1
@@ -76,9 +77,9 @@ def _way(outcome: Judged) -> dict[str, Any]:
     entry = {**kept, **figures}
     entry["success_interval"] = wilson(figures["success_rate"], figures["episodes"])
     if "goals_bound" in outcome.figures:
-        most = float(np.mean(outcome.figures["goals_bound"]))
-        goals = float(np.mean(outcome.figures["goals_reached"]))
-        entry["share_of_mean_bound"] = goals / most if most > 0.0 else None
+        entry["share_of_mean_bound"] = share_of_mean(
+            outcome.figures["goals_reached"], outcome.figures["goals_bound"]
+        )
     return entry
 
 

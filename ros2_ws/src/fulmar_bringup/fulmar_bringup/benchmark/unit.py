@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from fulmar_bringup.benchmark.bound_file import cached_bound
 from fulmar_bringup.benchmark.judged import QUANTILES, Judged
 from fulmar_bringup.benchmark.thesis import CONTROL_HZ, GOAL_STEPS
 from fulmar_bringup.evaluation import Progress, Tally, Trial, runs_of
 from fulmar_core.episode import Episode, episode_steps
 from fulmar_core.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.planar import wrapped
-from fulmar_core.waypoint_score import shares_of_bound, waypoint_bound
+from fulmar_core.waypoint_score import bound_figures, has_bound
 
 KEPT = 48  # episodes whose paths are kept
 FEW_WORLDS = 64  # of the second run in batch, which must give the same numbers
@@ -92,7 +93,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None) -> Judged:
     drawn = trial.drawn(np.arange(trial.episodes))
     figures, about = tally.figures, _about(unit, tally.steps)
     if counts_targets(short):
-        _count_goals(trial, drawn, np.concatenate(goals), figures, about)
+        _count_goals(trial, drawn, np.concatenate(goals), figures, about, unit.folder)
     if trial.through == "batch":
         about["same_at_64_worlds"], about["compared_episodes"] = _same_with_few_worlds(unit.trial, figures)
     about["wall_s"] = time.monotonic() - began
@@ -179,6 +180,7 @@ def _count_goals(
     goals: np.ndarray,
     figures: dict[str, np.ndarray],
     about: dict[str, object],
+    folder: Path,
 ) -> None:
     """Add the bound over an episode, and goals over the thesis' horizon: its steps, and its seconds at 10 Hz."""
     dt, known = _control_dt(trial), goals.shape[1]
@@ -189,10 +191,9 @@ def _count_goals(
         if steps <= known:
             figures[name] = goals[:, steps - 1]
     about["thousand_steps_s"] = GOAL_STEPS * dt
-    bound = waypoint_bound(trial.robot, trial.task, drawn, float(str(about["episode_s"])))
-    if bound is not None:
-        figures["goals_bound"] = bound.goals
-        figures["share_of_bound"] = shares_of_bound(figures["goals_reached"], bound.goals)
+    if has_bound(trial.task):
+        bound = cached_bound(trial, drawn, float(str(about["episode_s"])), folder)
+        figures |= bound_figures(figures["goals_reached"], bound)
         about["bound"] = bound.rule
 
 

@@ -156,7 +156,11 @@ def _print(figures: dict[str, Any]) -> None:
             table.add_row(name, *numbers)
     output.print(table)
     if "bound" in figures:
-        output.print(f"bound on goals: {figures['bound']}", markup=False)
+        output.print(
+            f"bound on goals, of the first {figures['bound_episodes']} episodes: {figures['bound']}",
+            markup=False,
+            soft_wrap=True,
+        )
     output.print(
         f"success {figures['success_rate']:.3f} of {figures['episodes']} episodes of {figures['episode_s']:g} s "
         f"(seed {figures['seed']}) through {figures['through']}; {figures['wall_s']:.1f} s, "
