@@ -42,7 +42,7 @@ def test_the_table_names_every_policy_that_shall_ship():
 
 def test_making_all_of_them_takes_under_ninety_minutes():
     table = load_policy_table()
-    judging, slow = 1.0, 300  # minutes for each policy; updates a minute of one run, on a core that others use too
+    judging, slow = 1.0, 300  # minutes for each policy; updates a minute, on a core that others use too
     minutes = sum(policy.updates / slow + judging for policy in table.policies) / table.at_once
     assert minutes < 90.0
 
