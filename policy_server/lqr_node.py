@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from fulmar_core.controllers.classical import load_lqr
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.lqr import load_lqr
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_ros.controller_node import ControllerNode

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fulmar_core.config import load_config
+from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.lqr import load_lqr
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot, load_robot
@@ -25,6 +25,18 @@ def _load_lqr(robot: Robot, task: Task, control_hz: float, _policy: str) -> Cont
     return load_lqr(robot, task, control_hz=control_hz)
 
 
+def _load_classical(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
+    return load_classical(robot, task, control_hz=control_hz)
+
+
+def _check_lqr(robot: Robot, task: Task) -> None:
+    check_pair(robot, task, law="lqr")
+
+
+def _any_pair(robot: Robot, task: Task) -> None:
+    """A bundle says itself what it was made for."""
+
+
 @dataclass(frozen=True)
 class ControllerEntry:
     """One line of the table of controllers."""
@@ -32,12 +44,21 @@ class ControllerEntry:
     title: str
     node: str  # script and module in policy_server
     load: Callable[[Robot, Task, float, str], Controller]  # with the command rate and the folder of a bundle
+    check: Callable[[Robot, Task], None]  # refuses a robot and a task that it has nothing for
     needs: tuple[str, ...] = ()  # modules that an extra brings
 
 
+_LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
 CONTROLLERS = {
-    "policy": ControllerEntry("a learned policy bundle", "policy_node", _load_policy, ("onnxruntime",)),
-    "lqr": ControllerEntry("linear-quadratic regulator with valve allocation", "lqr_node", _load_lqr),
+    "policy": ControllerEntry(
+        "a learned policy bundle", "policy_node", _load_policy, _any_pair, ("onnxruntime",)
+    ),
+    "lqr": ControllerEntry(
+        "linear-quadratic regulator with valve allocation", "lqr_node", _load_lqr, _check_lqr
+    ),
+    "classical": ControllerEntry(
+        f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
+    ),
 }
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")
@@ -84,15 +105,15 @@ def system_of(controller: str, backend: str) -> System | None:
 
 
 def check_names(robot: str, task: str, controller: str, backend: str) -> None:
-    """Refuse unknown names and backends that do not exist for a robot.
+    """Refuse unknown names, and controllers and backends that do not exist for a robot and a task.
 
     Raises:
         ConfigError: On the first wrong one.
     """
-    load_robot(robot)
-    load_task(task)
+    the_robot, the_task = load_robot(robot), load_task(task)
     if controller not in CONTROLLERS:
         raise UnknownNameError("controller", controller, CONTROLLERS)
+    CONTROLLERS[controller].check(the_robot, the_task)
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
     if backend == "hardware" and robot not in DRIVERS:

@@ -1,0 +1,105 @@
+"""The classical law for each family of robots, and the tasks that it does.
+
+The explicit table. A law for another family or task is one file here and one entry below.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fulmar_core.config import load_config
+from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.line_of_sight import LineOfSight, LineOfSightGains
+from fulmar_core.controllers.lqr import Lqr, LqrWeights
+from fulmar_core.controllers.polar import Polar, PolarGains
+from fulmar_core.controllers.pure_pursuit import PurePursuit, PurePursuitGains
+from fulmar_core.errors import ConfigError
+from fulmar_core.paths import config_names, config_path
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+
+POSITIONS = ("go_to_position", "go_to_position_with_obstacles", "go_through_positions", "race_waypoints")
+POSES = ("go_to_pose", "go_through_poses", "race_wayposes")
+VELOCITIES = ("track_velocities",)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the table."""
+
+    law: type[Law]
+    gains: type[Any]  # what its YAML is read into
+    tasks: tuple[str, ...]  # kinds that it does
+
+
+LAWS = {
+    "thrusters": Entry(Lqr, LqrWeights, POSITIONS + POSES + VELOCITIES),
+    "differential_drive": Entry(Polar, PolarGains, POSITIONS + POSES + VELOCITIES),
+    "propellers": Entry(LineOfSight, LineOfSightGains, POSITIONS + POSES + VELOCITIES),
+    "ackermann": Entry(PurePursuit, PurePursuitGains, POSITIONS + VELOCITIES),  # no law here parks a car
+}
+
+
+def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
+    """Refuse a robot and a task that no law here is for.
+
+    Args:
+        robot: The robot.
+        task: The task.
+        law: Name of the only law that is meant; any by default.
+
+    Raises:
+        ConfigError: With what would be allowed.
+    """
+    family = robot.actuators.kind
+    entry = LAWS[family]
+    if law is not None and entry.law.law != law:
+        families = ", ".join(name for name, other in LAWS.items() if other.law.law == law)
+        raise ConfigError(
+            f"controller '{law}' is for robots with {families}; '{robot.name}' has {family}. "
+            "Use --controller classical."
+        )
+    if task.kind not in entry.tasks:
+        raise ConfigError(
+            f"no classical law does '{task.name}' on '{robot.name}' ({family}); there is one for: "
+            f"{', '.join(entry.tasks)}. Use --controller policy."
+        )
+
+
+def load_classical(
+    robot: Robot, task: Task, *, control_hz: float | None = None, law: str | None = None
+) -> Law:
+    """The law for a robot and a task, with the gains of `configs/controllers/<robot>_<law>.yaml`.
+
+    Args:
+        robot: The robot.
+        task: The task.
+        control_hz: Command rate; the robot's own by default [Hz].
+        law: Name of the only law that is meant; by default the one of the robot's family, called "classical".
+
+    Returns:
+        The controller.
+
+    Raises:
+        ConfigError: No law for the pair, no gains for this robot, a mistake in them, or a rate that the physics
+            cannot keep.
+    """
+    check_pair(robot, task, law=law)
+    entry = LAWS[robot.actuators.kind]
+    name = f"{robot.name}_{entry.law.law}"
+    if name not in config_names("controllers"):
+        raise ConfigError(
+            f"no gains of '{entry.law.law}' for '{robot.name}'. Write configs/controllers/{name}.yaml."
+        )
+    gains = load_config(entry.gains, config_path("controllers", name))
+    try:
+        return entry.law(robot, task, gains, control_hz=control_hz, name=law or "classical")
+    except ValueError as error:
+        hz = control_hz or robot.timing.control_hz
+        raise ConfigError(f"{entry.law.law} for '{robot.name}' at {hz:g} Hz: {error}") from error
+
+
+def load_lqr(robot: Robot, task: Task, *, control_hz: float | None = None) -> Law:
+    """The LQR of a robot with thrusters; arguments and errors as of `load_classical`."""
+    return load_classical(robot, task, control_hz=control_hz, law="lqr")

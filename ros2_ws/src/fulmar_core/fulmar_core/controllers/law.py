@@ -1,0 +1,110 @@
+"""What every classical law is made of: gains from a file, a reader of observations, and a name for itself."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from abc import ABC, abstractmethod
+from dataclasses import asdict
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fulmar_core.controllers.around import Around
+from fulmar_core.controllers.seen import Reader, Vector
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks import Task
+
+
+class Law(ABC):
+    """Each command is a function of the observation; at obstacles also of the side on which they are being passed."""
+
+    law: ClassVar[str]  # the end of its gains' file name
+    title: ClassVar[str]  # for lists
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        gains: Any,
+        *,
+        control_hz: float | None = None,
+        name: str | None = None,
+    ) -> None:
+        """Bind a law to a robot and a task.
+
+        Args:
+            robot: The robot.
+            task: The task.
+            gains: A dataclass of numbers.
+            control_hz: Command rate; the robot's own by default [Hz].
+            name: Under which it was chosen; the law's own by default.
+        """
+        self.name = name or self.law
+        self.control_hz = control_hz or robot.timing.control_hz
+        self.robot, self.task, self.gains = robot, task, gains
+        self.reader = Reader(robot, task)
+        self.observation_names = self.reader.names
+        if self.reader.crosses_obstacles and gains.around is None:
+            raise ValueError("'around' is missing, which says how to keep off obstacles.")
+        robot.timing.substeps(self.control_hz)  # refuses rates that the physics cannot keep
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget on which side obstacles are being passed."""
+        self._side: np.ndarray | None = None
+
+    def act(self, observation: Array) -> Array:
+        """Choose a command; shapes as in `Controller.act`."""
+        return self.robot.actuators.limited(self.command(np.asarray(observation, dtype=float)))
+
+    @property
+    def share_of_speed(self) -> float:
+        """How much of the cruising speed may be used [-]."""
+        around: Around = self.gains.around
+        return around.speed if self.reader.crosses_obstacles else 1.0
+
+    @property
+    def near(self) -> float:
+        """What counts as being there [m]."""
+        passed = 0.7 * getattr(self.task, "reach", 0.0) if self.reader.passes else 0.0
+        return max(float(self.gains.near), passed)
+
+    def around(self, goal: Vector, observation: np.ndarray, course: np.ndarray) -> tuple[Vector, np.ndarray]:
+        """Goal and free distance ahead, with respect to obstacles where the task has some; see `Around.aim`."""
+        if not self.reader.crosses_obstacles:
+            return goal, np.full_like(goal[0], np.inf)
+        around: Around = self.gains.around
+        if self._side is None or self._side.shape != goal[0].shape:
+            self._side = np.zeros_like(goal[0])
+        goal, room, self._side = around.aim(goal, self.reader.obstacles(observation), course, self._side)
+        return goal, room
+
+    @abstractmethod
+    def command(self, observation: np.ndarray) -> np.ndarray:
+        """The law itself, before the actuators' limits; shapes as in `Controller.act`."""
+
+    def metadata(self) -> dict[str, Any]:
+        """Robot, task, rate and gains, with the SHA-256 of everything that the commands depend on."""
+        told = {
+            "controller": self.name,
+            "law": self.law,
+            "robot": self.robot.name,
+            "task": self.task.name,
+            "control_hz": self.control_hz,
+            "gains": asdict(self.gains),
+        }
+        text = json.dumps(told | self.derived(), sort_keys=True)
+        return told | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
+
+    def derived(self) -> dict[str, Any]:
+        """What else the commands depend on, as JSON-ready values."""
+        water = self.robot.hydrodynamics
+        return {
+            "observation_names": self.observation_names,
+            "actuators": asdict(self.robot.actuators),
+            "body": asdict(self.robot.body),
+            "performance": asdict(self.robot.performance),
+            "hydrodynamics": asdict(water) if water else None,
+        }

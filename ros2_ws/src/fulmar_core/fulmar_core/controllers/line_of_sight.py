@@ -1,0 +1,134 @@
+"""Line-of-sight guidance for boats with fixed propellers.
+
+Fossen, "Handbook of Marine Craft Hydrodynamics and Motion Control", 2011: the boat is steered along the line
+of sight to the next waypoint, less its sideslip (ch. 10), by a heading controller on heading and turn rate
+(ch. 12), and driven by a speed controller, both with the water's forces fed forward (feedback linearisation,
+ch. 13). Where it has arrived it stops, and turns on the spot if a heading is wanted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.controllers.around import Around
+from fulmar_core.controllers.guidance import (
+    bearing,
+    end_that_goes_first,
+    passing_speed,
+    stopping_speed,
+    way_to_face,
+    way_to_turn_least,
+)
+from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.propeller_allocation import PropellerAllocation
+from fulmar_core.controllers.seen import Vector
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+
+
+@dataclass(frozen=True)
+class LineOfSightGains:
+    """Gains, as read from `configs/controllers/<robot>_line_of_sight.yaml`."""
+
+    cruise: float  # fastest speed ahead [m/s]
+    astern: float  # same astern; 0: always turn to goals behind [m/s]
+    approach: float  # speed for each metre that is left [1/s]
+    braking: float  # deceleration to plan with [m/s²]
+    surge: float  # acceleration for an error of the speed [1/s]
+    heading: float  # turn rate for an error of the heading [1/s]
+    turn_rate: float  # fastest wanted turn [rad/s]
+    yaw: float  # angular acceleration for an error of the turn rate [1/s]
+    slowing: float  # speed falls with this power of the cosine of the bearing [-]
+    sideslip: float  # share of the sideslip angle that the heading makes up for [-]
+    corner: float  # share of the cruising speed at a waypoint where the course turns by a quarter or more [-]
+    near: float  # what counts as there [m]
+    least_thrust: float  # less is not worth a propeller's way through its dead band [N]
+    around: Around  # how to keep off obstacles
+
+    def __post_init__(self) -> None:
+        """Refuse gains that do not lead to the goal."""
+        positive = (
+            self.cruise, self.approach, self.braking, self.surge, self.heading, self.turn_rate, self.yaw,
+            self.slowing, self.near, self.least_thrust,
+        )  # fmt: skip
+        if min(positive) <= 0.0 or min(self.astern, self.sideslip, self.corner) < 0.0:
+            raise ValueError(
+                "gains must be greater than 0; astern, sideslip and corner must not be negative."
+            )
+
+
+class LineOfSight(Law):
+    """Sails to positions, to poses, through waypoints, and at velocities."""
+
+    law = "line_of_sight"
+    title = "line of sight"
+    gains: LineOfSightGains
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        gains: LineOfSightGains,
+        *,
+        control_hz: float | None = None,
+        name: str | None = None,
+    ) -> None:
+        """Prepare the allocation; arguments as of `Law`."""
+        super().__init__(robot, task, gains, control_hz=control_hz, name=name)
+        assert isinstance(robot.actuators, Propellers)
+        self._allocation = PropellerAllocation(robot.actuators, least=gains.least_thrust)
+
+    def command(self, observation: np.ndarray) -> np.ndarray:
+        """Propeller commands; shapes as in `Controller.act`."""
+        u, v, r = self.reader.motion(observation)
+        if self.reader.tracks:
+            eu, _, er = self.reader.velocity_error(observation)
+            speed, turn = u + eu, r + er
+        else:
+            speed, turn = self._guided(observation, u, v)
+        push, moment = self._effort(u, v, r, speed - u, turn - r)
+        return self._allocation.best(push, moment, self.reader.previous(observation))
+
+    def _guided(self, observation: np.ndarray, u: np.ndarray, v: np.ndarray) -> Vector:
+        """Wanted speed [m/s] and turn rate [rad/s]."""
+        gains, share = self.gains, self.share_of_speed
+        goal, room = self.around(self.reader.goal(observation), observation, end_that_goes_first(u))
+        rho = np.hypot(*goal)
+        if self.reader.heads and gains.astern > 0.0:
+            way = way_to_turn_least(goal, self.reader.turn(observation), u)
+        else:
+            way = way_to_face(goal, u, backwards=gains.astern > 0.0)
+        alpha = bearing(goal, way)
+        cruise = np.where(way < 0.0, gains.astern, gains.cruise) * share
+        last = np.zeros_like(rho)
+        if self.reader.passes and not self.reader.heads:
+            leg = self.reader.next_leg(observation)
+            last = passing_speed(goal, leg, cruise=cruise, corner=gains.corner)
+        fastest = stopping_speed(
+            np.minimum(rho, room), gain=gains.approach * share, deceleration=gains.braking, last=last
+        )
+        speed = way * np.minimum(fastest, cruise) * np.maximum(np.cos(alpha), 0.0) ** gains.slowing
+        slip = np.where(way * u > 0.1, np.arctan2(way * v, np.maximum(way * u, 0.1)), 0.0)
+        turn = gains.heading * (alpha - gains.sideslip * slip)
+        there = (rho < self.near) & (last == 0.0)
+        left = self.reader.turn(observation) if self.reader.heads else np.zeros_like(rho)
+        speed = np.where(there, gains.approach * goal[0], speed)
+        turn = np.where(there, gains.heading * left, turn)
+        return speed, np.clip(turn, -gains.turn_rate, gains.turn_rate)
+
+    def _effort(
+        self, u: np.ndarray, v: np.ndarray, r: np.ndarray, more_speed: np.ndarray, more_turn: np.ndarray
+    ) -> Vector:
+        """Push [N] and moment [N·m] that make up for missing speed and turn rate, and for the water."""
+        body, water = self.robot.body, self.robot.hydrodynamics
+        added_u, added_v, added_r = water.planar_added_mass if water else (0.0, 0.0, 0.0)
+        drag_u, _, drag_r = water.planar_damping(u, v, r) if water else (0.0, 0.0, 0.0)
+        # (m + m_u) u' = X + drag + (m + m_v) v r, and (I + I_r) r' = N + drag + (m_u - m_v) u v.
+        push = (body.mass + added_u) * self.gains.surge * more_speed - drag_u - (body.mass + added_v) * v * r
+        moment = (
+            (body.inertia[2] + added_r) * self.gains.yaw * more_turn - drag_r - (added_u - added_v) * u * v
+        )
+        return push, moment

@@ -1,0 +1,117 @@
+"""Pure pursuit for cars.
+
+Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992: the car drives
+on the circle that leads from its rear axle to a point on its path, of curvature 2 y / L² for a point at (x,
+y), L away; here the path is the straight line to the goal, and the point is a look-ahead distance away or the
+goal itself. The same circle is driven astern to goals behind. The speed is what the goal, the next corner and
+the tyres allow: v² |curvature| <= a sideways.
+
+A goal beside the car, inside its tightest circles, is on none that it can drive. It drives straight on, the
+way that it moves, until it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.controllers.around import Around
+from fulmar_core.controllers.guidance import (
+    bearing,
+    end_that_goes_first,
+    passing_speed,
+    stopping_speed,
+    way_to_face,
+)
+from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.seen import Vector
+
+
+@dataclass(frozen=True)
+class PurePursuitGains:
+    """Gains, as read from `configs/controllers/<robot>_pure_pursuit.yaml`."""
+
+    look_ahead: float  # [m]
+    cruise: float  # fastest speed towards a goal [m/s]
+    approach: float  # speed for each metre that is left [1/s]
+    braking: float  # deceleration to plan with [m/s²]
+    sideways: float  # acceleration that the tyres may be asked for [m/s²]
+    corner: float  # share of the cruising speed at a waypoint where the course turns by a quarter or more [-]
+    near: float  # what counts as there [m]
+    velocity: float  # share of an error of the wanted speed that the command adds [-]
+    around: Around  # how to keep off obstacles
+
+    def __post_init__(self) -> None:
+        """Refuse gains that do not lead to the goal."""
+        positive = (self.look_ahead, self.cruise, self.approach, self.braking, self.sideways, self.near)
+        if min(positive) <= 0.0 or self.corner < 0.0 or not 0.0 <= self.velocity < 1.0:
+            raise ValueError("gains must be greater than 0; 'corner' not negative, 'velocity' in [0, 1).")
+
+
+class PurePursuit(Law):
+    """Drives to positions, through waypoints, and at velocities."""
+
+    law = "pure_pursuit"
+    title = "pure pursuit"
+    gains: PurePursuitGains
+
+    def command(self, observation: np.ndarray) -> np.ndarray:
+        """Speed and steering angle; shapes as in `Controller.act`."""
+        u, _, r = self.reader.motion(observation)
+        if self.reader.tracks:
+            eu, _, er = self.reader.velocity_error(observation)
+            return self._at_velocity(u + eu, r + er, u)
+        goal, room = self.around(self.reader.goal(observation), observation, end_that_goes_first(u))
+        last = np.zeros_like(u)
+        if self.reader.passes:
+            leg = self.reader.next_leg(observation)
+            last = passing_speed(goal, leg, cruise=self.gains.cruise, corner=self.gains.corner)
+        return self._pursuit(goal, u, room, last)
+
+    def _pursuit(self, goal: Vector, u: np.ndarray, room: np.ndarray, last: np.ndarray) -> np.ndarray:
+        gains = self.gains
+        rho = np.hypot(*goal)
+        way = way_to_face(goal, u, backwards=True)
+        alpha = bearing(goal, way)
+        # An angle to the left of the end that goes first is steered to the left going ahead, to the right going astern.
+        direct = 2.0 * np.sin(alpha) / np.maximum(rho, 1e-6)
+        sharp = 2.0 * np.sin(alpha) / np.clip(rho, 1e-6, gains.look_ahead)
+        beside = np.abs(direct) > self._tightest
+        curvature = np.where(beside, 0.0, np.clip(sharp, -self._tightest, self._tightest))
+        fastest = stopping_speed(
+            np.minimum(rho, room), gain=gains.approach, deceleration=gains.braking, last=last
+        )
+        held = np.sqrt(gains.sideways / np.maximum(np.abs(curvature), 1e-3))
+        speed = np.minimum(np.minimum(fastest, held), gains.cruise * self.share_of_speed)
+        way = np.where(beside & (np.abs(u) > 0.01), np.sign(u), way)
+        driven = np.stack((way * speed, way * np.arctan(self._car.wheelbase * curvature)), axis=-1)
+        moving = (rho > self.near) | (last > 0.0)
+        return np.where(moving[..., None], driven, 0.0)
+
+    def _at_velocity(self, speed: np.ndarray, turn: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Steering for a turn rate r at speed u: tan(angle) = wheelbase r / u (Rajamani 2012, §2.2).
+
+        A car turns no faster than its tightest circle allows at its speed. Where that is less than wanted, it drives
+        faster, until both errors are the same share of what the task tolerates.
+        """
+        tolerance, k = self.task.tolerance, self._tightest
+        much, much_turn = tolerance.velocity, np.deg2rad(tolerance.yaw_rate_deg)
+        shared = (much_turn * np.abs(speed) + much * np.abs(turn)) / (much_turn + much * k)
+        sign = np.where(speed < 0.0, -1.0, 1.0)
+        speed = sign * np.where(np.abs(turn) > k * np.abs(speed), shared, np.abs(speed))
+        curvature = np.clip(turn / np.where(np.abs(speed) > 1e-6, speed, 1e-6), -k, k)
+        steering = np.arctan(self._car.wheelbase * curvature)
+        return np.stack((speed + self.gains.velocity * (speed - u), steering), axis=-1)
+
+    @property
+    def _car(self) -> Ackermann:
+        car = self.robot.actuators
+        assert isinstance(car, Ackermann)
+        return car
+
+    @property
+    def _tightest(self) -> float:
+        """Largest curvature that the front wheels steer [1/m]."""
+        return float(np.tan(self._car.max_steering) / self._car.wheelbase)
