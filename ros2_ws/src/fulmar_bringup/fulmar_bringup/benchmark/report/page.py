@@ -14,15 +14,16 @@ from fulmar_bringup.report.style import as_svg
 from fulmar_core.figures import FIGURES, SUCCESS
 
 _MARKS = {GOOD: " ✓", BAD: " ✗", "": ""}
+_REM_PER_INCH = 6.7  # so that a picture of full width fills the page
 _OWN_STYLE = """
 body { max-width: 64rem }
 h2 { font-size: 1.35rem; border-top: 1px solid var(--rule); padding-top: 1.6rem }
 h3 { font-size: 1.05rem; margin: 2rem 0 .4rem }
 td.good { color: #15803d; font-weight: 600 } td.bad { color: #d6336c; font-weight: 600 }
 @media (prefers-color-scheme: dark) { td.good { color: #5fcf8a } td.bad { color: #ff7aa2 } }
-nav a { color: inherit; margin-right: 1.1rem; white-space: nowrap }
+nav { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem } nav a { color: inherit }
 .verdict { --run: var(--faint); margin: 1.2rem 0 }
-figure svg { min-width: 40rem }
+figure svg { min-width: min(40rem, var(--wide)); max-width: var(--wide) }
 """
 
 
@@ -73,8 +74,9 @@ def _subtitle(document: dict[str, Any]) -> str:
 
 
 def _figure(picture: Picture) -> str:
+    wide = f"--wide: {_REM_PER_INCH * picture.figure.get_figwidth():.1f}rem"
     return (
-        f"<h3>{escape(picture.title)}</h3><figure>{as_svg(picture.figure)}</figure>"
+        f'<h3>{escape(picture.title)}</h3><figure style="{wide}">{as_svg(picture.figure)}</figure>'
         f'<p class="faint">{escape(picture.caption)}</p>'
     )
 
