@@ -15,7 +15,7 @@ def goals(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="[NAME]",
+            metavar="NAME",
             help="A name from `fulmar list goals`, or a path that ends in .yaml; without it they are listed.",
         ),
     ] = None,

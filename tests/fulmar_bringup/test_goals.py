@@ -1,0 +1,52 @@
+"""`fulmar goals` before any node is up: what there is, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import pytest
+
+from fulmar_bringup.commands.goals import goals
+from fulmar_bringup.node_table import goals_spec
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.goal_files import load_goals
+from fulmar_core.paths import config_names
+from fulmar_ros.goal_node import GoalSettings
+
+
+def call(name=None, robot=None, as_path=False):
+    return goals(name, robot=robot, as_path=as_path, control_hz=10.0)
+
+
+def test_without_a_name_every_file_is_listed_with_its_title(capsys):
+    call()
+    told = capsys.readouterr().out
+    for name in config_names("goals"):
+        assert name in told and load_goals(name).title in told
+
+
+def test_goals_are_somebody_s():
+    with pytest.raises(ConfigError, match="--robot floating_platform"):
+        call("circle")
+
+
+@pytest.mark.parametrize(("name", "robot"), [("circel", "turtlebot2"), ("circle", "turtelbot2")])
+def test_a_misspelt_name_gets_the_nearest(name, robot):
+    with pytest.raises(UnknownNameError, match="Did you mean"):
+        call(name, robot)
+
+
+def test_a_file_that_is_not_there_is_named():
+    with pytest.raises(ConfigError, match=r"nowhere/mine\.yaml"):
+        call("nowhere/mine.yaml", "turtlebot2")
+
+
+def test_a_path_to_follow_is_no_list_of_waypoints():
+    with pytest.raises(ConfigError, match="only positions and poses"):
+        call("circle", "turtlebot2", as_path=True)
+
+
+def test_the_node_knows_every_parameter_it_is_given():
+    spec = goals_spec("turtlebot2", "circle")
+    assert spec.namespace == "/turtlebot2"
+    assert set(spec.parameters) <= {field.name for field in fields(GoalSettings)}
