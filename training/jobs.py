@@ -15,7 +15,7 @@ from fulmar_core.tasks import load_task
 from training.progress import ProgressFile, Watcher
 from training.run_folder import CHECKPOINT_FILE, PROGRESS_FILE, read_run_record, write_run_record
 from training.settings import TrainingSettings
-from training.train import train
+from training.train import check_seed, train
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,7 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
     Returns:
         The run's record.
     """
+    check_seed(job.seed)  # before anything is written
     job.out.mkdir(parents=True, exist_ok=True)
     train(
         load_robot(job.robot),

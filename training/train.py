@@ -42,6 +42,17 @@ from training.settings import OffPolicy, TrainingSettings, write_training_settin
 from training.vec_env import BatchVecEnv
 
 
+def check_seed(seed: int) -> None:
+    """Refuse seeds that no run may learn from.
+
+    Raises:
+        ConfigError: If the seed is negative, or one of those kept for judging.
+    """
+    if seed < 0 or seed in JUDGING_SEEDS:
+        kept = " and ".join(str(kept) for kept in JUDGING_SEEDS)
+        raise ConfigError(f"seed {seed} must not be negative, nor {kept}, which are kept for judging.")
+
+
 def train(
     robot: Robot,
     task: Task,
@@ -80,9 +91,7 @@ def train(
         ConfigError: If the seed is one of those kept for judging, or there is nothing to resume.
         KeyboardInterrupt: A person ended it; the run folder is finished with the best network so far.
     """
-    if seed < 0 or seed in JUDGING_SEEDS:
-        kept = " and ".join(str(kept) for kept in JUDGING_SEEDS)
-        raise ConfigError(f"seed {seed} must not be negative, nor {kept}, which are kept for judging.")
+    check_seed(seed)
     if time_limit_s is None and updates is None:
         time_limit_s = settings.time_limit_s
     torch.set_num_threads(settings.threads)

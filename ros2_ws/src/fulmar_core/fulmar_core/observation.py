@@ -69,4 +69,4 @@ def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> 
     xp = array_namespace(command)
     most = control_dt * np.asarray(robot.actuators.response.slew)
     limit = xp.asarray(most, dtype=command.dtype, device=device(command))
-    return previous + clip(command - previous, -limit, limit)
+    return robot.actuators.limited(previous + clip(command - previous, -limit, limit))
