@@ -122,6 +122,10 @@ def rows(task: str, entries: list[dict[str, Any]]) -> list[Row]:
         Row("required", tuple(_required(entry) for entry in entries)),
         Row("thesis: success", tuple(_thesis_success(entry) for entry in entries)),
         Row("batch and MuJoCo apart by", tuple(_gap(entry) for entry in entries)),
+        Row(
+            "batch, of MuJoCo's episodes",
+            tuple(Cell(_number(entry["judged_in_batch_on_mujocos_episodes"], 3)) for entry in entries),
+        ),
         Row("trained in, on two cores", tuple(_training(entry) for entry in entries)),
     ]
     for quantity in QUANTITIES.get(task, _COMMON):
