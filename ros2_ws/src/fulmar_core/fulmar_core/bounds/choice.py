@@ -76,7 +76,9 @@ def bound_of(
             start_xy, waypoints, motions=motions, radius=radius, duration_s=duration_s, start_yaw=start_yaw
         )
         fastest = max(rate for _, rate in motions.turns)
-        rule = f"at up to {motions.ahead:.2f} m/s and {fastest:.2f} rad/s, inertia and slew not counted"
+        rule = (
+            f"at up to {motions.ahead:.2f} m/s and {fastest:.2f} rad/s, inertia in turns and slew not counted"
+        )
         return NamedBound(bound, "turn_limited", rule)
     speed = robot.performance.top_speed
     bound = top_speed_bound(start_xy, waypoints, radius=radius, top_speed=speed, duration_s=duration_s)

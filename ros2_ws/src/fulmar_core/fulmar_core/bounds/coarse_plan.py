@@ -1,4 +1,4 @@
-"""Fastest plans on a coarse grid of places on each disc and headings there, by dynamic programming."""
+"""Fastest plans over where and how each disc is touched, on a coarse grid, by dynamic programming."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.bounds.leg_table import HEADINGS, LegTable
+from fulmar_core.bounds.legs import MODES
 from fulmar_core.bounds.turn_course import TurnCourse, TurnPlan
 
 _PLACES = np.deg2rad(np.linspace(-105.0, 105.0, 8))  # on a disc, from the side that the way comes from
@@ -38,9 +39,11 @@ class CoarsePlans:
             states[:, goal] = here
             here = np.where(goal <= number, self.source[goal - 1, episodes, here], here)
         states[:, 0] = here
-        place, heading = np.divmod(states, HEADINGS)
-        angle = self.approach[episodes, :goals] + _PLACES[place[:, 1:]]
-        return TurnPlan(angle, heading * (2.0 * math.pi / HEADINGS))
+        rest, heading = np.divmod(states, HEADINGS)
+        mode, place = np.divmod(rest[:, 1:], len(_PLACES))
+        mode = np.concatenate((rest[:, :1], mode), axis=1)  # there is but one place to start from
+        angle = self.approach[episodes, :goals] + _PLACES[place]
+        return TurnPlan(angle, heading * (2.0 * math.pi / HEADINGS), MODES[mode])
 
 
 def coarse_plans(course: TurnCourse, table: LegTable, latest: float) -> CoarsePlans:
@@ -53,11 +56,12 @@ def coarse_plans(course: TurnCourse, table: LegTable, latest: float) -> CoarsePl
     """
     approach = course.approach
     touches = course.touch(approach[:, :, None] + _PLACES)
-    count, states = len(course.start), len(_PLACES) * HEADINGS
-    cost = np.zeros((count, 1, HEADINGS), dtype=np.float32)
+    count, states = len(course.start), table.modes * len(_PLACES) * HEADINGS
+    cost = np.full((count, table.modes, 1, HEADINGS), np.inf, dtype=np.float32)
+    cost[:, -1] = 0.0  # at rest
     if course.yaw is not None:
         at = np.rint(course.yaw * (HEADINGS / (2.0 * math.pi))).astype(int) % HEADINGS
-        cost[:, 0] = np.where(np.arange(HEADINGS) == at[:, None], 0.0, np.inf)
+        cost[:, -1, 0] = np.where(np.arange(HEADINGS) == at[:, None], 0.0, np.inf)
     before = course.start[:, None]
     times, last, source = [], [], []
     for goal in range(course.centres.shape[1]):
@@ -70,5 +74,5 @@ def coarse_plans(course: TurnCourse, table: LegTable, latest: float) -> CoarsePl
         source.append(origin)
         if np.all(times[-1] > latest):
             break
-        cost, before = new.reshape(count, len(_PLACES), HEADINGS), touches[:, goal]
+        cost, before = new.reshape(count, table.modes, len(_PLACES), HEADINGS), touches[:, goal]
     return CoarsePlans(np.stack(times, axis=1).astype(float), np.stack(last), np.stack(source), approach)

@@ -12,10 +12,10 @@ from fulmar_core.bounds.turn_course import TurnCourse, TurnPlan, relative
 
 _ROUNDS = 14
 _STEPS = np.deg2rad([14.0, 7.0])  # of places on the disc and of headings, in the first round
-_SHRINK = 0.75  # of the steps from round to round
+_SHRINK = 0.8  # of the steps from round to round
 _OFFSETS = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=2)))  # of place and heading [steps]
 _WORDS = 3  # ways of each leg that are looked at
-_ANEW = (0, 2, 5, 9)  # rounds in which they are chosen anew
+_ANEW = (0, 1, 3, 6, 9)  # rounds in which they are chosen anew
 _CHUNK = 16  # episodes at once: what a core's cache likes
 
 
@@ -36,16 +36,15 @@ def refined(
     angle, heading = plan.angle.copy(), plan.heading.copy()
     if course.yaw is not None:
         heading[:, 0] = course.yaw
-    for begin in range(0, len(angle), _CHUNK):
-        some = slice(begin, begin + _CHUNK)
-        part = course.of(some, angle.shape[1])
-        for number, size in enumerate(_SHRINK ** np.arange(_ROUNDS)):
-            here = TurnPlan(angle[some], heading[some])
-            if number in _ANEW:
-                words = all_words(motions)[_ways(part, motions, here, _WORDS)[1]]
-            better = _round(part, words, motions, here, counts[some], size * _STEPS)
+    plan = TurnPlan(angle, heading, plan.mode)
+    for number, size in enumerate(_SHRINK ** np.arange(_ROUNDS)):
+        if number in _ANEW:
+            words = all_words(motions)[_ways(course, motions, plan, _WORDS)[1]]
+        for begin in range(0, len(angle), _CHUNK):
+            some = slice(begin, begin + _CHUNK)
+            part = course.of(some, angle.shape[1])
+            better = _round(part, words[:, some], motions, plan.of(some), counts[some], size * _STEPS)
             angle[some], heading[some] = better.angle, better.heading
-    plan = TurnPlan(angle, heading)
     times, _ = _ways(course, motions, plan, 1)
     return plan, np.concatenate((np.zeros((len(angle), 1)), np.cumsum(times[0], axis=1)), axis=1)
 
@@ -55,8 +54,15 @@ def _ways(course: TurnCourse, motions: Motions, plan: TurnPlan, count: int) -> t
     places = np.concatenate((course.start[:, None], course.touch(plan.angle[..., None])[:, :, 0]), axis=1)
     x, y = relative(places[:, :-1], plan.heading[:, :-1], places[:, 1:])
     turn = np.diff(plan.heading, axis=1)
-    times, rows = best_words(motions, x.ravel(), y.ravel(), turn.ravel(), count=count)
+    before, after = _ends(plan)
+    modes = (before.ravel(), after.ravel()) if motions.surge else None
+    times, rows = best_words(motions, x.ravel(), y.ravel(), turn.ravel(), modes, count=count)
     return times.reshape(count, *x.shape), rows.reshape(count, *x.shape)
+
+
+def _ends(plan: TurnPlan) -> tuple[np.ndarray, np.ndarray]:
+    """How both ends of each leg are passed, shapes (E, goals)."""
+    return plan.mode[:, :-1], plan.mode[:, 1:]
 
 
 def _round(
@@ -78,9 +84,11 @@ def _round(
     x, y = relative(places[:, :-1, :, None], headings[:, :-1, :, None], places[:, 1:, None])
     turn = headings[:, 1:, None] - headings[:, :-1, :, None]
     times = np.full(x.shape, np.inf)
+    before, after = (mode[..., None, None] for mode in _ends(plan))
+    modes = (before, after) if motions.surge else None
     for way in words:
         word = tuple(way[..., None, None, i] for i in range(5))
-        times = np.minimum(times, leg_time(motions, word, x, y, turn))
+        times = np.minimum(times, leg_time(motions, word, x, y, turn, modes))
     goals = angles.shape[1]
     times[np.arange(goals) >= counts[:, None]] = 0.0
     cost, source = np.zeros((len(angles), n)), []
@@ -95,4 +103,5 @@ def _round(
     return TurnPlan(
         np.take_along_axis(angles, pick[:, 1:, None], axis=2)[..., 0],
         np.take_along_axis(headings, pick[..., None], axis=2)[..., 0],
+        plan.mode,
     )

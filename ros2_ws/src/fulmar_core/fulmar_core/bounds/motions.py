@@ -9,6 +9,7 @@ import numpy as np
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.bounds.surge import Surge
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.robot import Robot
 
@@ -24,6 +25,7 @@ class Motions:
     ahead: float  # top speed straight ahead [m/s]
     astern: float  # top speed straight astern, 0: it cannot [m/s]
     turns: tuple[tuple[float, float], ...]  # speed ahead [m/s] and turn rate > 0 [rad/s] of each corner
+    surge: Surge | None = None  # what stopping costs; None: nothing
 
     def __post_init__(self) -> None:
         """Refuse robots that cannot move or turn."""
@@ -88,7 +90,11 @@ def _in_water(robot: Robot, propellers: Propellers) -> Motions | None:
         turns.append((0.0, on_the_spot))
     if not turns:
         return None
-    return Motions(speed(most * len(arms)), max(-speed(least * len(arms)), 0.0), tuple(turns))
+    ahead, astern = most * len(arms), -least * len(arms)
+    surge = None
+    if du == 0.0 and astern > 0.0:
+        surge = Surge(robot.body.mass + water.planar_added_mass[0], qu, ahead, astern)
+    return Motions(speed(ahead), max(-speed(-astern), 0.0), tuple(turns), surge)
 
 
 def _balance(linear: float, quadratic: float, push: float) -> float:

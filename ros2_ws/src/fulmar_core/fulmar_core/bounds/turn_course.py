@@ -47,10 +47,11 @@ class TurnPlan:
 
     angle: np.ndarray  # (E, goals) of the touch on the disc's edge [rad]
     heading: np.ndarray  # (E, goals + 1) at the start and at each touch [rad]
+    mode: np.ndarray  # (E, goals + 1) whether they are passed ahead (1), astern (-1) or at rest (0)
 
     def of(self, episodes: np.ndarray | slice) -> TurnPlan:
         """Some of the episodes."""
-        return TurnPlan(self.angle[episodes], self.heading[episodes])
+        return TurnPlan(self.angle[episodes], self.heading[episodes], self.mode[episodes])
 
 
 def relative(before: np.ndarray, heading: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
