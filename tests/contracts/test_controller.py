@@ -1,4 +1,4 @@
-"""What every controller promises, learned or classical."""
+"""What every controller promises, learned or classical, for every robot and task that there is one for."""
 
 from __future__ import annotations
 
@@ -8,105 +8,147 @@ import numpy as np
 import pytest
 
 from fulmar_bringup.system import CONTROLLERS
-from fulmar_core.controllers.lqr import load_lqr
+from fulmar_core.controllers.classical import LAWS
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import ConfigError
+from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
+from fulmar_core.policy_bundle import read_passport
 from fulmar_core.robot import load_robot
-from fulmar_core.state import planar_pose, planar_state
+from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
-from policy_server.policy import Policy
-from policy_server.shipped import shipped_policy
+from policy_server.shipped import shipped_policies
 
-ROBOT = load_robot("floating_platform")
+ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+TASKS = {name: load_task(name) for name in config_names("tasks")}
+LEARNED = {
+    (passport.robot, passport.task): str(folder)
+    for folder, passport in ((folder, read_passport(folder)) for folder in shipped_policies())
+}
+WORLDS = 40
 
 
-def build_policy(robot, task):
-    folder = shipped_policy(robot.name, task.name)
-    return None if folder is None else Policy(folder, robot, task)
+def has_one(name, robot, task):
+    """Whether a controller says that it does a task on a robot."""
+    if name == "policy":
+        return (robot.name, task.name) in LEARNED
+    try:
+        CONTROLLERS[name].check(robot, task)
+    except ConfigError:
+        return False
+    return True
 
 
-BUILDERS = {"lqr": load_lqr, "policy": build_policy}
 CASES = [
-    (name, task)
-    for name in sorted(BUILDERS)
-    for task in config_names("tasks")
-    if name != "policy" or shipped_policy(ROBOT.name, task)
+    (name, robot, task)
+    for name in CONTROLLERS
+    for robot in ROBOTS.values()
+    for task in TASKS.values()
+    if has_one(name, robot, task)
 ]
 
 
-@pytest.fixture(params=CASES, ids=lambda case: " ".join(case))
+@pytest.fixture(params=CASES, ids=lambda case: f"{case[0]}-{case[1].name}-{case[2].name}", scope="module")
 def case(request):
-    name, task = request.param
-    the_task = load_task(task)
-    return name, the_task, BUILDERS[name](ROBOT, the_task)
+    name, robot, task = request.param
+    policy = LEARNED.get((robot.name, task.name), "")
+    controller = CONTROLLERS[name].load(robot, task, robot.timing.control_hz, policy)
+    return name, robot, task, controller
 
 
-def situations(task, count=200):
-    rng = np.random.default_rng(12)
-    state = planar_state(
-        *rng.uniform(-3, 3, (3, count)), vx=rng.normal(size=count), yaw_rate=rng.normal(size=count)
-    )
-    return task.observe(state, planar_pose(*rng.uniform(-3, 3, (3, count))))
+@pytest.fixture
+def seen(case):
+    """Observations of robots that have moved about for a while."""
+    _, robot, task, _ = case
+    simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=WORLDS, seed=12)
+    rng, size = np.random.default_rng(1), (WORLDS, len(robot.actuators.names))
+    for _ in range(10):
+        simulation.step(robot.actuators.scale * rng.uniform(-1.0, 1.0, size))
+    return simulation.observe()
 
 
-def test_every_controller_is_under_this_contract():
-    assert set(BUILDERS) == set(CONTROLLERS)
-    assert ("policy", "go_to_pose") in CASES
+def answers(controller, rows):
+    """What a controller that remembers nothing says to each of some observations."""
+    told = []
+    for row in rows:
+        controller.reset()
+        told.append(controller.act(row))
+    return told
 
 
-def test_it_takes_what_its_task_sees(case):
-    name, task, controller = case
+def test_every_controller_and_every_robot_is_under_this_contract():
+    assert {name for name, _, _ in CASES} == set(CONTROLLERS)
+    assert {robot.name for name, robot, _ in CASES if name == "classical"} == set(ROBOTS)
+    assert ("floating_platform", "go_to_pose") in LEARNED
+
+
+def test_it_takes_what_the_robot_sees_at_its_task(case):
+    name, robot, task, controller = case
     assert controller.name == name
-    assert controller.observation_names == task.observation_names
-    assert controller.control_hz == ROBOT.timing.control_hz
+    assert controller.observation_names == Observer(robot, task).names
+    assert controller.control_hz == robot.timing.control_hz
 
 
-def test_one_observation_gives_one_command_and_a_batch_gives_a_batch(case):
-    _, task, controller = case
-    seen = situations(task)
+def test_one_observation_gives_one_command_and_a_batch_gives_a_batch(case, seen):
+    _, robot, _, controller = case
+    controller.reset()
     many = controller.act(seen)
-    assert many.shape == (200, len(ROBOT.actuators.names))
-    assert controller.act(seen[0]).shape == (len(ROBOT.actuators.names),)
-    assert controller.act(seen[:1]).shape == (1, len(ROBOT.actuators.names))
-    np.testing.assert_array_equal([controller.act(row) for row in seen], many)
+    count = len(robot.actuators.names)
+    assert np.shape(many) == (WORLDS, count)
+    assert np.shape(controller.act(seen[0])) == (count,)
+    assert np.shape(controller.act(seen[:1])) == (1, count)
+    np.testing.assert_allclose(answers(controller, seen), many, rtol=1e-5, atol=1e-5)
 
 
-def test_commands_are_already_what_the_hardware_can_do(case):
-    _, task, controller = case
-    commands = controller.act(situations(task))
-    np.testing.assert_array_equal(ROBOT.actuators.limited(commands), commands)
-    assert 0.0 < commands.mean() < 1.0
+def test_commands_are_finite_and_already_what_the_hardware_can_do(case, seen):
+    _, robot, _, controller = case
+    controller.reset()
+    commands = np.asarray(controller.act(seen))
+    assert np.isfinite(commands).all()
+    np.testing.assert_allclose(robot.actuators.limited(commands), commands, rtol=1e-12, atol=1e-12)
+    assert np.abs(commands).max() > 0.0
 
 
-def test_it_has_no_memory_that_a_reset_would_not_clear(case):
-    _, task, controller = case
-    seen = situations(task)
+def test_it_answers_a_robot_at_rest_where_it_shall_be(case):
+    controller = case[3]
+    controller.reset()
+    assert np.isfinite(controller.act(np.zeros(len(controller.observation_names)))).all()
+
+
+def test_it_remembers_nothing_that_a_reset_would_not_clear(case, seen):
+    controller = case[3]
+    controller.reset()
     first = controller.act(seen)
     controller.act(seen[::-1])
     controller.reset()
     np.testing.assert_array_equal(controller.act(seen), first)
 
 
-def test_it_leaves_its_input_alone(case):
-    _, task, controller = case
-    seen = situations(task)
+def test_it_leaves_its_input_alone(case, seen):
     kept = seen.copy()
-    controller.act(seen)
+    case[3].act(seen)
     np.testing.assert_array_equal(seen, kept)
 
 
 def test_its_metadata_is_json_and_names_who_and_what_with_a_hash(case):
-    name, task, controller = case
+    name, robot, task, controller = case
     metadata = json.loads(json.dumps(controller.metadata(), allow_nan=False))
-    assert (metadata["controller"], metadata["robot"], metadata["task"]) == (name, ROBOT.name, task.name)
+    assert (metadata["controller"], metadata["robot"], metadata["task"]) == (name, robot.name, task.name)
     assert metadata["control_hz"] == controller.control_hz
     assert len(metadata["sha256"]) == 64
 
 
-def test_it_heads_for_the_goal_from_every_side(case):
-    _, task, controller = case
-    bearings = np.linspace(-np.pi, np.pi, 24, endpoint=False)
-    goal = planar_pose(np.zeros(24), np.zeros(24), np.zeros(24))
-    state = planar_state(2 * np.cos(bearings), 2 * np.sin(bearings), np.zeros(24))
-    force, _ = ROBOT.actuators.wrench_in_body(controller.act(task.observe(state, goal)))
-    towards = -(force[:, 0] * np.cos(bearings) + force[:, 1] * np.sin(bearings))
-    assert np.mean(towards > 0.0) > 0.8  # a policy may turn first where that is better
+@pytest.mark.parametrize("name", ["lqr", "classical"])
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+@pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
+def test_a_pair_without_a_law_is_refused_with_what_to_use_instead(name, robot, task):
+    if has_one(name, robot, task):
+        return
+    with pytest.raises(ConfigError, match="Use --controller") as told:
+        CONTROLLERS[name].load(robot, task, robot.timing.control_hz, "")
+    assert f"'{robot.name}'" in str(told.value)
+    assert "is for robots with thrusters" in str(told.value) or "there is one for: go_to_" in str(told.value)
+
+
+def test_the_table_of_laws_knows_every_family():
+    assert set(LAWS) == {robot.actuators.kind for robot in ROBOTS.values()}

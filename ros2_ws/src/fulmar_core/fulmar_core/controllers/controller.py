@@ -21,6 +21,8 @@ class Controller(Protocol):
     def act(self, observation: Array) -> Array:
         """Choose a command.
 
+        A controller that remembers anything does so for each row by itself, until `reset` or another number of rows.
+
         Args:
             observation: Terms in the order of `observation_names`, shape (n,) or (worlds, n).
 

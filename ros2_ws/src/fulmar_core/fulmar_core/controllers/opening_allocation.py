@@ -17,7 +17,8 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.valve_allocation import MAX_VALVES
 from fulmar_core.rotation import Array
 
-ROUNDING = 1e-9  # a part this far below 0 is 0
+MOST = 4  # corners in a mixture: one more than a wrench has numbers
+ROUNDING = 1e-9  # a part this far below 0 is 0, and costs this near to each other are equal
 
 
 class OpeningAllocation:
@@ -41,17 +42,29 @@ class OpeningAllocation:
         force, torque = thrusters.wrench_in_body(np.eye(count))
         corners = np.concatenate((force[:, 0:2], torque[:, 2:3]), axis=1)
         corners, price = np.vstack((np.zeros(3), corners)), np.append(0.0, np.full(count, valve_cost))
-        self._corners, self._price, self._weight = corners, price, weight
         sets = [
-            chosen
-            for size in range(1, 5)
+            list(chosen)
+            for size in range(1, MOST + 1)
             for chosen in itertools.combinations(range(count + 1), size)
             if np.linalg.matrix_rank(corners[list(chosen)] - corners[chosen[0]], tol=1e-9) == size - 1
         ]
-        maps = [_best_parts(corners[list(chosen)], price[list(chosen)], weight) for chosen in sets]
-        self._slopes, self._levels = np.zeros((len(sets), count + 1, 3)), np.zeros((len(sets), count + 1))
-        for i, (chosen, (slope, level)) in enumerate(zip(sets, maps, strict=True)):
-            self._slopes[i, list(chosen)], self._levels[i, list(chosen)] = slope, level
+        # Everything about a set is linear in the wanted wrench: its parts, its error and its price.
+        slopes, levels = np.zeros((len(sets), MOST, 3)), np.zeros((len(sets), MOST))
+        errors, offsets = np.zeros((len(sets), 3, 3)), np.zeros((len(sets), 3))
+        prices, fees = np.zeros((len(sets), 3)), np.zeros(len(sets))
+        root = np.linalg.cholesky(weight).T  # |root e|² is the cost of an error e
+        self._members = np.zeros((len(sets), MOST), dtype=int)
+        for i, chosen in enumerate(sets):
+            slope, level = _best_parts(corners[chosen], price[chosen], weight)
+            self._members[i, : len(chosen)] = chosen
+            slopes[i, : len(chosen)], levels[i, : len(chosen)] = slope, level
+            errors[i] = root @ (corners[chosen].T @ slope - np.eye(3))
+            offsets[i] = root @ corners[chosen].T @ level
+            prices[i], fees[i] = price[chosen] @ slope, price[chosen] @ level
+        self._parts = slopes.reshape(-1, 3).T, levels
+        self._errors = errors.reshape(-1, 3).T, offsets
+        self._prices = prices.T, fees
+        self._valves = count
 
     def best(self, wanted: Array) -> Array:
         """Openings with the least weighted error and price.
@@ -63,12 +76,18 @@ class OpeningAllocation:
             Openings from 0 to 1 that add up to at most 1, shape (..., n).
         """
         wanted = np.asarray(wanted, dtype=float)
-        parts = np.einsum("sci,...i->...sc", self._slopes, wanted) + self._levels
-        miss = parts @ self._corners - wanted[..., None, :]
-        cost = np.sum((miss @ self._weight) * miss, axis=-1) + parts @ self._price
+        leading, count = wanted.shape[:-1], len(self._members)
+        parts = (wanted @ self._parts[0]).reshape(*leading, count, MOST) + self._parts[1]
+        error = (wanted @ self._errors[0]).reshape(*leading, count, 3) + self._errors[1]
+        cost = np.sum(error * error, axis=-1) + wanted @ self._prices[0] + self._prices[1]
         cost = np.where(np.min(parts, axis=-1) >= -ROUNDING, cost, np.inf)
-        best = np.argmin(cost, axis=-1)[..., None, None]
-        return np.clip(np.take_along_axis(parts, best, axis=-2)[..., 0, 1:], 0.0, 1.0)
+        least = np.min(cost, axis=-1, keepdims=True)
+        best = np.argmax(cost <= least + ROUNDING * (1.0 + least), axis=-1)  # of equals always the same
+        chosen = np.take_along_axis(parts, best[..., None, None], axis=-2)[..., 0, :]
+        openings = np.zeros((*leading, self._valves + 1))
+        # What fills up a small set is the corner of doing nothing, which is no valve.
+        np.put_along_axis(openings, self._members[best], np.clip(chosen, 0.0, 1.0), axis=-1)
+        return openings[..., 1:]
 
 
 def _best_parts(corners: np.ndarray, price: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
