@@ -132,7 +132,7 @@ def test_every_kind_of_goal_and_robot_runs_and_is_judged(
     record = read_run(tmp_path / "bag")
     assert not record.warnings
     assert len(record.commanded) >= 26 * 5
-    assert len(record.goals) == (3 if task == "track_velocities" else 1)
+    assert len(record.goals) == (5 if task == "track_velocities" else 1)
     assert bool(len(record.obstacles)) == task.endswith("obstacles")
 
 

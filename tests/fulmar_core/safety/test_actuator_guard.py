@@ -118,3 +118,28 @@ def test_a_stray_stamp_from_the_future_locks_nobody_out_beyond_one_trip(guard):
     assert not guard.offer(NAMES, GOOD, 100 * MS, stamp_ns=5000 * MS)
     assert not guard.output(10_000 * MS).any()
     assert guard.offer(NAMES, GOOD, 10_001 * MS, stamp_ns=5000 * MS)
+
+
+WHEELS = load_robot("turtlebot2").actuators  # may change by 0.9 m/s and 1.8 rad/s a second
+
+
+def test_wheels_slow_down_as_fast_as_they_may_when_commands_stop():
+    guard = ActuatorGuard(WHEELS, Watchdog(200 * MS))
+    assert guard.offer(WHEELS.names, [0.36, -0.9], 0)
+    assert guard.output(200 * MS) == pytest.approx([0.36, -0.9])
+    assert guard.output(300 * MS) == pytest.approx([0.27, -0.72])
+    assert guard.output(650 * MS) == pytest.approx([0.0, -0.09])
+    assert guard.output(800 * MS).tolist() == [0.0, 0.0]
+
+
+def test_wheels_that_were_told_to_stop_stay_still_when_commands_stop():
+    guard = ActuatorGuard(WHEELS, Watchdog(200 * MS))
+    guard.offer(WHEELS.names, [0.0, 0.0], 0)
+    assert not guard.output(210 * MS).any()
+
+
+def test_propellers_stop_at_once_when_commands_stop():
+    propellers = load_robot("kingfisher").actuators
+    guard = ActuatorGuard(propellers, Watchdog(200 * MS))
+    guard.offer(propellers.names, [1.0, -0.5], 0)
+    assert not guard.output(201 * MS).any()

@@ -121,8 +121,6 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
 
     try:
         overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=starting)
-        if load_task(plan.task).goal_topic == "goal_velocity":
-            overseer.change_targets(request.mission, ahead_s=0.5 / plan.control_hz)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)

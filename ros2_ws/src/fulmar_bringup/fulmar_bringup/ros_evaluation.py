@@ -212,14 +212,9 @@ def _episodes(
         def on_step(
             sample: Sample, command: np.ndarray, log: TrajectoryLog = log, judge: Judge = judge
         ) -> None:
-            nonlocal began
             assert sample.truth is not None
-            truth, before = planar_of(sample.truth), judge.goal.done
-            goal = judge.see(truth, sample.block)
-            log.add(truth, goal, command)
-            if task.goal_topic == "goal_velocity" and goal.done != before:
-                began = time.monotonic()
-                overseer.give_goal(goal, time_ns=plant.clock.now_ns, alive=alive)
+            truth = planar_of(sample.truth)
+            log.add(truth, judge.see(truth, sample.block), command)
 
         try:
             plant.run_episode(episode, number=number, seed=plan.seed, steps=steps, on_step=on_step)

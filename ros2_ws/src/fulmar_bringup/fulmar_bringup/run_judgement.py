@@ -16,6 +16,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targets, episode_metrics, successes
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.schedule import Schedule
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.trajectories import COLUMNS
 
@@ -86,7 +87,8 @@ def judge(record: RunRecord) -> Judgement | None:
     time_s, samples = _even(motion)
     states = planar_of(motion.states)
     block = _block(record.block, motion.stamp_s[samples], states[samples])
-    goal = _goals_at(task, goals, record.obstacles, states, samples, motion.log_s[samples], block, time_s[0])
+    newest = _newest(task, goals, motion)[samples]
+    goal = _goals_at(task, goals, newest, record.obstacles, states[samples], states[0], block, time_s[0])
     # Steps one after another have the shape of episodes side by side.
     log = TrajectoryLog(robot, task, float(time_s[0]))
     log.add(states[samples], goal, _applied(record.applied, robot, motion.stamp_s[0] + time_s - time_s[0]))
@@ -130,33 +132,49 @@ def _goals(record: RunRecord) -> list[GivenGoal]:
     return [GivenGoal(-np.inf, -np.inf, np.array([[x, y, np.deg2rad(heading_deg)]]))]
 
 
+def _newest(task: Task, given: list[GivenGoal], motion: Motion) -> np.ndarray:
+    """Which of the goals counts at each state, shape (n,): places when they came, velocities when they begin."""
+    arrived = np.searchsorted(motion.log_s, [goal.log_s for goal in given])
+    schedule: Schedule[int] = Schedule()
+    newest, number = np.zeros(len(motion), dtype=int), 0
+    for sample, now_ns in enumerate(np.round(1e9 * motion.stamp_s).astype(int).tolist()):
+        while number < len(given) and arrived[number] <= sample:
+            told_ns = (
+                round(1e9 * max(0.0, given[number].stamp_s)) if task.goal_topic == "goal_velocity" else 0
+            )
+            schedule.give(number, told_ns)
+            number += 1
+        newest[sample] = schedule.at(now_ns) or 0
+    return newest
+
+
 def _goals_at(
     task: Task,
     given: list[GivenGoal],
+    newest: np.ndarray,
     obstacles: np.ndarray,
     states: PlanarState,
-    samples: np.ndarray,
-    log_s: np.ndarray,
+    first: PlanarState,
     block: np.ndarray,
     dt: float,
 ) -> Goal:
     """The goal that a judge counts at each step: its current target alone, shape (n,)."""
-    newest = np.searchsorted([goal.log_s for goal in given], log_s, side="right") - 1
-    aims, done = np.empty((len(samples), 3)), np.zeros(len(samples))
+    count = len(newest)
+    aims, done = np.empty((count, 3)), np.zeros(count)
     number, before, judge = -1, 0.0, None
-    last = states[0]
-    for step, (which, sample) in enumerate(zip(newest.clip(0), samples, strict=True)):
+    last = first
+    for step, which in enumerate(newest):
         if judge is None or which != number:
             if judge is not None:  # what was reached so far counts on; of velocities, one more is over
                 before += float(judge.goal.done) + (task.goal_topic == "goal_velocity")
             place = np.array([last.x, last.y])
             judge = Judge(task, Goal(given[which].targets, np.asarray(0.0), obstacles, place), dt)
             number = which
-        last = states[sample]
+        last = states[step]
         goal = judge.see(last, block[step])
         aims[step], done[step] = goal.current, before + goal.done
     discs = np.broadcast_to(
-        obstacles if len(obstacles) else np.zeros((1, 3)), (len(samples), max(1, len(obstacles)), 3)
+        obstacles if len(obstacles) else np.zeros((1, 3)), (count, max(1, len(obstacles)), 3)
     )
     return Goal(aims[:, None, :], done, discs, block)
 

@@ -12,24 +12,21 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rosgraph_msgs.msg import Clock
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bringup.processes import child_environment
 from fulmar_core.errors import RunFailed
-from fulmar_core.goal import Goal
-from fulmar_core.planar import at_rest
+from fulmar_core.goal import Goal, goal_at
 from fulmar_core.tasks import Task
-from fulmar_core.topics import CLOCK, DIAGNOSTICS, GOAL_WIRES, OBSTACLES, SIMULATION_START_NS, STATUS
+from fulmar_core.tasks.track_velocities import TrackVelocities
+from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_ros.controller_wires import sees_obstacles
-from fulmar_ros.convert import stamp_ns
 from fulmar_ros.goal_messages import TYPES, goal_message, obstacles_message
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
@@ -92,41 +89,33 @@ class Supervisor:
     def give_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
         """Publish a goal, with the obstacles if the task has any, and wait until the controller has them.
 
+        Velocities that follow one another are all sent now, stamped with the time when each begins: what a controller
+        tracks then hangs on the plant's clock alone.
+
         Args:
             goal: The goal, without a batch axis.
-            time_ns: Its stamp, by which the controller names it [ns].
+            time_ns: Its stamp, by which the controller names it; for velocities also when the first begins [ns].
             alive: Called while waiting; raises to give up.
         """
-        echoes = {"goal_stamp_ns": str(time_ns)}
-        if self._obstacles is not None:
-            self._obstacles.publish(obstacles_message(goal.obstacles, time_ns))
-            echoes["obstacles_stamp_ns"] = str(time_ns)
-        self._publish_goal(goal, time_ns)
-        self.wait_until(lambda: echoes.items() <= self.controller.values.items(), alive)
+        self.give_obstacles(goal, time_ns=time_ns, alive=alive)
+        for part, stamp in self._timed(goal, time_ns):
+            echo = str(stamp)
+            self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
+            self.wait_until(lambda echo=echo: self.controller.values.get("goal_stamp_ns") == echo, alive)
 
-    def change_targets(self, goal: Goal, *, ahead_s: float) -> None:
-        """Publish each further target of a goal by the plant's clock, when the time of the one before is over.
+    def give_obstacles(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
+        """The obstacles alone, if the task has any; arguments as of `give_goal`."""
+        if self._obstacles is None:
+            return
+        self._obstacles.publish(obstacles_message(goal.obstacles, time_ns))
+        self.wait_until(lambda: self.controller.values.get("obstacles_stamp_ns") == str(time_ns), alive)
 
-        Args:
-            goal: The goal, whose first target has been given.
-            ahead_s: How much before its time a target is sent, so that it is there in time [s].
-        """
-        body = at_rest(*np.zeros((3,)))
-        done = int(goal.done)
-
-        def tick(clock: Clock) -> None:
-            nonlocal done
-            now_ns = stamp_ns(clock.clock)
-            time_s = np.asarray((now_ns - SIMULATION_START_NS) / 1e9 + ahead_s)
-            newest = self._task.advance(goal, body, time_s)
-            if int(newest.done) != done:
-                done = int(newest.done)
-                self._publish_goal(newest, now_ns)
-
-        self._node.create_subscription(Clock, CLOCK.name, tick, subscriber_qos(CLOCK))
-
-    def _publish_goal(self, goal: Goal, time_ns: int) -> None:
-        self._goal.publish(goal_message(goal, self._task.goal_topic, time_ns))
+    def _timed(self, goal: Goal, time_ns: int) -> list[tuple[Goal, int]]:
+        """Goals to publish, with their stamps [ns]."""
+        if not isinstance(self._task, TrackVelocities):
+            return [(goal, time_ns)]
+        hold_ns = round(1e9 * self._task.hold_s)
+        return [(goal_at(tuple(target)), time_ns + i * hold_ns) for i, target in enumerate(goal.targets)]
 
     def start_plant(self, alive: Callable[[], None], last_words: Callable[[], str] = lambda: "") -> None:
         """Configure and activate the plant.

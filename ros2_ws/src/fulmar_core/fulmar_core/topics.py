@@ -24,7 +24,7 @@ class Wire:
     """One topic.
 
     `delivery` is how publishers offer it: "stream" is reliable with the last 10 kept, "latched" is reliable and
-    transient-local with the last 1, "best_effort" keeps the last 10.
+    transient-local with the last `latest`, "best_effort" keeps the last 10.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Wire:
     rate: str  # for people
     content: str  # for people
     recorded: bool = True
+    latest: int = 1  # messages that late subscribers of a latched wire still get
 
 
 ODOMETRY = Wire(
@@ -154,7 +155,8 @@ GOAL_VELOCITY = Wire(
     "operator",
     "latched",
     "on demand",
-    "velocity and turn rate to track, in `base_link`; it holds until the next one comes",
+    "velocity and turn rate to track, in `base_link`; holds until the next one; a stamp ahead says when it begins",
+    latest=100,
 )
 OBSTACLES = Wire(
     "obstacles",

@@ -72,10 +72,15 @@ class ControllerNode(LifecycleNode):
         self._input_gate = InputGate(self.robot.limits, frozen_after=FROZEN_AFTER if noisy else 0)
         self._rejections = Rejections()
         self._newest: Measurement | None = None
-        self.mission = Mission(self.robot, self.task)
-        self._late: Odometry | None = None  # waits in lock step for the block of the same stamp
+        self.mission = Mission(self.robot, self.task, streamed=self.settings.goals_streamed)
+        self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
+        # After so long without a command the actuators are in their safe state, and memories are of no use.
+        pause_s = (
+            1.75 / hz if self.settings.lockstep else default_timeout(1.0 / hz) * max(self.settings.rate, 1.0)
+        )
+        self._pause_ns = round(1e9 * pause_s)
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
         self._inference_ms = Spread()
@@ -195,12 +200,13 @@ class ControllerNode(LifecycleNode):
             self.get_logger().warning(f"goal refused: {problem}")
             return
         with self._lock:
-            self.mission.give(goal, stamp_ns(message.header.stamp))
+            if self.mission.give(goal, stamp_ns(message.header.stamp)):
+                self.controller.reset()
             self._follow_mission()
-            self.controller.reset()
             if self.settings.lockstep:
                 self._input_gate.forget()
         self._tell_status(self._decide())
+        self._go_on()
 
     def _on_obstacles(self, message: MarkerArray) -> None:
         discs, problem = obstacles_of(message)
@@ -221,6 +227,10 @@ class ControllerNode(LifecycleNode):
         with self._lock:
             self.mission.see_block(np.array([place.x, place.y]), stamp_ns(message.header.stamp))
             self._follow_mission()
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Take the odometry that has waited."""
         late, self._late = self._late, None
         if late is not None:
             self._on_odometry(late)
@@ -234,7 +244,7 @@ class ControllerNode(LifecycleNode):
         if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
             return  # the plant asks again
         measurement = measurement_of(message)
-        if self.settings.lockstep and self.mission.lacks_block_of(measurement.stamp_ns):
+        if self.settings.lockstep and self.mission.lacks_something_of(measurement.stamp_ns):
             self._late = message
             return
         if self.settings.lockstep and measurement.stamp_ns == self._answered_ns:
@@ -249,6 +259,8 @@ class ControllerNode(LifecycleNode):
                     self._follow(measurement, now)
                 self._newest = measurement
                 changes["last_input_ns"] = now
+                self.mission.turn_to(measurement.stamp_ns)
+                changes["has_goal"] = self.mission.complete
                 changes["goal_distance"] = self.mission.distance(measurement.state)
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
         if self.settings.lockstep:
@@ -286,9 +298,9 @@ class ControllerNode(LifecycleNode):
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""
-        if measurement.stamp_ns - self._answered_ns > 1.75 * self._control_ns:
-            # Nothing was commanded in between: by now the actuators are in their safe state.
+        if measurement.stamp_ns - self._answered_ns > self._pause_ns:
             self._answer = self.robot.actuators.safe_command
+            self.controller.reset()
         return self.mission.observe(measurement.state, measurement.stamp_ns, self._answer)
 
     def _act(self, observation: np.ndarray, stamp: int) -> np.ndarray:
@@ -328,7 +340,7 @@ class ControllerNode(LifecycleNode):
         changed = (
             decision.mode,
             decision.reason.split(" (")[0][:24],
-            self.mission.goal_stamp_ns,
+            not self.settings.goals_streamed and self.mission.goal_stamp_ns,
             self.mission.obstacles_stamp_ns,
             self._rejections.total,
         )

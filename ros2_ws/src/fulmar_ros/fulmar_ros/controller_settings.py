@@ -20,6 +20,9 @@ class ControllerSettings:
     rate: float = 1.0  # simulated seconds a wall-clock second, where not in lock step
     input_timeout_s: float = 0.0  # 0: two control periods, at least 0.2 s and at most 0.5 s [s]
     wait_for_subscribers: int = 0  # of actuators/command, before the first answer in lock step
+    goals_streamed: bool = (
+        False  # a goal node sends the goal with each odometry; in lock step it is waited for
+    )
     autostart: bool = True
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.observation import Observer
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
+from fulmar_core.schedule import Schedule
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.push_block import PushBlock
@@ -19,10 +20,18 @@ from fulmar_ros.controller_wires import sees_obstacles
 class Mission:
     """Not thread-safe; the caller holds a lock. Computes with a batch of one, as evaluations do with many."""
 
-    def __init__(self, robot: Robot, task: Task) -> None:
-        """Begin without a goal."""
-        self._task, self._observer = task, Observer(robot, task)
+    def __init__(self, robot: Robot, task: Task, *, streamed: bool = False) -> None:
+        """Begin without a goal.
+
+        Args:
+            robot: The robot.
+            task: What it shall do.
+            streamed: Goals come with each odometry, stamped as it is, mostly the same again.
+        """
+        self._task, self._observer, self._streamed = task, Observer(robot, task), streamed
         self._goal: Goal | None = None
+        # Velocities may be told ahead of their time; a place counts from when it comes, whoever's clock stamped it.
+        self._schedule: Schedule[Goal] | None = Schedule() if task.goal_topic == "goal_velocity" else None
         self._since_ns: int | None = None
         self._obstacles: np.ndarray | None = None if sees_obstacles(task) else np.zeros((0, 3))
         self._block: np.ndarray | None = None if isinstance(task, PushBlock) else np.zeros(2)
@@ -40,9 +49,26 @@ class Mission:
         """Targets reached since the goal was given."""
         return 0 if self._goal is None else int(self._goal.done)
 
-    def give(self, goal: Goal, stamp_ns: int) -> None:
-        """Take a new goal; its time begins with the next observation."""
-        self._goal, self.goal_stamp_ns, self._since_ns = goal, stamp_ns, None
+    def give(self, goal: Goal, stamp_ns: int) -> bool:
+        """Take a new goal; its time begins with the next observation, or, of a velocity, when its stamp says.
+
+        Returns:
+            Whether something new begins: not so for a goal that is streamed again, and for velocities, which go on
+            from one to the next.
+        """
+        self.goal_stamp_ns = stamp_ns
+        if self._schedule is not None:
+            self._schedule.give(goal, stamp_ns)
+            return False
+        if self._streamed and self._goal is not None and np.array_equal(self._goal.targets, goal.targets):
+            return False
+        self._goal, self._since_ns = goal, None
+        return True
+
+    def turn_to(self, stamp_ns: int) -> None:
+        """Let the goal count that belongs to a time of the plant's clock [ns]."""
+        if self._schedule is not None:
+            self._goal = self._schedule.at(stamp_ns)
 
     def see_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
         """Take obstacles, shape (m, 3), instead of those known so far."""
@@ -52,9 +78,10 @@ class Mission:
         """Take the place of the block, shape (2,) [m]."""
         self._block, self._block_stamp_ns = place, stamp_ns
 
-    def lacks_block_of(self, stamp_ns: int) -> bool:
-        """Whether the block of this stamp is still to come."""
-        return isinstance(self._task, PushBlock) and self._block_stamp_ns != stamp_ns
+    def lacks_something_of(self, stamp_ns: int) -> bool:
+        """Whether the block, or a streamed goal, of this stamp is still to come."""
+        block = isinstance(self._task, PushBlock) and self._block_stamp_ns != stamp_ns
+        return block or (self._streamed and self.goal_stamp_ns != stamp_ns)
 
     def distance(self, state: RigidBodyState) -> float:
         """From a state to the current target; 0 where the task has none, infinite before everything is known [m]."""

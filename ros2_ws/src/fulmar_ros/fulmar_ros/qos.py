@@ -17,7 +17,7 @@ def publisher_qos(wire: Wire) -> QoSProfile:
     return _profile(
         reliable=wire.delivery != "best_effort",
         latched=wire.delivery == "latched",
-        depth=1 if wire.delivery == "latched" else STREAM_DEPTH,
+        depth=wire.latest if wire.delivery == "latched" else STREAM_DEPTH,
     )
 
 
@@ -25,7 +25,7 @@ def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | Non
     """How subscribers of a wire ask for it.
 
     By default a subscriber wants the newest message only: best effort, the last 1 kept. Latched wires are
-    asked for reliably, with what was published before.
+    asked for reliably, with what was published before, as much as their publishers keep.
 
     Args:
         wire: The wire.
@@ -39,7 +39,7 @@ def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | Non
     return _profile(
         reliable=latched if reliable is None else reliable and wire.delivery != "best_effort",
         latched=latched,
-        depth=depth or 1,
+        depth=depth or wire.latest,
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.robot import Actuators
+from fulmar_core.robot import Actuators, Rolling
 from fulmar_core.safety.command_gate import command_problem, name_problem
 from fulmar_core.safety.watchdog import Watchdog
 
@@ -65,8 +65,19 @@ class ActuatorGuard:
         return True
 
     def output(self, now_ns: int) -> np.ndarray:
-        """What to apply at this time of the steady clock [ns]."""
-        return self._actuators.safe_command if self.watchdog.expired(now_ns) else self.command
+        """What to apply at this time of the steady clock [ns].
+
+        After a silence the safe command; wheels slow down to it as fast as they may, so that they do not lock.
+        """
+        if not self.watchdog.expired(now_ns):
+            return self.command
+        slew = self._actuators.response.slew
+        if not slew or not isinstance(self._actuators, Rolling):
+            return self._actuators.safe_command
+        since_s = max(0, self.watchdog.silent_ns(now_ns) - self.watchdog.timeout_ns) / 1e9
+        left = np.maximum(np.abs(self.command) - since_s * np.asarray(slew), 0.0)
+        slowed: np.ndarray = np.where(left > 0.0, np.copysign(left, self.command), 0.0)
+        return slowed
 
     def _stamp_problem(self, stamp_ns: int) -> str | None:
         if stamp_ns and stamp_ns < self._stamp_ns:
