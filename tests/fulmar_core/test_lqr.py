@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 
 import numpy as np
 import pytest
@@ -138,7 +138,9 @@ NUMBERS = [field.name for field in fields(LqrWeights) if field.name != "around"]
 
 @pytest.mark.parametrize("name", NUMBERS)
 def test_the_metadata_hash_changes_with_every_weight_and_limit(name):
-    assert sha(weights=replace(WEIGHTS, **{name: 1.5 * getattr(WEIGHTS, name)})) != sha()
+    other = replace(WEIGHTS, **{name: 1.5 * getattr(WEIGHTS, name)})
+    assert sha(weights=other) != sha()
+    assert Lqr(ROBOT, SPEED, other).metadata()["gains"] == asdict(other)
 
 
 def test_the_metadata_hash_changes_with_robot_task_and_rate_and_with_nothing_else():
@@ -159,7 +161,7 @@ def test_the_rate_is_the_robots_own_by_default():
     [
         ({"position": -1.0}, "weights must not be negative"),
         ({"force": 0.0}, "force, torque and the error limits"),
-        ({"overshoot": -0.1}, "'overshoot' must not be negative"),
+        ({"overshoot": -0.1}, "'overshoot' and 'tracking_torque' must not be negative"),
     ],
 )
 def test_weights_without_a_solution_are_refused(change, words):

@@ -44,6 +44,7 @@ class LqrWeights:
     open_valve: float  # of each open valve
     position_error_limit: float  # errors beyond count as this, which sets the cruising speed [m]
     heading_error_limit_deg: float  # same for the turn rate [deg]
+    tracking_torque: float = 0.0  # as 'torque', where a turn rate is the goal; 0: the same
     overshoot: float = 0.0  # how far beyond a waypoint to aim where the course goes straight on [m]
     around: Around | None = None  # how to keep off obstacles; tasks without any need nothing
 
@@ -53,8 +54,8 @@ class LqrWeights:
             raise ValueError("weights must not be negative.")
         if min(self.force, self.torque, self.position_error_limit, self.heading_error_limit_deg) <= 0.0:
             raise ValueError("force, torque and the error limits must be greater than 0.")
-        if self.overshoot < 0.0:
-            raise ValueError("'overshoot' must not be negative.")
+        if min(self.overshoot, self.tracking_torque) < 0.0:
+            raise ValueError("'overshoot' and 'tracking_torque' must not be negative.")
 
 
 def linear_model(robot: Robot, control_dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -112,7 +113,8 @@ class Lqr(Law):
         dt = 1.0 / self.control_hz
         a, b = linear_model(robot, dt)
         q = np.array([gains.position] * 2 + [gains.heading] + [gains.velocity] * 2 + [gains.yaw_rate])
-        r = dt * np.diag([gains.force, gains.force, gains.torque])
+        torque = (self.reader.tracks and gains.tracking_torque) or gains.torque
+        r = dt * np.diag([gains.force, gains.force, torque])
         # What has no goal is not a state.
         used = (
             [3, 4, 5] if self.reader.tracks else [0, 1, 2, 3, 4, 5] if self.reader.heads else [0, 1, 3, 4, 5]
