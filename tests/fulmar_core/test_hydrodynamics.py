@@ -68,12 +68,14 @@ def test_added_mass_neither_gives_nor_takes_energy():
 
 
 def test_buoyancy_carries_the_weight_at_rest_and_more_the_deeper_the_hull_is():
-    statics = WATER.hydrostatics
-    force, moment = statics.wrench(np.asarray(0.0), UP, WEIGHT)
+    hydrostatics = WATER.hydrostatics
+    force, moment = hydrostatics.wrench(np.asarray(0.0), UP, WEIGHT)
     assert force == WEIGHT
     np.testing.assert_array_equal(moment, 0.0)
-    deeper, _ = statics.wrench(np.asarray(-0.01), UP, WEIGHT)
-    assert deeper - WEIGHT == pytest.approx(statics.water_density * GRAVITY * statics.waterplane_area * 0.01)
+    deeper, _ = hydrostatics.wrench(np.asarray(-0.01), UP, WEIGHT)
+    assert deeper - WEIGHT == pytest.approx(
+        hydrostatics.water_density * GRAVITY * hydrostatics.waterplane_area * 0.01
+    )
 
 
 def test_water_never_pulls_a_hull_down():
