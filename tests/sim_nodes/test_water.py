@@ -36,8 +36,8 @@ def test_at_rest_it_stays_at_rest_whatever_it_weighs(episode, mass):
 
 
 def test_the_draught_of_the_yaml_is_what_its_weight_displaces():
-    statics = WATER.hydrostatics
-    displaced = statics.water_density * statics.waterplane_area * statics.draught
+    hydrostatics = WATER.hydrostatics
+    displaced = hydrostatics.water_density * hydrostatics.waterplane_area * hydrostatics.draught
     assert displaced == pytest.approx(BOAT.body.mass, rel=1e-3)
 
 
