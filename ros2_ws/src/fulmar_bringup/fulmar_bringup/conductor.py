@@ -7,13 +7,15 @@ import signal
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec
+from fulmar_bringup.goal_plan import is_endless, shown_path
+from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec, run_goals_spec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
@@ -22,6 +24,7 @@ from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor
 from fulmar_core.errors import FulmarError, RunFailed
+from fulmar_core.goal_files import load_goals
 from fulmar_core.paths import config_path
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
@@ -81,10 +84,11 @@ def _run(request: RunRequest) -> tuple[str, int]:
     failure, plant, ends = "", Report(), list[Ended]()
     try:
         group.start(recorder_spec(plan, **_recording(request)))
-        group.start(plant_spec(plan, subscribers=2))  # controller and recorder
+        group.start(plant_spec(plan, subscribers=3 if plan.goals else 2))  # controller, recorder, goals
         group.start(controller_spec(plan, subscribers=2))  # plant and recorder
-        task = load_task(plan.task)
-        with supervisor(plan.robot, task) as overseer:
+        if plan.goals:
+            group.start(run_goals_spec(plan))
+        with supervisor(plan.robot, load_task(plan.task)) as overseer:
             plant = overseer.plant
             failure = _watch(request, plan, overseer, group)
             # The controller first: the plant then shows that its actuators are safe, and the recorder sees it.
@@ -120,7 +124,10 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
             )
 
     try:
-        overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=starting)
+        if plan.goals:
+            overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
+        else:
+            overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=starting)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)
@@ -190,11 +197,13 @@ def _recording(request: RunRequest) -> dict[str, str]:
         **{key: value for key, value in asdict(plan).items() if key not in ("start", "supervised")},
         "start": list(plan.start),
         "goal": list(request.goal) if request.goal else None,
+        **_of_goals(plan),
         "fulmar_version": fulmar_version(),
         "git_revision": git_revision(),
         "command": request.command,
     }
     files = {
+        **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
         "robot.yaml": config_path("robots", plan.robot),
         "task.yaml": config_path("tasks", plan.task),
         "scenario.yaml": config_path("scenarios", plan.scenario),
@@ -204,6 +213,14 @@ def _recording(request: RunRequest) -> dict[str, str]:
         "run_info": json.dumps(info),
         "attachments": json.dumps({name: str(path.absolute()) for name, path in files.items()}),
     }
+
+
+def _of_goals(plan: RunPlan) -> dict[str, Any]:
+    """What the judge of a run must know of its goal file."""
+    if not plan.goals:
+        return {}
+    file = load_goals(plan.goals)
+    return {"path": shown_path(file), "endless": is_endless(file)}
 
 
 def _nothing_recorded(request: RunRequest) -> RunRecord:

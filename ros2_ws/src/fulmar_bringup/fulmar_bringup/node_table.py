@@ -5,10 +5,12 @@ Both `fulmar run` and `launch/system.launch.py` start exactly what this lists.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
 from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, load_system
 from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
 
 Parameter = bool | int | float | str | list[float]
 
@@ -41,6 +43,7 @@ class RunPlan:
     duration_s: float = 0.0  # 0: until stopped [s]
     lockstep: bool = False
     rate: float = 1.0  # simulated seconds a wall-clock second
+    goals: str = ""  # goal file that a node of its own tells; empty: somebody else gives the goal
     supervised: bool = False  # somebody else activates the plant when all are ready
 
 
@@ -58,6 +61,7 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "control_hz": plan.control_hz,
         "lockstep": plan.lockstep,
         "rate": plan.rate,
+        "goals_streamed": bool(plan.goals),
         "wait_for_subscribers": subscribers,
     }
     if plan.controller == "policy" and plan.policy:
@@ -124,6 +128,18 @@ def goals_spec(robot: str, goals: str, *, as_path: bool = False, control_hz: flo
     return NodeSpec("goals", "fulmar_ros", "goal_node", "fulmar_ros.goal_node", f"/{robot}", parameters)
 
 
+def run_goals_spec(plan: RunPlan) -> NodeSpec:
+    """The node that tells the goals of a run, for as long as the run lasts."""
+    spec = goals_spec(
+        plan.robot,
+        plan.goals,
+        as_path=is_path_of_places(load_task(plan.task)),
+        control_hz=min(plan.control_hz, 10.0),
+    )
+    more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}
+    return replace(spec, parameters=spec.parameters | more)
+
+
 def list_nodes(
     *,
     system: str | None = None,
@@ -132,6 +148,7 @@ def list_nodes(
     controller: str | None = None,
     backend: str | None = None,
     policy: str | None = None,
+    goals: str | None = None,
 ) -> tuple[NodeSpec, ...]:
     """Nodes of a system, each of its choices replaced by what is given.
 
@@ -142,9 +159,10 @@ def list_nodes(
         controller: Another controller.
         backend: Another backend.
         policy: Folder of a bundle; the shipped one by default.
+        goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it somebody else gives goals.
 
     Returns:
-        Recorder, plant and controller.
+        Recorder, plant, controller and, with `goals`, the node that tells them.
 
     Raises:
         ConfigError: Unknown name, or a mistake in a file.
@@ -156,4 +174,9 @@ def list_nodes(
     hz = base.control_hz if as_written else default_control_hz(*chosen)
     load_robot(chosen[0]).timing.substeps(hz)
     plan = RunPlan(*chosen, control_hz=hz, policy=policy or "")
-    return recorder_spec(plan), plant_spec(plan), controller_spec(plan)
+    nodes = recorder_spec(plan), plant_spec(plan), controller_spec(plan)
+    if not goals:
+        return nodes
+    checked_goals(goals, load_robot(plan.robot), load_task(plan.task))
+    plan = replace(plan, goals=str(goal_path(goals)))
+    return *nodes[:2], controller_spec(plan), run_goals_spec(plan)

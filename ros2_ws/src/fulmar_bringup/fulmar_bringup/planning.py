@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.system import check_names, default_control_hz
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError
 from fulmar_core.goal import Goal
+from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, read_passport
 from fulmar_core.robot import Robot, load_robot
@@ -53,6 +56,7 @@ def plan_run(
     seed: int,
     record: Path,
     command: str,
+    goals: str | None = None,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -73,6 +77,7 @@ def plan_run(
         seed: Seed.
         record: Folder of the bag; must not exist.
         command: Command line.
+        goals: Goal file, a name or a path that ends in `.yaml`; its goals come one after another.
 
     Returns:
         The request.
@@ -94,7 +99,13 @@ def plan_run(
         )
     episode = draw_episode(the_robot, the_task, load_scenario(scenario), seed=seed, number=0)
     mission, drawn_start = episode.goal, _pose_of_state(episode.start)
-    if goal is not None:
+    if goals is not None:
+        if goal is not None:
+            raise ConfigError("--goals brings its own goals; it takes no --goal.")
+        file = checked_goals(goals, the_robot, the_task)
+        mission, drawn_start = _from_file(file, mission, drawn_start)
+        duration_s = duration_s or duration_of(file, the_robot, start or drawn_start)
+    elif goal is not None:
         mission, drawn_start = _moved(the_task, mission, drawn_start, goal)
     start = start or drawn_start
     _check_distance(the_robot, the_task, mission, start)
@@ -111,6 +122,7 @@ def plan_run(
         duration_s=duration_s or the_task.episode_s,
         lockstep=lockstep,
         rate=rate,
+        goals=str(goal_path(goals)) if goals else "",
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
@@ -119,6 +131,16 @@ def plan_run(
 def default_task(robot: str) -> str:
     """What a robot does if nobody says: the hardest of the plain tasks that its own policy can."""
     return "go_to_pose" if shipped_policy(robot, "go_to_pose") else "go_to_position"
+
+
+def _from_file(file: GoalFile, drawn: Goal, start: PoseTuple) -> tuple[Goal, PoseTuple]:
+    """The first goal of a file, and a start that suits it."""
+    mission = replace(drawn, targets=first_targets(file))
+    fixed = start_of(file)
+    if fixed is not None:
+        return mission, fixed
+    x, y = (float(new - old) for new, old in zip(mission.current[:2], drawn.current[:2], strict=True))
+    return mission, (start[0] + x, start[1] + y, start[2])
 
 
 def _moved(task: Task, mission: Goal, start: PoseTuple, goal: PoseTuple) -> tuple[Goal, PoseTuple]:
@@ -141,19 +163,22 @@ def _moved(task: Task, mission: Goal, start: PoseTuple, goal: PoseTuple) -> tupl
 
 
 def _check_distance(robot: Robot, task: Task, mission: Goal, start: PoseTuple) -> None:
-    """Refuse a start beyond the geofence around the first target.
+    """Refuse a start beyond the geofence around the first target, and targets as far from each other.
 
     Raises:
         ConfigError: If it is.
     """
     if task.goal_topic == "goal_velocity":
         return
-    distance = math.dist(start[:2], mission.current[:2])
-    if distance > robot.limits.geofence:
-        raise ConfigError(
-            f"start and goal are {distance:.1f} m apart, the geofence of '{robot.name}' is "
-            f"{robot.limits.geofence:g} m. Bring them nearer to each other."
-        )
+    places = [np.asarray(start[:2]), *mission.targets[:, :2]]
+    for number, (here, there) in enumerate(itertools.pairwise(places)):
+        distance = math.dist(here, there)
+        if distance > robot.limits.geofence:
+            what = f"targets {number} and {number + 1}" if number else "start and goal"
+            raise ConfigError(
+                f"{what} are {distance:.1f} m apart, the geofence of '{robot.name}' is "
+                f"{robot.limits.geofence:g} m. Bring them nearer to each other."
+            )
 
 
 def _check_finite(**values: PoseTuple | float | None) -> None:

@@ -16,9 +16,11 @@ from fulmar_core.goal import Goal
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targets, episode_metrics, successes
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.schedule import Schedule
+from fulmar_core.schedule import LONGEST_AHEAD_NS, SLACK_NS
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.trajectories import COLUMNS
+
+LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its stamp
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,33 @@ class Judgement:
     run: Trajectories  # one episode of n steps; without a record of the actuators, its shares are NaN
     figures: dict[str, float]  # of `metrics.episode_metrics`; NaN or absent: there is none
     duration_s: float  # [s]
+    progress: str | None  # how far the goals of a file came, in words; None: there was no such file
+    unfinished: bool  # whether more was to come of them
+    path: np.ndarray  # (m, 2) to be followed [m]; m may be 0
 
     @property
     def success(self) -> bool:
-        """Whether the whole closing window was recorded and spent inside the tolerance, or enough targets reached."""
-        return self.long_enough and bool(successes(self.run, self.task)[0])
+        """Whether the whole closing window was recorded and spent inside the tolerance, or enough targets reached.
+
+        Where goals came from a file, it also is asked whether they came to their end; of waypoints only that is.
+        """
+        if self.unfinished or not self.long_enough:
+            return False
+        if self.progress is not None and self.counts:
+            return not self.figures["collided"]
+        return bool(successes(self.run, self.task)[0])
+
+    @property
+    def path_error_m(self) -> float | None:
+        """Mean distance from the path [m]; None where none was to be followed."""
+        if not len(self.path):
+            return None
+        place = np.stack((self.run.x[0], self.run.y[0]), axis=-1)[:, None]
+        begin, way = self.path[:-1], np.diff(self.path, axis=0)
+        length = np.clip(np.sum(way * way, axis=-1), 1e-12, None)
+        share = np.clip(np.sum((place - begin) * way, axis=-1) / length, 0.0, 1.0)
+        gap = np.linalg.norm(begin + share[..., None] * way - place, axis=-1)
+        return float(np.mean(np.min(gap, axis=1)))
 
     @property
     def counts(self) -> bool:
@@ -87,7 +111,7 @@ def judge(record: RunRecord) -> Judgement | None:
     time_s, samples = _even(motion)
     states = planar_of(motion.states)
     block = _block(record.block, motion.stamp_s[samples], states[samples])
-    newest = _newest(task, goals, motion)[samples]
+    newest = _newest(record, task, goals)[samples]
     goal = _goals_at(task, goals, newest, record.obstacles, states[samples], states[0], block, time_s[0])
     # Steps one after another have the shape of episodes side by side.
     log = TrajectoryLog(robot, task, float(time_s[0]))
@@ -107,7 +131,20 @@ def judge(record: RunRecord) -> Judgement | None:
         run=run,
         figures={name: float(values[0]) for name, values in episode_metrics(run, task).items()},
         duration_s=float(motion.stamp_s[-1] - motion.stamp_s[0]),
+        **_of_goal_file(record),
     )
+
+
+def _of_goal_file(record: RunRecord) -> dict[str, Any]:
+    """What the node that tells goals from a file said last, and the path of that file."""
+    said = record.last_health("goals")
+    asked = bool(record.info.get("goals"))
+    finished = said is not None and said.values.get("mode") == "finished"
+    return {
+        "progress": (said.values.get("progress", "") if said else "nothing was told") if asked else None,
+        "unfinished": asked and not finished and not record.info.get("endless"),
+        "path": np.array(record.info.get("path") or np.empty((0, 2)), dtype=float).reshape(-1, 2),
+    }
 
 
 def _text(record: RunRecord, key: str) -> str:
@@ -119,7 +156,12 @@ def _text(record: RunRecord, key: str) -> str:
 
 def _goals(record: RunRecord) -> list[GivenGoal]:
     """Goals as they came; what was asked for if the bag has none."""
-    given = [goal for goal in record.goals if len(goal.targets)]
+    given: list[GivenGoal] = []
+    for goal in record.goals:
+        # A goal file is told again and again; where nothing changes, nothing begins anew.
+        again = record.info.get("goals") and given and np.array_equal(goal.targets, given[-1].targets)
+        if len(goal.targets) and not again:
+            given.append(goal)
     if given:
         return given
     asked: Any = record.info.get("goal")
@@ -132,20 +174,27 @@ def _goals(record: RunRecord) -> list[GivenGoal]:
     return [GivenGoal(-np.inf, -np.inf, np.array([[x, y, np.deg2rad(heading_deg)]]))]
 
 
-def _newest(task: Task, given: list[GivenGoal], motion: Motion) -> np.ndarray:
-    """Which of the goals counts at each state, shape (n,): places when they came, velocities when they begin."""
-    arrived = np.searchsorted(motion.log_s, [goal.log_s for goal in given])
-    schedule: Schedule[int] = Schedule()
-    newest, number = np.zeros(len(motion), dtype=int), 0
-    for sample, now_ns in enumerate(np.round(1e9 * motion.stamp_s).astype(int).tolist()):
-        while number < len(given) and arrived[number] <= sample:
-            told_ns = (
-                round(1e9 * max(0.0, given[number].stamp_s)) if task.goal_topic == "goal_velocity" else 0
-            )
-            schedule.give(number, told_ns)
-            number += 1
-        newest[sample] = schedule.at(now_ns) or 0
-    return newest
+def _newest(record: RunRecord, task: Task, given: list[GivenGoal]) -> np.ndarray:
+    """Which of the goals counts at each state, shape (n,).
+
+    Places count from when they came. Velocities, and whatever a goal node tells, are stamped with the time when they
+    begin; messages of one time need not come into the bag in their order.
+    """
+    motion = record.motion
+    now_ns = np.round(1e9 * motion.stamp_s).astype(np.int64)
+    timed = task.goal_topic == "goal_velocity" or bool(record.info.get("goals"))
+    late_ns = LONGEST_AHEAD_NS if record.info.get("lockstep") else LATE_NS
+    begun: list[tuple[int, int]] = []  # when each begins, and its number
+    for number, sample in enumerate(np.searchsorted(motion.log_s, [goal.log_s for goal in given]).tolist()):
+        came_ns = int(now_ns[sample]) if sample < len(now_ns) else int(now_ns[-1]) + 1
+        stamp_ns = round(1e9 * max(0.0, given[number].stamp_s))
+        by_stamp = timed and stamp_ns and came_ns - late_ns <= stamp_ns <= came_ns + LONGEST_AHEAD_NS
+        begin_ns = stamp_ns if by_stamp else came_ns
+        while begun and begun[-1][0] >= begin_ns:
+            begun.pop()
+        begun.append((begin_ns, number))
+    order = np.searchsorted([begin_ns for begin_ns, _ in begun], now_ns + SLACK_NS, side="right") - 1
+    return np.array([number for _, number in begun])[order.clip(0)]
 
 
 def _goals_at(

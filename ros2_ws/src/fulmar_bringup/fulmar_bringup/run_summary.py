@@ -46,6 +46,8 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "success": judgement is not None and judgement.success,
         **{name: judgement.figure(name) if judgement else None for name in FIGURES},
         "collided": None if judgement is None else bool(judgement.figures["collided"]),
+        "path_error_m": judgement.path_error_m if judgement else None,
+        "goals_progress": judgement.progress if judgement else None,
         "control_rate_hz": _own_rate_hz(record, wall_hz),
         "wall_control_rate_hz": wall_hz,
         "latency_ms": _known(_spread(plant, "latency_ms")) or percentiles(latencies_ms(record)),

@@ -18,6 +18,7 @@ ARGUMENTS = {
     "controller": "policy, or a classical controller such as lqr",
     "backend": "mujoco, mock or hardware",
     "policy": "folder of a policy bundle",
+    "goals": "a file of configs/goals, without .yaml, that a node of its own tells",
 }
 
 

@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -23,15 +24,17 @@ from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import GOAL_WIRES, ODOMETRY
+from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, ODOMETRY
 from fulmar_ros.convert import measurement_of
 from fulmar_ros.goal_messages import TYPES, goal_message
+from fulmar_ros.health import Health
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 PATIENCE_S = 3.0  # for the first odometry and for somebody who listens, before a person is told
 WATCH_S = 0.1
+STATUS_PERIOD_S = 0.5  # at least 1 Hz
 FLUSH = Duration(seconds=0.5)
 
 
@@ -43,13 +46,14 @@ class GoalSettings:
     robot: str = "floating_platform"
     control_hz: float = 10.0  # goals come at most so often in the robot's own time [Hz]
     as_path: bool = False  # tell all positions or poses at once
-    input_timeout_s: float = (
-        0.5  # of wall-clock time without usable odometry, before a robot shall stand still [s]
-    )
+    input_timeout_s: float = 0.5  # without usable odometry, before a robot shall stand still, at rate 1 [s]
+    rate: float = 1.0  # seconds of the robot's own time a wall-clock second
+    lockstep: bool = False  # tell the goal with each odometry: plant and controller wait for it
+    stay: bool = False  # go on when everything is done, until told to stop
 
     def __post_init__(self) -> None:
         """Refuse values without meaning."""
-        for name in ("control_hz", "input_timeout_s"):
+        for name in ("control_hz", "input_timeout_s", "rate"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} = {getattr(self, name):g} must be finite and greater than 0.")
 
@@ -79,11 +83,16 @@ class GoalNode(Node):
         self._newest: Measurement | None = None
         self._time_ns, self._told_at_ns = 0, 0  # of the sequence; it stands still while no odometry comes
         self._period_ns = round(1e9 / self._settings.control_hz)
+        self._timeout_s = self._settings.input_timeout_s / min(self._settings.rate, 1.0)
         self._progress = self._sequence.progress
-        self._problem, self._stale, self._over, self._heard = "", False, False, False
+        self._said, self._said_at = "", 0.0
+        self._problem, self._stale, self._over = "", False, False
+        self._heard = self._settings.stay  # whoever starts all nodes together knows that somebody will listen
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
         self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
+        self._health = Health(f"{robot.name}: goals", [diagnostics])
         self.create_subscription(
             Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
         )
@@ -94,18 +103,20 @@ class GoalNode(Node):
         measurement = measurement_of(message)
         with self._lock:
             problem = self._gate.problem(measurement)
-            if problem or self._over:
+            if self._over or (problem and not self._settings.lockstep):
                 self._problem = problem or ""
                 return
+            was_done = self._sequence.done
             self._resume(measurement)
             goal = self._sequence.step(planar_of(measurement.state), self._time_ns / 1e9)
             self._tell_progress()
             if self._is_due(goal):
                 self._tell(goal)
-            if self._sequence.done:
-                self._over = True
+            if self._sequence.done and not was_done:
+                self._over = not self._settings.stay
                 self.get_logger().info(self._farewell())
-                self._request_exit(DONE)
+                if self._over:
+                    self._request_exit(DONE)
 
     def _resume(self, measurement: Measurement) -> None:
         """Go on with the sequence's time; gaps do not count."""
@@ -119,7 +130,7 @@ class GoalNode(Node):
         self._problem, self._stale = "", False
 
     def _is_due(self, goal: Goal) -> bool:
-        if self._told is None:
+        if self._told is None or self._settings.lockstep:
             return True
         if np.array_equal(goal.targets, self._told.targets):
             return False
@@ -134,6 +145,10 @@ class GoalNode(Node):
         if self._sequence.progress != self._progress:
             self._progress = self._sequence.progress
             self.get_logger().info(self._progress)
+        if self._sequence.progress != self._said or time.monotonic() - self._said_at > STATUS_PERIOD_S:
+            self._said, self._said_at = self._progress, time.monotonic()
+            mode = "finished" if self._sequence.done else "running"
+            self._health.publish("ok", self._progress, {"mode": mode, "progress": self._progress})
 
     def _farewell(self) -> str:
         if self._sequence.topic == "goal_path":
@@ -146,8 +161,8 @@ class GoalNode(Node):
         """Notice silence, of the odometry and of whoever should listen; by a steady clock."""
         with self._lock:
             now = time.monotonic()
-            limit_s = self._settings.input_timeout_s if self._newest else PATIENCE_S
-            late = now - self._usable_at > limit_s
+            limit_s = self._timeout_s if self._newest else PATIENCE_S
+            late = now - self._usable_at > limit_s and not self._settings.lockstep
             if late and not self._stale and not self._over:
                 self._stale = True
                 self._pause()
@@ -163,9 +178,7 @@ class GoalNode(Node):
             return
         stands = self._stand_still()
         then = "the robot is told to stand still" if stands else "the goal stays as it is"
-        self.get_logger().warning(
-            f"no usable odometry for {self._settings.input_timeout_s:g} s ({reason}): {then}"
-        )
+        self.get_logger().warning(f"no usable odometry for {self._timeout_s:g} s ({reason}): {then}")
 
     def _stand_still(self) -> bool:
         """End a velocity that was told; other goals need no end."""

@@ -29,7 +29,7 @@ def run(
         typer.Option(
             metavar="T",
             help="A name from `fulmar list tasks`; go_to_pose by default, "
-            "or go_to_position where no policy for poses is shipped.",
+            "or go_to_position where no policy for poses is shipped; with --goals, the one that takes them.",
         ),
     ] = None,
     controller: ControllerOption = "policy",
@@ -40,6 +40,13 @@ def run(
         typer.Option(
             metavar="x,y,deg",
             help="Where to go; drawn from the seed by default; so are many targets.",
+        ),
+    ] = None,
+    goals: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file.",
         ),
     ] = None,
     start: Annotated[
@@ -77,17 +84,20 @@ def run(
     fulmar run floating_platform --controller policy --lockstep --seed 7
 
     fulmar run turtlebot2 --task go_through_positions --controller classical
+
+    fulmar run floating_platform --controller classical --goals circle
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
     from fulmar_bringup.conductor import conduct
     from fulmar_bringup.extras import require
+    from fulmar_bringup.goal_plan import default_task as task_of_goals
     from fulmar_bringup.planning import default_task, plan_run
     from fulmar_bringup.system import modules_of
 
     request = plan_run(
         robot=robot,
-        task=task or default_task(robot),
+        task=task or (task_of_goals(goals) if goals else default_task(robot)),
         controller=controller,
         backend=backend,
         policy=policy,
@@ -101,6 +111,7 @@ def run(
         seed=seed,
         record=record or default_record(robot, controller),
         command="fulmar " + " ".join(sys.argv[1:]),
+        goals=goals,
     )
     require(*modules_of(controller, backend))  # the nodes would fail for want of them one by one
     outcome = conduct(request)
@@ -124,6 +135,8 @@ TOLD = {
     "goals_reached": "{:.0f} targets reached",
     "velocity_error_m_s": "velocity {:.3f} m/s off",
     "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
+    "path_error_m": "path {:.3f} m off",
+    "goals_progress": "{}",
 }
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fulmar_bringup.report.actuator_picture import draw_actuators, draw_use
 from fulmar_bringup.report.error_picture import counting, draw_progress, strips
 from fulmar_bringup.report.latency_picture import draw_latency
-from fulmar_bringup.report.style import quiet_grid
+from fulmar_bringup.report.style import legend, quiet_grid
 from fulmar_bringup.report.trajectory_picture import draw_close_up, draw_trajectory, has_place
 from fulmar_bringup.report.view import View, judged
 
@@ -41,7 +41,7 @@ def overview(runs: Sequence[View], title: str) -> Figure:
     left, right = top.subfigures(1, 2, width_ratios=(1.0, 1.0))
     path = left.subplots()
     draw_trajectory(path, runs)
-    path.legend(loc="best")
+    legend(path, loc="best")
     count = _rows(runs)
     axes = right.subplots(count + 1, 1, gridspec_kw={"height_ratios": (*[1.0] * count, 0.9)})
     draw_progress(axes[:-1], runs)
@@ -68,7 +68,7 @@ def _trajectory(runs: Sequence[View]) -> Picture:
     else:
         whole = figure.subplots()
     draw_trajectory(whole, runs)
-    whole.legend(loc="best")
+    legend(whole, loc="best")
     (left, right), (low, high) = whole.get_xlim(), whole.get_ylim()
     width = 3.3 if near else 5.0
     figure.set_size_inches(WIDTH, np.clip(0.55 + width * (high - low) / (right - left), 2.6, 6.0))
@@ -78,6 +78,8 @@ def _trajectory(runs: Sequence[View]) -> Picture:
         caption += " Grey discs are obstacles."
     if any(not np.isnan(judgement.block).all() for _, judgement in judged(runs)):
         caption += " The dashed line is the way of the block, the square its end."
+    if any(len(judgement.path) for _, judgement in judged(runs)):
+        caption += " The dashed line is the path that was to be followed."
     if counting(runs):
         caption += (
             " Numbered circles are the targets, as large as the tolerance; those that were reached are grey."
@@ -93,7 +95,7 @@ def _progress(runs: Sequence[View]) -> Picture:
     figure = Figure(figsize=(WIDTH, 0.5 + 1.7 * count), layout="constrained")
     rows = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
     draw_progress(rows, runs)
-    rows[0].legend(loc="upper left" if counts else "upper right", ncols=len(runs))
+    legend(rows[0], loc="upper left" if counts else "upper right", ncols=len(runs))
     caption = "The scales of errors are logarithmic: each grid line is ten times the one below."
     if counts:
         return Picture("How many targets, and how far from the next", caption, figure)
@@ -122,7 +124,7 @@ def _use(runs: Sequence[View]) -> Picture:
     axes = figure.subplots()
     draw_use(axes, runs)
     quiet_grid(axes)
-    axes.legend(loc="lower right", ncols=len(runs))
+    legend(axes, loc="lower right", ncols=len(runs))
     if all(run.binary for run in runs):
         caption = """
         Open time of all valves added up: two valves open for one second count as two seconds. Less is

@@ -81,6 +81,12 @@ def quiet_grid(axes: Axes) -> None:
     axes.tick_params(length=0.0, which="minor")
 
 
+def legend(axes: Axes, **how: object) -> None:
+    """A legend, where something has a name."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(**how)
+
+
 def as_svg(figure: Figure) -> str:
     """A figure as an element of a page, in the page's own colours and type."""
     stream = StringIO()

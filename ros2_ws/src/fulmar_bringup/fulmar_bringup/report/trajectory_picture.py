@@ -36,10 +36,16 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
         if not np.isnan(judgement.block).all():
             axes.plot(*judgement.block.T, color=run.colour, linestyle=DASHED, linewidth=1.2, zorder=4)
             axes.plot(*judgement.block[-1], "s", color=run.colour, markersize=5, zorder=6)
+        if order == 0 and len(judgement.path):
+            axes.plot(*judgement.path.T, color=INK, linestyle=DASHED, linewidth=0.8, zorder=3)
         if judgement.counts:
             _waypoints(axes, judgement, named=order == 0)
         elif has_place(judgement):
-            _goal(axes, judgement, radius, named=order == 0)
+            for target in _given(judgement):
+                _goal(axes, judgement, target, radius)
+            if order == 0:
+                x, y, _ = judgement.targets[-1]
+                axes.text(x, y - 1.15 * radius, "goal", ha="center", va="top")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     axes.margins(0.1)
@@ -106,19 +112,25 @@ def _body(axes: Axes, centre: np.ndarray, yaw: float, radius: float, colour: str
     axes.plot(*np.stack((centre, nose)).T, color=colour, linewidth=1.4, alpha=0.8, zorder=3)
 
 
-def _goal(axes: Axes, judgement: Judgement, radius: float, *, named: bool) -> None:
-    x, y, yaw = judgement.targets[-1]
+def _given(judgement: Judgement) -> np.ndarray:
+    """Every place that was a goal at some time, in their order, shape (k, 3)."""
+    changed = np.any(np.diff(judgement.aims, axis=0, prepend=np.nan) != 0.0, axis=1)
+    return judgement.aims[changed]
+
+
+def _goal(axes: Axes, judgement: Judgement, target: np.ndarray, radius: float) -> None:
+    x, y, yaw = target
     tolerance = judgement.task.tolerance
     axes.add_patch(
         Circle((x, y), tolerance.position, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=6)
     )
     if tolerance.heading_deg > 0.0:
+        tip = (x + 1.6 * radius * np.cos(yaw), y + 1.6 * radius * np.sin(yaw))
+        axes.plot(*tip, linestyle="none")  # makes room: arrows beyond the axes are not drawn
         axes.annotate(
             "",
-            (x + 1.6 * radius * np.cos(yaw), y + 1.6 * radius * np.sin(yaw)),
+            tip,
             (x, y),
             arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0},
             zorder=7,
         )
-    if named:
-        axes.text(x, y - 1.15 * radius, "goal", ha="center", va="top")

@@ -20,6 +20,15 @@ def verdict(run: View) -> tuple[str, str]:
     if not judgement.long_enough:
         return "Missed", f"The run ended after {judgement.duration_s:.1f} s, too early to judge."
     touched = " It touched an obstacle." if judgement.figures["collided"] else ""
+    if judgement.progress is not None:
+        path = run.summary["path_error_m"]
+        way = "" if path is None else f" On average the robot was {_length(path)} from the path."
+        end = (
+            "there it stayed to the end" if judgement.success else "it was not where it should be at the end"
+        )
+        return ("Done" if judgement.success else "Missed"), (
+            f"Of the goal file: {judgement.progress} in {judgement.duration_s:.0f} s; {end}.{way}{touched}"
+        )
     if judgement.counts:
         reached, required = run.summary["goals_reached"] or 0, getattr(judgement.task, "required", 0)
         word = "Reached" if judgement.success else "Missed"
@@ -53,6 +62,8 @@ def rule(runs: Sequence[View]) -> str:
         if run.judgement is not None:
             task, tolerance = run.judgement.task, run.judgement.task.tolerance
             heading = f" and {tolerance.heading_deg:g}°" if tolerance.heading_deg > 0.0 else ""
+            if run.judgement.progress is not None:
+                return "A run counts as done if the goals of its file came to their end and the last one was kept."
             if run.judgement.counts:
                 return (
                     f"A target counts as reached within {100 * tolerance.position:g} cm{heading}, and a run that "
@@ -89,6 +100,8 @@ def table(runs: Sequence[View]) -> list[Row]:
         row("Final heading error", "", lambda s: _value(s["final_heading_error_deg"], "°", 1)),
         row("Time to goal", "from when on it stayed", lambda s: _value(s["time_to_target_s"], " s", 1)),
         row("Targets reached", "", lambda s: _value(s["goals_reached"], "", 0)),
+        row("Goals of the file", "", lambda s: s["goals_progress"] or "–"),
+        row("Distance from the path", "mean", lambda s: _length(s["path_error_m"])),
         row("Velocity error", "mean", lambda s: _value(s["velocity_error_m_s"], " m/s", 3)),
         row("Turn rate error", "mean", lambda s: _value(s["yaw_rate_error_deg_s"], "°/s", 1)),
     ]

@@ -1,0 +1,104 @@
+"""What follows for a run from a goal file: its task, where it begins, how long it lasts, and the path to show."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities, load_goals
+from fulmar_core.goal_sequence import goal_sequence
+from fulmar_core.paths import config_path
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.push_block import PushBlock
+
+DEFAULT_TASKS = {Positions: "go_to_position", Poses: "go_to_pose"}  # all others are about velocities
+SHOWN = 400  # points of a path that a record carries along
+SPARE_S = 5.0  # after everything is done, to see that it stays so
+
+PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
+
+
+def default_task(goals: str) -> str:
+    """Name of the task whose controller takes the goals of a file.
+
+    Raises:
+        ConfigError: Unknown name, or a mistake in the file.
+    """
+    return DEFAULT_TASKS.get(type(load_goals(goals)), "track_velocities")
+
+
+def goal_path(goals: str) -> Path:
+    """Where a goal file lies, in full."""
+    return (Path(goals) if goals.endswith(".yaml") else config_path("goals", goals)).absolute()
+
+
+def is_path_of_places(task: Task) -> bool:
+    """Whether a task takes all places at once."""
+    return task.goal_topic == "goal_path"
+
+
+def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
+    """A goal file that a task's controller can follow in a run.
+
+    Raises:
+        ConfigError: Unknown name, a mistake in the file, or a task that takes other goals.
+    """
+    file = load_goals(goals)
+    as_path = is_path_of_places(task) and isinstance(file, Positions | Poses)
+    fits = goal_sequence(file, robot, as_path=as_path).topic == task.goal_topic
+    fits &= not (isinstance(file, Positions) and task.tolerance.heading_deg > 0.0)
+    if not fits or isinstance(
+        task, GoToPositionWithObstacles | PushBlock
+    ):  # whose surroundings the seed draws
+        raise ConfigError(
+            f"the goals '{goals}' are no goals of task '{task.name}'. "
+            f"Leave --task out: they are for '{default_task(goals)}'."
+        )
+    return file
+
+
+def first_targets(file: GoalFile) -> np.ndarray:
+    """Targets that the file begins with, shape (k, 3) as in `fulmar_core.goal.Goal`."""
+    return np.zeros((1, 3)) if isinstance(file, FollowedPath) else file.targets()
+
+
+def start_of(file: GoalFile) -> PoseTuple | None:
+    """Where to begin; None for places: anywhere about the first of them."""
+    if isinstance(file, FollowedPath):
+        (x, y), (next_x, next_y) = file.planner().points[:2].tolist()
+        return x, y, math.degrees(math.atan2(next_y - y, next_x - x))
+    return (0.0, 0.0, 0.0) if isinstance(file, Velocities) else None
+
+
+def duration_of(file: GoalFile, robot: Robot, start: PoseTuple) -> float:
+    """How long a robot needs, with time to spare; for endless rounds, that of one [s]."""
+    if isinstance(file, Velocities):
+        return float(file.ends()[-1]) + SPARE_S
+    if isinstance(file, FollowedPath):
+        planner = replace(file, loops=max(1, file.loops)).planner()
+        length = planner.spacing * len(planner.points) * (planner.loops if planner.closed else 1)
+        return 1.25 * length / file.speed + SPARE_S
+    places = np.concatenate((np.array([start[:2]]), file.targets()[:, :2]))
+    ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    return float(np.sum(20.0 + 3.0 * ways / robot.performance.speed)) + SPARE_S
+
+
+def shown_path(file: GoalFile) -> list[list[float]]:
+    """Where a path runs that is followed, thinned out [m]; empty for goals of another kind."""
+    if not isinstance(file, FollowedPath):
+        return []
+    planner = file.planner()
+    points = planner.points[:: max(1, len(planner.points) // SHOWN)]
+    ends = points[:1] if planner.closed else planner.points[-1:]
+    return np.round(np.concatenate((points, ends)), 4).tolist()
+
+
+def is_endless(file: GoalFile) -> bool:
+    """Whether the goals never come to an end."""
+    return isinstance(file, FollowedPath) and file.planner().closed and file.loops == 0
