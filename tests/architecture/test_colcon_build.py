@@ -14,7 +14,9 @@ import pytest
 PACKAGES = ["fulmar_bringup", "fulmar_core", "fulmar_ros", "hardware_drivers", "policy_server", "sim_nodes"]
 PROGRAMS = {
     "fulmar_bringup/fulmar": "fulmar_bringup.cli",
+    "fulmar_ros/goal_node": "fulmar_ros.goal_node",
     "fulmar_ros/recorder_node": "fulmar_ros.recorder_node",
+    "policy_server/classical_node": "policy_server.classical_node",
     "policy_server/lqr_node": "policy_server.lqr_node",
     "policy_server/policy_node": "policy_server.policy_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",

@@ -153,13 +153,13 @@ def test_policies_that_reach_less_than_they_have_to_are_told_and_the_command_fai
 ):
     code, told = call(policies, "turtlebot2_go_to_position", "kingfisher_go_to_pose", "--out", tmp_path)
     assert code == 1
-    assert [job.bundle for job in asked] == [
+    assert {job.bundle for job in asked} == {
         tmp_path / "kingfisher_go_to_pose",
         tmp_path / "turtlebot2_go_to_position",
-    ]
-    lines = told.splitlines()
-    assert lines[1].split() == ["kingfisher_go_to_pose", "0.960", "0.90"]
-    assert lines[2].split() == ["turtlebot2_go_to_position", "0.960", "0.99", "too", "low"]
+    }
+    lines = sorted(told.splitlines()[1:3])
+    assert lines[0].split() == ["kingfisher_go_to_pose", "0.960", "0.90"]
+    assert lines[1].split() == ["turtlebot2_go_to_position", "0.960", "0.99", "too", "low"]
 
 
 def test_policies_can_be_made_one_by_one_and_told_as_json(asked, passports, tmp_path):
