@@ -15,13 +15,14 @@ from fulmar_ros.runtime import spinning
 from policy_server.lqr_node import make_lqr
 from sim_nodes.sim_node import make_backend
 from tests.conftest import RosDomain
-from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
+from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, until
 
 
 @pytest.fixture
-def neighbour(ros_domain: RosDomain) -> Iterator[Neighbour]:
+def neighbour(ros_domain: RosDomain, request: pytest.FixtureRequest) -> Iterator[Neighbour]:
+    """Beside the floating platform, or the robot that a test names."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    other = Neighbour()
+    other = Neighbour(getattr(request, "param", ROBOT))
     with spinning(other.node, lambda error: pytest.fail(repr(error))):
         yield other
     rclpy.try_shutdown()

@@ -8,10 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot, load_robot
@@ -21,21 +22,24 @@ from fulmar_core.topics import (
     COMMAND,
     DIAGNOSTICS,
     GOAL_POSE,
+    OBSTACLES,
     ODOMETRY,
+    VELOCITY_COMMAND,
 )
 from fulmar_ros.convert import OdometryWriter, VectorWriter
 from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
-NAMESPACE = "/floating_platform"
+ROBOT = "floating_platform"
+NAMESPACE = f"/{ROBOT}"
 
 
 class Neighbour:
     """Another node: publishes by hand, and keeps what it hears."""
 
-    def __init__(self) -> None:
-        self.node = Node("neighbour", namespace=NAMESPACE)
-        self.robot = load_robot("floating_platform")
+    def __init__(self, robot: str = ROBOT) -> None:
+        self.node = Node("neighbour", namespace=f"/{robot}")
+        self.robot = load_robot(robot)
         self.applied: list[np.ndarray] = []
         self.commands: list[np.ndarray] = []
         self.said: dict[str, tuple[str, dict[str, str]]] = {}
@@ -58,6 +62,11 @@ class Neighbour:
         self.goal_publisher = self.node.create_publisher(
             PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE)
         )
+
+        self.drive = self.node.create_publisher(
+            TwistStamped, VELOCITY_COMMAND.name, publisher_qos(VELOCITY_COMMAND)
+        )
+        self.mark = self.node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
 
     def _applied(self, message: JointState) -> None:
         self.applied.append(np.array(message.effort))

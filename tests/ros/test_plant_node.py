@@ -7,11 +7,13 @@ import time
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import TwistStamped
 
 from fulmar_core.backend import Sample
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import spinning
 from sim_nodes.mock_backend import MockBackend
+from sim_nodes.sim_node import make_backend
 from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
 
 
@@ -98,4 +100,30 @@ def test_a_backend_that_hangs_is_reported_and_its_watchdog_counts(neighbour: Nei
     with spinning(node, lambda error: pytest.fail(repr(error))):
         until(lambda: "it hangs" in neighbour.said.get("plant", ("",))[0])
         release.set()
+        node.stop()
+
+
+@pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)
+def test_wheels_follow_cmd_vel_and_slow_down_within_a_second_when_it_falls_silent(
+    neighbour: Neighbour,
+) -> None:
+    """Turtlebot2: 0.36 m/s fall by 0.9 m/s a second, after a watchdog of 0.2 s."""
+    arguments = ["--ros-args", "-r", "__ns:=/turtlebot2", "-p", "robot:=turtlebot2", "-p", "backend:=mock"]
+    node = PlantNode(make_backend, lambda _code: None, cli_args=arguments)
+
+    def drive() -> None:
+        message = TwistStamped()
+        message.twist.linear.x, message.twist.angular.z = 0.36, -0.9
+        neighbour.drive.publish(message)
+
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: drive() or (bool(neighbour.applied) and neighbour.applied[-1].any()))
+        assert neighbour.applied[-1] == pytest.approx([0.36, -0.9])
+        silent_since = time.monotonic()
+        until(lambda: not neighbour.applied[-1].any())
+        assert 0.5 < time.monotonic() - silent_since < 1.2
+        speeds = np.array([speed for speed, _ in neighbour.applied if 0.0 < speed < 0.36])
+        assert len(speeds) > 5
+        assert np.all(np.diff(speeds) < 0.0)
+        until(lambda: "no command for" in neighbour.said["plant"][0])
         node.stop()

@@ -35,7 +35,9 @@ def command_bytes(bag: Path) -> list[bytes]:
     with file.open("rb") as stream:
         messages = make_reader(stream).iter_messages()
         return [
-            message.data for _, channel, message in messages if channel.topic.endswith("actuators/command")
+            message.data
+            for _, channel, message in messages
+            if channel.topic.endswith(("actuators/command", "cmd_vel"))
         ]
 
 
@@ -192,18 +194,31 @@ def test_evaluation_through_ros_agrees_with_mujoco_alone(ros_domain: RosDomain, 
     assert through_ros["AAS"] == alone["AAS"]
 
 
-@pytest.mark.parametrize("task", ["track_velocities", "go_to_position_with_obstacles", "race_waypoints"])
-def test_through_ros_and_alone_every_kind_of_goal_comes_to_the_same(
-    task: str, ros_domain: RosDomain, tmp_path: Path
-) -> None:
-    """Targets change at the very step at which they do without ROS."""
-    asked = ("evaluate", "turtlebot2", task, "--controller", "classical", "--episodes", "2")
-    asked += ("--episode-s", "26", "--json")
-    through_ros, alone = (
-        json_of(fulmar(*asked, "--through", way, env=ros_domain.env, cwd=tmp_path).stdout)
-        for way in ("ros", "mujoco")
+def test_a_path_is_followed_the_same_way_twice_in_lock_step(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """A goal node between odometry and command: the controller waits for what it says to each state."""
+    asked = ("turtlebot2", "--controller", "classical", "--goals", "circle", "--lockstep", "--duration", "12")
+    summaries = [
+        json_of(fulmar("run", *asked, "--record", name, "--json", env=ros_domain.env, cwd=tmp_path).stdout)
+        for name in ("one", "two")
+    ]
+    one, two = command_bytes(tmp_path / "one"), command_bytes(tmp_path / "two")
+    assert len(one) >= 120
+    assert one == two
+    for summary in summaries:
+        assert summary["failure"] is None
+        assert summary["path_error_m"] < 0.05
+        assert summary["velocity_error_m_s"] == summaries[0]["velocity_error_m_s"]
+        assert (summary["goals_progress"], summary["success"]) == ("0 of 1 rounds", False)
+
+
+def test_places_of_a_file_are_visited_one_after_another(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """The next one comes when the robot has been at one for a while."""
+    (tmp_path / "mine.yaml").write_text(
+        "kind: positions\ntitle: two places\npositions: [[0.0, 0.0], [0.6, 0.0]]\n"
     )
-    assert through_ros["success_rate"] == alone["success_rate"]
-    for name, figure in alone.items():
-        if isinstance(figure, dict):  # what rounding on the wire leaves
-            assert through_ros[name] == pytest.approx(figure, rel=1e-4, abs=1e-6), name
+    asked = ("turtlebot2", "--controller", "classical", "--goals", "mine.yaml", "--start", "-0.6,0,0")
+    done = fulmar("run", *asked, "--lockstep", "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = json_of(done.stdout)
+    assert (summary["task"], summary["success"]) == ("go_to_position", True)
+    assert summary["goals_progress"] == "2 of 2 targets reached"

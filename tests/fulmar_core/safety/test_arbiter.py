@@ -59,6 +59,10 @@ def test_of_two_things_wrong_the_more_severe_is_told(rung):
         assert words in decision.reason
 
 
+def test_what_is_lacking_beside_a_goal_is_told():
+    assert arbitrate(replace(FINE, has_goal=False, lacking="obstacles"), NOW).reason == "no obstacles yet"
+
+
 def test_the_geofence_and_the_timeout_themselves_are_allowed():
     assert arbitrate(replace(FINE, goal_distance=8.0, last_input_ns=NOW - 400 * MS), NOW).may_act
 

@@ -238,7 +238,10 @@ class ControllerNode(LifecycleNode):
     def _follow_mission(self) -> None:
         """Tell the arbiter what the mission says; call with the lock held."""
         distance = self.mission.distance(self._newest.state) if self._newest else float("inf")
-        self._flags = dataclasses.replace(self._flags, has_goal=self.mission.complete, goal_distance=distance)
+        lacking = self.mission.lacking
+        self._flags = dataclasses.replace(
+            self._flags, has_goal=not lacking, lacking=lacking, goal_distance=distance
+        )
 
     def _on_odometry(self, message: Odometry) -> None:
         if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
@@ -260,7 +263,8 @@ class ControllerNode(LifecycleNode):
                 self._newest = measurement
                 changes["last_input_ns"] = now
                 self.mission.turn_to(measurement.stamp_ns)
-                changes["has_goal"] = self.mission.complete
+                changes["lacking"] = self.mission.lacking
+                changes["has_goal"] = not changes["lacking"]
                 changes["goal_distance"] = self.mission.distance(measurement.state)
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
         if self.settings.lockstep:

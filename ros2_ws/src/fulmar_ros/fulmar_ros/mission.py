@@ -40,9 +40,15 @@ class Mission:
         self.obstacles_stamp_ns = 0
 
     @property
+    def lacking(self) -> str:
+        """What the task needs and nobody has told; empty if everything is known."""
+        parts = {"goal": self._goal, "obstacles": self._obstacles, "place of the block": self._block}
+        return next((name for name, part in parts.items() if part is None), "")
+
+    @property
     def complete(self) -> bool:
         """Whether everything is known that the task needs."""
-        return self._goal is not None and self._obstacles is not None and self._block is not None
+        return not self.lacking
 
     @property
     def done(self) -> int:

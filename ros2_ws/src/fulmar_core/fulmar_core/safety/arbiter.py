@@ -29,6 +29,7 @@ class Flags:
     input_timeout_ns: int = 0
     goal_distance: float = 0.0  # [m]
     geofence: float = float("inf")  # [m]
+    lacking: str = "goal"  # what there is none of yet, where `has_goal` is false
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
     if flags.input_problem:
         return Decision(Mode.ARMED, False, flags.input_problem)
     if not flags.has_goal:
-        return Decision(Mode.ARMED, False, "no goal yet")
+        return Decision(Mode.ARMED, False, f"no {flags.lacking} yet")
     if not flags.goal_distance <= flags.geofence:  # so that a distance that is not a number is beyond it too
         return Decision(
             Mode.ARMED,

@@ -1,0 +1,136 @@
+"""Goals and obstacles survive the wire, and what makes no sense is refused with a reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from visualization_msgs.msg import Marker, MarkerArray
+
+from fulmar_core.goal import goal_at
+from fulmar_ros.convert import stamp_ns
+from fulmar_ros.goal_messages import (
+    MOST_OBSTACLES,
+    MOST_WAYPOINTS,
+    goal_message,
+    goal_of,
+    obstacles_message,
+    obstacles_of,
+)
+
+NAN = float("nan")
+COURSE = ((1.0, -2.0, 0.5), (0.0, 3.0, -3.0), (4.0, 4.0, 0.0))
+
+
+@pytest.mark.parametrize("topic", ["goal_pose", "goal_path", "goal_velocity"])
+def test_a_goal_comes_back_as_it_was(topic):
+    targets = COURSE if topic == "goal_path" else COURSE[:1]
+    message = goal_message(goal_at(*targets), topic, 1_500_000_000)
+    goal, problem = goal_of(message)
+    assert problem == ""
+    np.testing.assert_allclose(goal.targets, targets)
+    assert stamp_ns(message.header.stamp) == 1_500_000_000
+
+
+def test_a_point_has_no_heading():
+    goal, _ = goal_of(goal_message(goal_at(COURSE[0]), "goal_point", 0))
+    assert goal.targets.tolist() == [[1.0, -2.0, 0.0]]
+
+
+def test_of_many_targets_a_point_is_the_one_that_counts():
+    goal = goal_at(*COURSE)
+    message = goal_message(
+        type(goal)(goal.targets, np.asarray(1.0), goal.obstacles, goal.block), "goal_point", 0
+    )
+    assert (message.point.x, message.point.y) == (0.0, 3.0)
+
+
+def spoilt(topic, spoil):
+    message = goal_message(goal_at(*COURSE), topic, 0)
+    spoil(message)
+    return message
+
+
+def in_map(message):
+    message.header.frame_id = "map"
+
+
+def nothing(message):
+    message.poses = []
+
+
+def endless(message):
+    message.poses = message.poses[:1] * (MOST_WAYPOINTS + 1)
+
+
+def nan_in_the_middle(message):
+    message.poses[1].pose.position.y = NAN
+
+
+def long_quaternion(message):
+    message.poses[1].pose.orientation.w = 3.0
+
+
+def nan_velocity(message):
+    message.twist.angular.z = NAN
+
+
+def nan_point(message):
+    message.point.x = NAN
+
+
+@pytest.mark.parametrize(
+    ("topic", "spoil", "reason"),
+    [
+        ("goal_point", in_map, "goal frame is 'map', must be 'odom'"),
+        ("goal_path", in_map, "goal frame is 'map', must be 'odom'"),
+        ("goal_velocity", in_map, "goal frame is 'map', must be 'base_link'"),
+        ("goal_path", nothing, "goal has 0 waypoints"),
+        ("goal_path", endless, f"goal has {MOST_WAYPOINTS + 1} waypoints"),
+        ("goal_path", nan_in_the_middle, "not finite"),
+        ("goal_path", long_quaternion, "quaternion has norm"),
+        ("goal_velocity", nan_velocity, "not finite"),
+        ("goal_point", nan_point, "not finite"),
+    ],
+)
+def test_a_goal_without_sense_is_refused_with_a_reason(topic, spoil, reason):
+    goal, problem = goal_of(spoilt(topic, spoil))
+    assert goal is None
+    assert reason in problem
+
+
+def test_obstacles_come_back_as_they_were_without_those_that_are_not_there():
+    discs, problem = obstacles_of(obstacles_message(np.array([[1.0, 2.0, 0.3], [5.0, 5.0, 0.0]]), 7))
+    assert problem == ""
+    np.testing.assert_allclose(discs, [[1.0, 2.0, 0.3]])
+
+
+def test_no_obstacles_are_told_with_a_stamp_and_clear_a_viewer():
+    message = obstacles_message(np.zeros((0, 3)), 7)
+    assert [marker.action for marker in message.markers] == [Marker.DELETEALL]
+    assert stamp_ns(message.markers[0].header.stamp) == 7
+    discs, problem = obstacles_of(message)
+    assert (len(discs), problem) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("x", "diameter", "frame", "reason"),
+    [
+        (NAN, 0.4, "odom", "not finite"),
+        (0.0, NAN, "odom", "not finite"),
+        (0.0, -0.4, "odom", "negative size"),
+        (0.0, 0.4, "map", "obstacle frame is 'map', must be 'odom'"),
+    ],
+)
+def test_an_obstacle_without_sense_is_refused_with_a_reason(x, diameter, frame, reason):
+    message = obstacles_message(np.array([[1.0, 2.0, 0.3]]), 7)
+    marker = message.markers[1]
+    marker.pose.position.x, marker.scale.x, marker.header.frame_id = x, diameter, frame
+    discs, problem = obstacles_of(message)
+    assert discs is None
+    assert reason in problem
+
+
+def test_an_absurd_number_of_obstacles_is_refused():
+    discs, problem = obstacles_of(MarkerArray(markers=[Marker()] * (MOST_OBSTACLES + 1)))
+    assert discs is None
+    assert "obstacles, at most" in problem

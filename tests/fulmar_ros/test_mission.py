@@ -1,0 +1,92 @@
+"""What a controller node has been told to do, and how far it has come."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fulmar_core.goal import goal_at
+from fulmar_core.robot import load_robot
+from fulmar_core.state import planar_state
+from fulmar_core.tasks import load_task
+from fulmar_ros.mission import Mission
+
+S = 1_000_000_000
+ROBOT = load_robot("turtlebot2")
+STILL = np.zeros(2)
+
+
+def mission(task, **how):
+    return Mission(ROBOT, load_task(task), **how)
+
+
+def at(x, y=0.0):
+    return planar_state(x, y, 0.0)
+
+
+def test_a_mission_lacks_its_goal_first_then_what_stands_about():
+    told = mission("go_to_position_with_obstacles")
+    assert told.lacking == "goal"
+    told.give(goal_at((1.0, 0.0, 0.0)), 1)
+    assert told.lacking == "obstacles"
+    told.see_obstacles(np.array([[0.5, 0.0, 0.1]]), 2)
+    assert told.complete
+
+
+def test_the_block_of_each_state_is_waited_for():
+    told = mission("push_block")
+    told.give(goal_at((1.0, 0.0, 0.0)), 1)
+    assert told.lacking == "place of the block"
+    told.see_block(np.array([0.5, 0.0]), 3 * S)
+    assert told.complete
+    assert told.lacks_something_of(4 * S)
+    assert not told.lacks_something_of(3 * S)
+
+
+def test_waypoints_give_way_when_the_robot_is_at_them():
+    told = mission("go_through_positions")
+    told.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), 1)
+    assert told.distance(at(1.0)) == pytest.approx(1.0)
+    for step, x in enumerate((1.0, 0.5, 0.05)):
+        told.observe(at(x), step * S, STILL)
+    assert told.done == 1
+    assert told.distance(at(0.05)) == pytest.approx(2.95)
+
+
+def test_a_new_goal_begins_anew_and_a_streamed_one_only_where_it_differs():
+    course = goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
+    for streamed, done in ((False, 0), (True, 1)):
+        told = mission("go_through_positions", streamed=streamed)
+        assert told.give(course, 1)
+        for step in range(2):
+            told.observe(at(0.0), step * S, STILL)
+        assert told.give(course, 2) is not streamed
+        assert told.done == done
+        assert told.give(goal_at((9.0, 0.0, 0.0)), 3)
+        assert told.done == 0
+
+
+def test_a_streamed_goal_of_each_state_is_waited_for():
+    told = mission("go_to_position", streamed=True)
+    told.give(goal_at((1.0, 0.0, 0.0)), 3 * S)
+    assert told.lacks_something_of(4 * S)
+    assert not told.lacks_something_of(3 * S)
+
+
+def test_velocities_begin_when_their_stamps_say():
+    told = mission("track_velocities")
+    for second in (1, 3):
+        assert not told.give(goal_at((0.1 * second, 0.0, 0.0)), second * S)
+    assert not told.complete
+    seen = []
+    for second in (1, 2, 3):
+        told.turn_to(second * S)
+        seen.append(float(told.observe(at(0.0), second * S, STILL)[0]))
+    assert seen == pytest.approx([0.1, 0.1, 0.3])
+    assert told.distance(at(100.0)) == 0.0
+
+
+def test_nothing_is_near_before_everything_is_known():
+    assert mission("go_to_pose").distance(at(0.0)) == math.inf

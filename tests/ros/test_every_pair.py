@@ -1,0 +1,141 @@
+"""Every robot and every task over the wires: the nodes compute what a loop without ROS does."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from fulmar_bringup.supervisor import Supervisor
+from fulmar_core.backend import Sample
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode, episode_steps
+from fulmar_core.observation import Observer
+from fulmar_core.paths import config_names
+from fulmar_core.planar import planar_of
+from fulmar_core.robot import Robot, Rolling, load_robot
+from fulmar_core.rollout import roll_out_in_backends
+from fulmar_core.tasks import Task, load_task
+from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.runtime import spinning
+from sim_nodes.mujoco_backend import MujocoBackend
+from sim_nodes.sim_node import make_backend
+from tests.conftest import RosDomain
+
+SEED = 5
+LASTS_S = {"track_velocities": 14.0}  # long enough for a second velocity
+BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
+ROBOTS, TASKS = config_names("robots"), config_names("tasks")
+
+
+class Wanderer:
+    """Does something that depends on all that it sees and on what it has seen; reaches nothing."""
+
+    name = "wanderer"
+
+    def __init__(self, robot: Robot, task: Task) -> None:
+        self.observation_names = Observer(robot, task).names
+        self.control_hz = robot.timing.control_hz
+        rng = np.random.default_rng(1)
+        self._scale = robot.actuators.scale * (0.4 if isinstance(robot.actuators, Rolling) else 1.0)
+        shape = (len(self.observation_names), len(robot.actuators.names))
+        self._weights = rng.normal(0.0, 0.4, shape)
+        self._seen = 0
+
+    def reset(self) -> None:
+        self._seen = 0
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        self._seen += 1
+        wave = 0.2 * np.sin(0.3 * self._seen)
+        return self._scale * np.tanh(np.clip(observation, -2.0, 2.0) @ self._weights + wave)
+
+    def metadata(self) -> dict[str, Any]:
+        return {"controller": self.name, "sha256": ""}
+
+
+@pytest.fixture(autouse=True)
+def ros(ros_domain: RosDomain) -> Iterator[None]:
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    yield
+    rclpy.try_shutdown()
+
+
+@contextlib.contextmanager
+def nodes(robot: Robot, task: Task) -> Iterator[tuple[PlantNode, ControllerNode, Supervisor]]:
+    """Plant and controller in lock step, and an operator."""
+
+    def arguments(*more: str) -> list[str]:
+        given = [f"robot:={robot.name}", f"task:={task.name}", "lockstep:=true", *more]
+        options = [word for parameter in given for word in ("-p", parameter)]
+        return ["--ros-args", "-r", f"__ns:=/{robot.name}", *options]
+
+    def fail(error: Exception) -> None:
+        pytest.fail(repr(error))
+
+    operator = Node("operator", namespace=f"/{robot.name}")
+    overseer = Supervisor(operator, robot.name, task)
+    plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments("autostart:=false"))
+    assert plant.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    controller = ControllerNode(
+        lambda *_: Wanderer(robot, task), lambda _code: None, cli_args=arguments("wait_for_subscribers:=1")
+    )
+    with spinning(operator, fail), spinning(plant, fail), spinning(controller, fail):
+        yield plant, controller, overseer
+
+
+def check_pair(robot: Robot, task: Task) -> None:
+    """Run the same two episodes with and without ROS."""
+    scenario = load_scenario("nominal")
+    dt = 1.0 / robot.timing.control_hz
+    steps = round(LASTS_S.get(task.name, BRIEFLY_S) / dt)
+    ways: list[list[tuple[float, ...]]] = [[], []]
+    with nodes(robot, task) as (plant, _, overseer):
+        for number in range(2):
+            episode = draw_episode(robot, task, scenario, seed=SEED, number=number)
+            plant.clock.advance(dt)
+            overseer.give_goal(episode.goal, time_ns=plant.clock.now_ns, alive=lambda: None)
+
+            def on_step(sample: Sample, command: np.ndarray, way: list[Any] = ways[number]) -> None:
+                assert sample.truth is not None
+                truth = planar_of(sample.truth)
+                way.append((float(truth.x), float(truth.y), *command))
+
+            plant.run_episode(episode, number=number, seed=SEED, steps=steps, on_step=on_step)
+    alone = roll_out_in_backends(
+        Wanderer(robot, task),
+        lambda: MujocoBackend.of(robot, task, scenario),
+        task,
+        scenario,
+        episodes=1,
+        seed=SEED,
+    )
+    way = np.array(ways[0])
+    assert episode_steps(task, dt) >= steps
+    moved = np.abs(way[-1, :2] - way[0, :2]).max()
+    assert moved > 0.02, "it stood still: the test shows nothing"
+    np.testing.assert_allclose(way[:, 0], alone.x[0, :steps], atol=1e-4)
+    np.testing.assert_allclose(way[:, 1], alone.y[0, :steps], atol=1e-4)
+    share = np.abs(way[:, 2:]) / robot.actuators.scale
+    np.testing.assert_allclose(share.mean(axis=1), alone.effort[0, :steps], atol=1e-4)
+    assert not np.allclose(ways[0][-1], ways[1][-1]), "two episodes were the same"
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_robot_goes_the_same_way_over_the_wires_as_without_them(robot: str) -> None:
+    """To a position; on its own command wire, with its own names, rate and slew."""
+    check_pair(load_robot(robot), load_task("go_to_position"))
+
+
+@pytest.mark.parametrize("task", [name for name in TASKS if name != "go_to_position"])
+def test_every_task_comes_over_the_wires_as_it_does_without_them(task: str) -> None:
+    """Poses, waypoints, gates, velocities that change, obstacles and the block; with wheels on `cmd_vel`."""
+    check_pair(load_robot("turtlebot2"), load_task(task))
