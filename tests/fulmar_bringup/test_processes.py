@@ -148,7 +148,8 @@ def test_a_child_that_was_stopped_in_its_tracks_is_killed_without_delay(start, t
     ready = tmp_path / "ready"
     group = start("frozen", f"import time, pathlib\npathlib.Path({str(ready)!r}).touch()\ntime.sleep(60)\n")
     wait_for(ready.exists)
-    (child,) = psutil.Process().children()
+    # Other tests of the session may have left helpers of multiprocessing.
+    (child,) = (each for each in psutil.Process().children() if "frozen_program" in " ".join(each.cmdline()))
     child.suspend()
     wait_for(lambda: child.status() == psutil.STATUS_STOPPED)
     began = time.monotonic()

@@ -23,8 +23,8 @@ SIMULATION_START_NS = 1_000_000_000
 class Wire:
     """One topic.
 
-    `delivery` is how publishers offer it: "stream" is reliable with the last 10 kept, "latched" is reliable and
-    transient-local with the last `latest`, "best_effort" keeps the last 10.
+    `delivery` is how publishers offer it: "stream" is reliable with the last 50 kept, "latched" is reliable and
+    transient-local with the last `latest`, "best_effort" keeps the last 50.
     """
 
     name: str

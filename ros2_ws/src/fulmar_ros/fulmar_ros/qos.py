@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from fulmar_core.topics import Wire
 
-STREAM_DEPTH = 10
+STREAM_DEPTH = 50  # a recorder that the machine holds up for as many steps still gets them all
 
 
 def publisher_qos(wire: Wire) -> QoSProfile:
