@@ -25,6 +25,7 @@ MESSAGES = {
     "sensor_msgs",
     "std_msgs",
     "std_srvs",
+    "visualization_msgs",
 }
 
 

@@ -45,6 +45,18 @@ def test_the_block_of_each_state_is_waited_for():
     assert not told.lacks_something_of(3 * S)
 
 
+def test_a_block_that_nobody_has_seen_for_long_is_lacking_until_it_is_seen_again():
+    told = mission("push_block")
+    told.give(goal_at((1.0, 0.0, 0.0)), 1)
+    told.see_block(np.array([0.5, 0.0]), 3 * S)
+    told.turn_to(4 * S)
+    assert told.complete
+    told.turn_to(4 * S + 1)
+    assert told.lacking == "place of the block"
+    told.see_block(np.array([0.5, 0.0]), 5 * S)
+    assert told.complete
+
+
 def test_waypoints_give_way_when_the_robot_is_at_them():
     told = mission("go_through_positions")
     told.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), 1)

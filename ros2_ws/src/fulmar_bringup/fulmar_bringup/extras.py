@@ -17,6 +17,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
         "rosgraph_msgs",
         "sensor_msgs",
         "std_msgs",
+        "visualization_msgs",
     ),
     "sim": ("mujoco",),
     "policy": ("onnxruntime",),

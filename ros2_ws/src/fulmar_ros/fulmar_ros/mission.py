@@ -16,6 +16,8 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_ros.controller_wires import sees_obstacles
 
+BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
+
 
 class Mission:
     """Not thread-safe; the caller holds a lock. Computes with a batch of one, as evaluations do with many."""
@@ -72,9 +74,11 @@ class Mission:
         return True
 
     def turn_to(self, stamp_ns: int) -> None:
-        """Let the goal count that belongs to a time of the plant's clock [ns]."""
+        """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""
         if self._schedule is not None:
             self._goal = self._schedule.at(stamp_ns)
+        if isinstance(self._task, PushBlock) and stamp_ns - self._block_stamp_ns > BLOCK_LASTS_NS:
+            self._block = None
 
     def see_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
         """Take obstacles, shape (m, 3), instead of those known so far."""
