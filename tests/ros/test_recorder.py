@@ -17,6 +17,7 @@ import rclpy
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
@@ -106,10 +107,14 @@ def publish(publisher, stamps, period_s: float = 0.002) -> None:
 
 
 def test_a_stopped_recorder_has_kept_every_message(record, node):
-    node.create_publisher(String, METADATA.name, publisher_qos(METADATA)).publish(String(data="early"))
+    early = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
+    early.publish(String(data="early"))
     recorder = record("run_info:='{\"seed\": 7}'")
     recorder.wait_until_recording()
+    while not early.get_subscription_count():  # endpoints find each other in any order
+        time.sleep(0.01)
     publish(odometry(node), range(500))
+    assert early.wait_for_all_acked(Duration(seconds=5.0))
     code, out, err = recorder.end(signal.SIGINT)
     assert (code, err) == (0, "")
     assert out.startswith("recorded 501 messages")
