@@ -80,7 +80,7 @@ def _lines(goal: Vector, x: np.ndarray, y: np.ndarray, wide: float) -> tuple[np.
     # Inside a disc the way out leads away from its centre, the more the deeper.
     outside, depth = np.maximum(far, wide), np.clip(1.0 - far / wide, 0.0, 1.0)
     half = np.arcsin(wide / outside) + 0.5 * np.pi * depth
-    tangent = np.maximum(np.sqrt(outside * outside - wide * wide), 0.1 * wide)
+    tangent = np.maximum(np.sqrt(np.maximum(outside * outside - wide * wide, 0.0)), 0.1 * wide)
     angles = np.concatenate(
         (np.arctan2(goal[1], goal[0])[..., None], bearing + half, bearing - half), axis=-1
     )
