@@ -55,8 +55,10 @@ class OneWorld:
         drawn = episode.world
         self.world = World(*(np.asarray(getattr(drawn, name), dtype=float)[..., None] for name in FIELDS))
         self.actuation = actuation_of(self._robot, self._safe)
-        self.latest_s = float(self._robot.actuators.response.delay_s + self.world.action_delay[0])
+        late = self.world.action_delay[0] + self.world.opening_delay[0]
+        self.latest_s = float(self._robot.actuators.response.delay_s + late)
         self.outside = tuple(np.zeros(1) for _ in range(3))
+        self._blurred = bool(self.world.velocity_noise[0] or self.world.yaw_rate_noise[0])
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
         self._ticks = 0
         self._begun = 0  # control steps
@@ -114,10 +116,11 @@ class OneWorld:
             period=ticks * self._robot.timing.physics_dt,
             max_delay_s=float(self.world.sensor_delay[0]),
             noisy=self._noisy,
+            blurred=self._blurred,
         )
 
     def _measure(self, truth: RigidBodyState) -> RigidBodyState:
-        if not self._noisy:
+        if not (self._noisy or self._blurred):
             return truth
         true = planar_of(truth)
         steps = np.array([self._measured])

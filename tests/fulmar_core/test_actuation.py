@@ -54,6 +54,17 @@ def test_a_world_s_own_delay_comes_on_top():
     assert seen.sum(axis=0).tolist() == [3.0, 2.0, 1.0]
 
 
+def test_valves_open_late_and_close_at_once():
+    state = actuation(binary=True, delay_s=0.02)
+    late = replace(NOMINAL, opening_delay=np.full(WORLDS, 0.04))
+    state.begin(full(), late, None)
+    assert course(state, 5, latest_s=1.0) == [0.0, 0.0, 0.0, 1.0, 1.0]
+    state.begin(full(), late, None)  # what is open stays open
+    assert course(state, 3, latest_s=1.0) == [1.0, 1.0, 1.0]
+    state.begin(full(0.0), late, None)
+    assert course(state, 3, latest_s=1.0) == [1.0, 0.0, 0.0]
+
+
 def test_slew_bounds_how_fast_an_actuator_changes_each_with_its_own_rate():
     state = actuation(slew=(5.0, 10.0))
     state.begin(full(), NOMINAL, None)

@@ -50,6 +50,17 @@ def test_a_wave_comes_again_after_its_length():
     assert felt(0.7 + np.pi / 2, 0.2, **wave)[0] == pytest.approx(-here[0])
 
 
+def test_an_air_line_pulls_toward_its_anchor_in_proportion_to_the_way_and_turns_about_where_it_is_fastened():
+    line = {"tether_stiffness": 0.05, "anchor_x": 1.0, "anchor_y": -0.5}
+    assert felt(3.0, 0.5, **line) == pytest.approx([-0.1, -0.05, 0.0])
+    yaw, lever = 0.7, 0.2  # the heading of every state of this file
+    fx, fy, torque = felt(3.0, 0.5, **line, tether_x=lever)
+    arm = lever * np.array([np.cos(yaw), np.sin(yaw)])
+    assert [fx, fy] == pytest.approx([-0.1 - 0.05 * arm[0], -0.05 - 0.05 * arm[1]])
+    assert torque == pytest.approx(arm[0] * fy - arm[1] * fx)
+    assert abs(torque) > 1e-4
+
+
 def test_a_kick_lasts_one_control_step_and_comes_once_a_period_but_not_at_the_start():
     kick = {"kick": 0.5, "kick_period": 4.3, "kick_direction": np.pi / 2}
     kicks = [felt(time_s=step * DT, **kick) for step in range(100)]

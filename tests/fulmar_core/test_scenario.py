@@ -14,6 +14,8 @@ from fulmar_core.disturbances.scenario import (
     Push,
     Scenario,
     Sensing,
+    Slope,
+    Tether,
     Wave,
     draw_world,
     load_scenario,
@@ -31,7 +33,9 @@ SEEING = replace(STILL, sensor_noise=True)
 ALL = Scenario(
     "everything happens", sensor_noise=True, body="uncertain",
     push=Push(0.2, 0.1), wave=Wave(0.1, 0.05), kick=Kick(0.3),
-    actuation=Actuation(0.05, (0.8, 1.1), 0.04, 2, 0.5), sensing=Sensing(2.0, 2.0, 0.1, 0.2),
+    tether=Tether((0.02, 0.05), 1.5, 0.1), slope=Slope((1.0, 3.0), 30.0),
+    actuation=Actuation(0.05, 0.0, (0.8, 1.1), 0.04, (0.01, 0.05), 2, 0.5),
+    sensing=Sensing(2.0, 2.0, 0.1, 0.2, (0.01, 0.03), (0.0, 0.02)),
 )  # fmt: skip
 
 # What is changed, by which entry, of which scenario, and which part of a world may differ for it.
@@ -47,10 +51,30 @@ ENTRIES = {
     ),
     "wave.force": (STILL, {"wave": Wave(force=0.1)}, {"wave_force"}),
     "wave.torque": (STILL, {"wave": Wave(torque=0.1)}, {"wave_torque"}),
+    "wave.least": (
+        replace(STILL, wave=Wave(0.1, 0.1)),
+        {"wave": Wave(0.1, 0.1, least=0.9)},
+        {"wave_force", "wave_torque"},
+    ),
     "wave.wave_number": (STILL, {"wave": Wave(wave_number=(5.0, 6.0))}, {"wave_number"}),
     "kick.force": (STILL, {"kick": Kick(force=0.1)}, {"kick"}),
     "kick.every_s": (STILL, {"kick": Kick(every_s=(8.0, 9.0))}, {"kick_period"}),
+    "tether.stiffness": (STILL, {"tether": Tether((0.01, 0.02))}, {"tether_stiffness"}),
+    "tether.reach": (STILL, {"tether": Tether(reach=1.0)}, {"anchor_x", "anchor_y"}),
+    "tether.lever": (STILL, {"tether": Tether(lever=0.1)}, {"tether_x", "tether_y"}),
+    "slope.milliradians": (STILL, {"slope": Slope((1.0, 2.0), 10.0)}, {"force_x", "force_y"}),
+    "slope.direction_deg": (
+        replace(STILL, slope=Slope((1.0, 2.0))),
+        {"slope": Slope((1.0, 2.0), 10.0)},
+        {"force_x", "force_y"},
+    ),
     "actuation.noise": (STILL, {"actuation": Actuation(noise=0.1)}, {"action_noise"}),
+    "actuation.least_noise": (
+        replace(STILL, actuation=Actuation(noise=0.1)),
+        {"actuation": Actuation(noise=0.1, least_noise=0.9)},
+        {"action_noise"},
+    ),
+    "actuation.opening_delay_s": (STILL, {"actuation": Actuation(opening_delay_s=(0.01, 0.02))}, {"opening_delay"}),
     "actuation.gain": (STILL, {"actuation": Actuation(gain=(0.8, 0.9))}, {"gain"}),
     "actuation.delay_s": (STILL, {"actuation": Actuation(delay_s=0.1)}, {"action_delay"}),
     "actuation.failures": (
@@ -67,8 +91,18 @@ ENTRIES = {
     "sensing.bias": (SEEING, {"sensing": Sensing(bias=2.0)}, {"sensor_bias", "sensor_scale"}),
     "sensing.delay_s": (SEEING, {"sensing": Sensing(delay_s=0.1)}, {"sensor_delay"}),
     "sensing.dropout": (SEEING, {"sensing": Sensing(dropout=0.1)}, {"dropout"}),
+    "sensing.velocity_noise": (STILL, {"sensing": Sensing(velocity_noise=(0.0, 0.1))}, {"velocity_noise"}),
+    "sensing.yaw_rate_noise": (STILL, {"sensing": Sensing(yaw_rate_noise=(0.0, 0.1))}, {"yaw_rate_noise"}),
 }  # fmt: skip
-PARTS = {"push": Push, "wave": Wave, "kick": Kick, "actuation": Actuation, "sensing": Sensing}
+PARTS = {
+    "push": Push,
+    "wave": Wave,
+    "kick": Kick,
+    "tether": Tether,
+    "slope": Slope,
+    "actuation": Actuation,
+    "sensing": Sensing,
+}
 
 
 def worlds(scenario, robot=PLATFORM, *, count=COUNT, strength=1.0, seed=7):
@@ -97,6 +131,8 @@ def test_an_entry_changes_what_it_says_and_nothing_else(robot, entry):
     differing = {name for name in FIELDS if not np.array_equal(getattr(before, name), getattr(after, name))}
     if robot is PLATFORM:
         meant = meant - {"drag"}  # nothing drags on air
+    else:
+        meant = meant - {"opening_delay"}  # propellers do not open
     assert differing == meant
 
 
@@ -113,7 +149,8 @@ def test_at_strength_0_a_scenario_is_the_nominal_robot_in_a_still_world(robot, s
 
 
 def test_half_the_strength_is_half_of_the_way():
-    calm, half, full = (worlds(ALL, BOAT, count=100, strength=s) for s in (0.0, 0.5, 1.0))
+    level = replace(ALL, slope=Slope())  # downhill is a product of the slope and of the mass, which both grow
+    calm, half, full = (worlds(level, BOAT, count=100, strength=s) for s in (0.0, 0.5, 1.0))
     for name in set(FIELDS) - {"alive"}:
         middle = 0.5 * (getattr(calm, name) + getattr(full, name))
         np.testing.assert_allclose(getattr(half, name), middle, rtol=1e-9, atol=1e-12, err_msg=name)
@@ -126,7 +163,8 @@ def test_the_ideal_world_is_the_nominal_body_in_stillness(robot):
     assert np.all(world.yaw_inertia == robot.body.inertia[2])
     assert np.all(world.gain == 1.0)
     assert np.all(world.alive == 1.0)
-    for name in ("force_x", "force_y", "torque", "wave_force", "wave_torque", "kick", "noise", "dropout"):
+    quiet = ("wave_force", "wave_torque", "kick", "tether_stiffness", "opening_delay", "velocity_noise")
+    for name in ("force_x", "force_y", "torque", "noise", "dropout", *quiet):
         assert not getattr(world, name).any(), name
 
 
@@ -155,6 +193,34 @@ def test_pushes_point_everywhere_and_are_shares_of_what_the_robot_can_do_itself(
         assert len(quadrants) == 4
         fills(np.abs(world.torque), 0.25 * 0.1 * robot.performance.torque, 0.1 * robot.performance.torque)
         assert 0.4 < np.mean(world.torque > 0.0) < 0.6
+
+
+def test_a_slope_pulls_the_weight_the_same_way_in_every_episode():
+    world = worlds(replace(STILL, slope=Slope((1.0, 3.0), 30.0)))
+    fills(np.hypot(world.force_x, world.force_y), 5.32 * 9.81 * 0.001, 5.32 * 9.81 * 0.003)
+    np.testing.assert_allclose(np.degrees(np.arctan2(world.force_y, world.force_x)), 30.0)
+
+
+def test_an_air_line_is_drawn_within_its_stiffness_reach_and_lever():
+    world = worlds(replace(STILL, tether=Tether((0.02, 0.05), 1.5, 0.1)))
+    fills(world.tether_stiffness, 0.02, 0.05)
+    fills(np.hypot(world.anchor_x, world.anchor_y), 0.0, 1.5)
+    fills(np.hypot(world.tether_x, world.tether_y), 0.0, 0.1)
+
+
+def test_the_least_share_1_makes_every_magnitude_exact():
+    world = worlds(
+        replace(
+            STILL,
+            wave=Wave(0.2, least=1.0),
+            actuation=Actuation(noise=0.05, least_noise=1.0),
+            push=Push(0.4, 0.1, 1.0),
+        )
+    )
+    np.testing.assert_allclose(np.hypot(world.force_x, world.force_y), 0.4, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(world.torque), 0.031, rtol=1e-12)
+    assert np.all(world.wave_force == 0.2)
+    assert np.all(world.action_noise == 0.05)
 
 
 def test_waves_and_kicks_are_shares_of_what_the_robot_can_do_itself():
@@ -227,6 +293,13 @@ def test_a_world_of_a_batch_is_picked_written_and_cast_whole():
         (lambda: Actuation(failure_chance=1.5), "at most 1"),
         (lambda: Wave(force=-1.0), "must not be negative"),
         (lambda: Wave(wave_number=(2.0, 1.0)), "low <= high"),
+        (lambda: Wave(least=1.5), "must lie in"),
+        (lambda: Tether(stiffness=(0.2, 0.1)), "low <= high"),
+        (lambda: Tether(lever=-1.0), "must not be negative"),
+        (lambda: Slope(milliradians=(2.0, 1.0)), "low <= high"),
+        (lambda: Actuation(opening_delay_s=(0.2, 0.1)), "low <= high"),
+        (lambda: Actuation(least_noise=1.5), "must lie in"),
+        (lambda: Sensing(velocity_noise=(0.2, 0.1)), "low <= high"),
         (lambda: Kick(force=-1.0), "must not be negative"),
         (lambda: Kick(every_s=(0.0, 1.0)), "greater than 0"),
         (lambda: Sensing(noise=-1.0), "must not be negative"),

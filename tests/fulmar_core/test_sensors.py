@@ -34,9 +34,11 @@ def alike(**channel):
 class Bench:
     """An odometer that sees the same truth again and again, or one that grows with each step."""
 
-    def __init__(self, spec, count, *, world=None, max_delay_s=0.0, noisy=True, seed=3):
+    def __init__(self, spec, count, *, world=None, max_delay_s=0.0, noisy=True, blurred=False, seed=3):
         self.world = worlds(count) if world is None else world
-        self.odometer = Odometer(spec, seed=seed, period=DT, max_delay_s=max_delay_s, noisy=noisy)
+        self.odometer = Odometer(
+            spec, seed=seed, period=DT, max_delay_s=max_delay_s, noisy=noisy, blurred=blurred
+        )
         self.numbers, self.repeats, self.steps = np.arange(count), np.zeros(count, int), np.zeros(count, int)
 
     def measure(self, *, growing=False, only=None):
@@ -75,6 +77,27 @@ def test_each_column_has_the_noise_of_its_channel_and_no_mean():
 def test_a_world_s_noise_is_a_factor_on_that_of_the_robot():
     error = first(alike(std=0.01), world=worlds(MANY, noise=3.0))
     np.testing.assert_allclose(error.std(axis=1), 0.03, rtol=0.03)
+
+
+@pytest.mark.parametrize("noisy", [False, True], ids=["perfect sensors", "noisy sensors"])
+def test_velocity_noise_of_a_world_is_uniform_to_its_bounds_on_velocities_alone(noisy):
+    world = worlds(
+        MANY, velocity_noise=0.04, yaw_rate_noise=0.02, noise=0.0, sensor_bias=0.0, sensor_scale=0.0
+    )
+    error = first(alike(std=0.01), world=world, noisy=noisy, blurred=True)
+    assert not error[:3].any()
+    most = np.array([0.04, 0.04, 0.02])
+    np.testing.assert_allclose(np.abs(error[3:]).max(axis=1), most, rtol=2e-3)
+    np.testing.assert_allclose(error[3:].std(axis=1), most / np.sqrt(3.0), rtol=0.03)
+    np.testing.assert_allclose(error[3:].mean(axis=1), 0.0, atol=4 * 0.04 / np.sqrt(3.0 * MANY))
+    assert np.abs(np.corrcoef(error[3:]) - np.eye(3)).max() < 4.5 / np.sqrt(MANY)
+
+
+def test_velocity_noise_leaves_every_other_error_as_it_was():
+    world = worlds(50, velocity_noise=0.0, yaw_rate_noise=0.0)
+    plain, blurred = (Bench(everything(), 50, world=world, max_delay_s=0.1, blurred=b) for b in (False, True))
+    for _ in range(5):
+        np.testing.assert_array_equal(plain.measure(growing=True), blurred.measure(growing=True))
 
 
 def test_noise_is_new_with_each_measurement_and_bias_stays():

@@ -32,7 +32,8 @@ def actuation_of(robot: Robot, safe: Array) -> ActuationState:
 
 def longest_delay(robot: Robot, scenario: Scenario) -> float:
     """Until the latest command of any world acts [s]."""
-    return robot.actuators.response.delay_s + scenario.actuation.delay_s
+    actuation = scenario.actuation
+    return robot.actuators.response.delay_s + actuation.delay_s + actuation.opening_delay_s[1]
 
 
 def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:

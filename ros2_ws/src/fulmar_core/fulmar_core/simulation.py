@@ -101,6 +101,7 @@ class BatchSimulation:
             period=self.control_dt,
             max_delay_s=scenario.sensing.delay_s,
             noisy=scenario.sensor_noise,
+            blurred=scenario.sensing.blurred,
         )
         safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
         self._safe = self._real(safe)

@@ -29,6 +29,7 @@ class ActuationState:
         self.gain = array_namespace(safe).ones_like(safe)
         self._since_s = 0.0
         self._late: Array | None = None
+        self._open_late: Array | None = None
         self._slew: Array | None = None
         if response.slew:
             xp = array_namespace(safe)
@@ -65,6 +66,7 @@ class ActuationState:
             self._wanted = (command + world.action_noise * self._scale * noise) * world.alive
         self._since_s = 0.0
         self._late = self._response.delay_s + world.action_delay
+        self._open_late = self._late + world.opening_delay
 
     def advance(self, dt: float, *, latest_s: float) -> Array:
         """Let time pass.
@@ -78,9 +80,11 @@ class ActuationState:
         """
         target = self._wanted
         xp = array_namespace(target)
-        if self._since_s + 0.5 * dt < latest_s:
+        now_s = self._since_s + 0.5 * dt
+        if now_s < latest_s:
             assert self._late is not None
-            target = xp.where(self._since_s + 0.5 * dt < self._late, self._before, target)
+            target = xp.where(now_s < self._open_late, xp.minimum(self._before, target), target)
+            target = xp.where(now_s < self._late, self._before, target)
         self._since_s += dt
         if self._slew is not None:
             most = self._slew * dt

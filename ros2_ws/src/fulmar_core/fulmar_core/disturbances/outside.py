@@ -30,8 +30,23 @@ def outside_wrench(
     since = time_s - world.kick_period * xp.floor(time_s / world.kick_period)
     kicking = (since < control_dt) & (time_s >= world.kick_period)
     kick = xp.where(kicking, world.kick, xp.zeros_like(world.kick))
+    pull_x, pull_y, twist = _tether(state, world)
     return (
-        world.force_x + world.wave_force * across + kick * xp.cos(world.kick_direction),
-        world.force_y + world.wave_force * along + kick * xp.sin(world.kick_direction),
-        world.torque + world.wave_torque * across,
+        world.force_x + world.wave_force * across + kick * xp.cos(world.kick_direction) + pull_x,
+        world.force_y + world.wave_force * along + kick * xp.sin(world.kick_direction) + pull_y,
+        world.torque + world.wave_torque * across + twist,
     )
+
+
+def _tether(state: PlanarState, world: World) -> tuple[Array, Array, Array]:
+    """Pull of an air line that hangs from above, as a pendulum's: in proportion to how far its lower end is aside.
+
+    The end is fastened beside the body's origin, so that the moment depends on the heading. The thesis (§3.5.7) says
+    that the tether applies "a small torque and force", and no more.
+    """
+    xp = array_namespace(state.x)
+    c, s = xp.cos(state.yaw), xp.sin(state.yaw)
+    arm_x, arm_y = c * world.tether_x - s * world.tether_y, s * world.tether_x + c * world.tether_y
+    pull_x = world.tether_stiffness * (world.anchor_x - state.x - arm_x)
+    pull_y = world.tether_stiffness * (world.anchor_y - state.y - arm_y)
+    return pull_x, pull_y, arm_x * pull_y - arm_y * pull_x

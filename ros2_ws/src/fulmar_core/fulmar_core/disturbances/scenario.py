@@ -8,9 +8,11 @@ from typing import Literal
 
 from array_api_compat import array_namespace
 
+from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.config import load_config
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.world import World
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
@@ -38,12 +40,15 @@ class Wave:
 
     force: float = 0.0  # largest amplitude, share of the robot's own [-]
     torque: float = 0.0  # same [-]
+    least: float = 0.0  # smallest, as a share of the largest [-]
     wave_number: Range = (0.25, 3.0)  # [rad/m]
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""
-        if min(self.force, self.torque, self.wave_number[0]) < 0.0:
-            raise ValueError("force, torque and wave_number must not be negative.")
+        if min(self.force, self.torque, self.wave_number[0]) < 0.0 or not 0.0 <= self.least <= 1.0:
+            raise ValueError(
+                "force, torque and wave_number must not be negative, 'least' must lie in [0, 1]."
+            )
         if self.wave_number[0] > self.wave_number[1]:
             raise ValueError("'wave_number' must be [low, high] with low <= high.")
 
@@ -64,12 +69,44 @@ class Kick:
 
 
 @dataclass(frozen=True)
+class Tether:
+    """An air line that hangs from somewhere above: a pendulum's pull, and with it a moment."""
+
+    stiffness: Range = (0.0, 0.0)  # pull per metre aside of the anchor [N/m]
+    reach: float = 0.0  # farthest that the anchor is from the world's origin [m]
+    lever: float = 0.0  # farthest that the line is fastened from the body's origin [m]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        low, high = self.stiffness
+        if min(low, self.reach, self.lever) < 0.0 or low > high:
+            raise ValueError(
+                "'stiffness' must be [low, high] with 0 <= low <= high; reach and lever must not be negative."
+            )
+
+
+@dataclass(frozen=True)
+class Slope:
+    """A floor that is not level: weight pulls the same way everywhere."""
+
+    milliradians: Range = (0.0, 0.0)
+    direction_deg: float = 0.0  # in which it falls, in the world [deg]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if not 0.0 <= self.milliradians[0] <= self.milliradians[1] <= 100.0:
+            raise ValueError("'milliradians' must be [low, high] with 0 <= low <= high <= 100.")
+
+
+@dataclass(frozen=True)
 class Actuation:
     """What may be wrong with the actuators."""
 
     noise: float = 0.0  # largest error at each control step, uniform, as a share of full command [-]
+    least_noise: float = 0.0  # smallest of these, as a share of the largest [-]
     gain: Range = (1.0, 1.0)  # each actuator's own factor, for a whole episode [-]
     delay_s: float = 0.0  # largest delay of commands [s]
+    opening_delay_s: Range = (0.0, 0.0)  # by which closed valves open late; closing does not wait [s]
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
 
@@ -79,6 +116,10 @@ class Actuation:
             raise ValueError("noise, delay, gain and failures must not be negative.")
         if self.gain[0] > self.gain[1] or self.failure_chance > 1.0:
             raise ValueError("'gain' must be [low, high] with low <= high, 'failure_chance' at most 1.")
+        if not 0.0 <= self.opening_delay_s[0] <= self.opening_delay_s[1]:
+            raise ValueError("'opening_delay_s' must be [low, high] with 0 <= low <= high.")
+        if not 0.0 <= self.least_noise <= 1.0:
+            raise ValueError("'least_noise' must lie in [0, 1].")
 
 
 @dataclass(frozen=True)
@@ -89,11 +130,24 @@ class Sensing:
     bias: float = 1.0  # factor on the robot's own biases [-]
     delay_s: float = 0.0  # largest delay beyond the robot's own [s]
     dropout: float = 0.0  # largest chance that a measurement is lost [-]
+    # Beside the noise of the robot's own sensors, and where these are perfect too; uniform, anew each time.
+    velocity_noise: Range = (0.0, 0.0)  # largest error of each measured velocity, for a whole episode [m/s]
+    yaw_rate_noise: Range = (0.0, 0.0)  # same for the turn rate [rad/s]
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""
         if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:
             raise ValueError("noise, bias, delay and dropout must not be negative, 'dropout' at most 1.")
+        for low, high in (self.velocity_noise, self.yaw_rate_noise):
+            if not 0.0 <= low <= high:
+                raise ValueError(
+                    "velocity_noise and yaw_rate_noise must be [low, high] with 0 <= low <= high."
+                )
+
+    @property
+    def blurred(self) -> bool:
+        """Whether measured velocities err beyond the robot's own sensors."""
+        return max(*self.velocity_noise, *self.yaw_rate_noise) > 0.0
 
 
 @dataclass(frozen=True)
@@ -106,6 +160,8 @@ class Scenario:
     push: Push = Push()
     wave: Wave = Wave()
     kick: Kick = Kick()
+    tether: Tether = Tether()
+    slope: Slope = Slope()
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
 
@@ -149,7 +205,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     direction = draws.uniform(-math.pi, math.pi)
     share = draws.uniform(-1.0, 1.0)
     twist = xp.sign(share) * (push.least + (1.0 - push.least) * xp.abs(share))
-    wave_size = draws.uniform(0.0, 1.0)
+    wave_size = draws.uniform(wave.least, 1.0)
     wave_number = draws.uniform(*wave.wave_number)
     phases = draws.uniform(-math.pi, math.pi, 2)
     kick_size, kick_period = draws.uniform(0.0, 1.0), draws.uniform(*kick.every_s)
@@ -157,9 +213,19 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     faults, sensing = scenario.actuation, scenario.sensing
     gain_share, lottery = draws.uniform(0.0, 1.0, count), draws.uniform(0.0, 1.0, count)
     chances = draws.uniform(0.0, 1.0, count)
-    delay, noise = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
+    delay, noise = draws.uniform(0.0, 1.0), draws.uniform(faults.least_noise, 1.0)
     bias, scale = draws.normal(1.0, 6), draws.normal(1.0, 6)
     sensor_delay, dropout = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
+    tether, slope = scenario.tether, scenario.slope
+    stiffness = draws.uniform(*tether.stiffness)
+    reach, anchor_bearing = draws.uniform(0.0, tether.reach), draws.uniform(-math.pi, math.pi)
+    lever, lever_bearing = draws.uniform(0.0, tether.lever), draws.uniform(-math.pi, math.pi)
+    fall = strength * 1e-3 * draws.uniform(*slope.milliradians)
+    opening_delay = draws.uniform(*faults.opening_delay_s)
+    velocity_noise = draws.uniform(*sensing.velocity_noise)
+    yaw_rate_noise = draws.uniform(*sensing.yaw_rate_noise)
+    downhill = mass * GRAVITY * xp.sin(fall)
+    valves = 1.0 if isinstance(robot.actuators, Thrusters) else 0.0
     low, high = faults.gain
     gain = 1.0 + strength * (low + (high - low) * gain_share - 1.0)
     own = 1.0 if scenario.sensor_noise else 0.0  # what the robot's YAML says of its sensors
@@ -174,18 +240,26 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
         alive=_survivors(lottery, chances, faults, strength),
         action_noise=zero + strength * faults.noise * noise,
         action_delay=strength * faults.delay_s * delay,
-        force_x=size * xp.cos(direction),
-        force_y=size * xp.sin(direction),
+        opening_delay=strength * valves * opening_delay,
+        force_x=size * xp.cos(direction) + downhill * math.cos(math.radians(slope.direction_deg)),
+        force_y=size * xp.sin(direction) + downhill * math.sin(math.radians(slope.direction_deg)),
         torque=strength * torque * push.torque * twist,
         wave_force=strength * force * wave.force * wave_size,
         wave_torque=strength * torque * wave.torque * wave_size,
         wave_number=wave_number,
         wave_phase_x=phases[:, 0],
         wave_phase_y=phases[:, 1],
+        tether_stiffness=strength * stiffness,
+        tether_x=strength * lever * xp.cos(lever_bearing),
+        tether_y=strength * lever * xp.sin(lever_bearing),
+        anchor_x=strength * reach * xp.cos(anchor_bearing),
+        anchor_y=strength * reach * xp.sin(anchor_bearing),
         kick=strength * force * kick.force * kick_size,
         kick_period=kick_period,
         kick_direction=kick_direction,
         noise=zero + own * (1.0 + strength * (sensing.noise - 1.0)),
+        velocity_noise=strength * velocity_noise,
+        yaw_rate_noise=strength * yaw_rate_noise,
         sensor_bias=(own * (1.0 + strength * (sensing.bias - 1.0)) * bias).T,
         sensor_scale=(own * (1.0 + strength * (sensing.bias - 1.0)) * scale).T,
         sensor_delay=strength * sensing.delay_s * sensor_delay,

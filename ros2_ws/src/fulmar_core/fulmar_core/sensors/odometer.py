@@ -60,7 +60,14 @@ class Odometer:
     """Measures a batch of worlds, once every `period` seconds; remembers what it held back."""
 
     def __init__(
-        self, spec: OdometrySpec, *, seed: int, period: float, max_delay_s: float = 0.0, noisy: bool = True
+        self,
+        spec: OdometrySpec,
+        *,
+        seed: int,
+        period: float,
+        max_delay_s: float = 0.0,
+        noisy: bool = True,
+        blurred: bool = False,
     ) -> None:
         """Prepare.
 
@@ -70,9 +77,12 @@ class Odometer:
             period: Time between two calls of `measure` [s].
             max_delay_s: Longest delay that worlds add to the spec's own [s].
             noisy: False: perfect, and at once.
+            blurred: Whether worlds have velocity noise of their own, which perfect sensors have too.
         """
+        spec = spec if noisy else OdometrySpec()
         self._spec, self._seed, self._noisy, self._period = spec, seed, noisy, period
-        self._every = max(1, round(1.0 / (spec.rate_hz * period))) if spec.rate_hz and noisy else 1
+        self._blurred = blurred
+        self._every = max(1, round(1.0 / (spec.rate_hz * period))) if spec.rate_hz else 1
         longest = spec.delay_s + max_delay_s if noisy else 0.0
         self._depth = int(np.ceil(longest / period - 1e-9)) + 1 if longest > 0.0 else 1
         self._constants: dict[str, Array] = {}
@@ -105,7 +115,7 @@ class Odometer:
         Returns:
             Measured state, shapes (n,).
         """
-        if not self._noisy:
+        if not (self._noisy or self._blurred):
             return truth
         xp = array_namespace(truth.x)
         if only is not None:
@@ -113,11 +123,11 @@ class Odometer:
         columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
         if self._keys is None:
             self._keys = world_keys(self._seed, numbers, repeats, NOISE)
-        bits = words(self._keys, steps, 7)
+        bits = words(self._keys, steps, self._words)
         reading = self._disturbed(columns, world, bits)
         if self._depth > 1:
             reading = self._delayed(reading, world)
-        lost = uniform_from(bits[6], columns.dtype) < world.dropout
+        lost = uniform_from(bits[6], columns.dtype) < (world.dropout if self._noisy else 0.0)
         if self._every > 1:
             lost = lost | (steps % self._every != 0)
         if self._held is not None:
@@ -136,12 +146,17 @@ class Odometer:
         assert self._keys is not None
         for every, some in zip(self._keys, keys, strict=True):
             every[only] = some
-        reading = self._disturbed(columns, world, words(keys, 0, 7))
+        reading = self._disturbed(columns, world, words(keys, 0, self._words))
         # Copies: who was given these readings keeps them.
         self._held, *self._past = (xp.asarray(old, copy=True) for old in (self._held, *self._past))
         for old in (self._held, *self._past):
             old[:, only] = reading
         return PlanarState(*(self._held[i] for i in range(6)))
+
+    @property
+    def _words(self) -> int:
+        """Random words for a measurement of one world."""
+        return 10 if self._blurred else 7
 
     def _constant(self, part: str, like: Array) -> Array:
         if part not in self._constants:
@@ -158,6 +173,16 @@ class Odometer:
         if "std" in self._used:
             noise = normal_from(bits[:6], columns.dtype) * world.noise
             columns = columns + self._constant("std", columns) * noise
+        if self._blurred:
+            share = 2.0 * uniform_from(bits[7:10], columns.dtype) - 1.0
+            error = (
+                world.velocity_noise * share[0],
+                world.velocity_noise * share[1],
+                world.yaw_rate_noise * share[2],
+            )
+            columns = xp.stack(
+                (*(columns[i] for i in range(3)), *(columns[3 + i] + error[i] for i in range(3)))
+            )
         if "limit" in self._used:
             limit = self._constant("limit", columns)
             most = xp.where(limit > 0.0, limit, xp.full_like(limit, xp.inf))
