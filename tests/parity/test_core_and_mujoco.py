@@ -12,6 +12,7 @@ from fulmar_core.dynamics.rigid_body import Disturbance, MassProperties, step
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.observation import slewed
+from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Rolling, load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
@@ -228,11 +229,37 @@ def test_mujoco_moves_under_every_disturbance_as_the_batch_does(name, atol):
     np.testing.assert_allclose(ours.position_error, batch.position_error, rtol=0, atol=atol)
 
 
-@pytest.mark.parametrize("scenario", ["nominal", "randomised"])
+OF_DRIFT = [name for name in config_names("scenarios") if name.startswith(("drift_", "lab_"))]
+
+
+class Bursts(Swaying):
+    """Two or three valves at a time, others from second to second."""
+
+    def act(self, observation):
+        self.k += 1
+        rng = np.random.default_rng(self.k // 5)
+        return (rng.uniform(size=(len(observation), 8)) > 0.7).astype(float)
+
+
+@pytest.mark.parametrize("scenario", OF_DRIFT)
+def test_mujoco_moves_under_each_disturbance_of_drift_as_the_batch_does(scenario):
+    task = replace(load_task("drift_go_to_pose"), episode_s=20.0)
+    given = {"task": task, "scenario": load_scenario(scenario), "episodes": 4, "seed": 3}
+    batch = roll_out_in_batch(Bursts(PLATFORM), PLATFORM, **given)
+    ours = roll_out_in_backends(
+        Bursts(PLATFORM), lambda: MujocoBackend.of(PLATFORM, task, given["scenario"]), **given
+    )
+    # The batch is float32: rounding, grown over 20 s of spinning.
+    np.testing.assert_allclose(ours.position_error, batch.position_error, rtol=0, atol=5e-3)
+    np.testing.assert_allclose(np.sin(ours.heading_error - batch.heading_error), 0.0, atol=5e-3)
+    assert np.ptp(batch.position_error, axis=1).min() > 0.1  # they did move
+
+
+@pytest.mark.parametrize("scenario", ["nominal", "randomised", "drift_velocity_noise_4", "lab_mocap"])
 def test_odometry_errs_in_mujoco_as_in_the_batch_number_by_number(scenario):
     scenario = load_scenario(scenario)
     simulation = BatchSimulation(PLATFORM, POSE, scenario, worlds=3, seed=4, dtype=np.float64)
-    backends = [MujocoBackend(PLATFORM) for _ in range(3)]
+    backends = [MujocoBackend.of(PLATFORM, POSE, scenario) for _ in range(3)]
     samples = [
         backend.reset(draw_episode(PLATFORM, POSE, scenario, seed=4, number=i), seed=4, number=i)
         for i, backend in enumerate(backends)
