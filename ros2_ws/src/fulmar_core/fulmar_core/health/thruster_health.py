@@ -1,0 +1,165 @@
+"""Which valves work, and what pushes from outside, told from commands and odometry.
+
+A bank of Kalman filters, one for each set of at most two lost valves: multiple-model estimation (Magill 1965, "Optimal
+adaptive estimation of sampled stochastic processes"; Bar-Shalom, Li and Kirubarajan 2001, §11.6). Each filter believes
+in its own set, moves the body under the thrust that the other valves then have, and estimates a force that is constant
+in the world and a constant torque. How well each foretells the next measurement tells how likely its set is.
+
+A lost valve stays closed, and under a shared pressure line leaves its share to the others, as in the simulators
+(`ActuationState.begin`): with two valves commanded and one of them lost, the other gives the whole thrust.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.errors import ConfigError
+from fulmar_core.health.push_filter import PushFilter
+from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.robot import Robot
+
+MOST_LOST = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What is believed now."""
+
+    effectiveness: np.ndarray  # (..., n) expected share of its thrust that each valve gives, 0 to 1 [-]
+    alive: np.ndarray  # (..., n) 1 or 0, of the likeliest set [-]
+    push: np.ndarray  # (..., 3) force from outside along the world's x and y [N], torque [N·m]
+
+
+class ThrusterHealth:
+    """The bank, for one robot or for many at once."""
+
+    def __init__(self, robot: Robot, suspicion: Suspicion | None = None) -> None:
+        """List the hypotheses.
+
+        Args:
+            robot: A planar robot with thrusters, on air.
+            suspicion: How far to trust what.
+
+        Raises:
+            ConfigError: The robot has no thrusters, or swims.
+        """
+        if not can_be_watched(robot):
+            raise ConfigError(
+                f"the health of '{robot.name}' cannot be told: it is no body on air with thrusters."
+            )
+        assert isinstance(robot.actuators, Thrusters)
+        self._robot, self._suspicion = robot, suspicion or Suspicion()
+        self._shared = robot.actuators.shared_pressure
+        count = len(robot.actuators.nozzles)
+        lost = [each for size in range(MOST_LOST + 1) for each in itertools.combinations(range(count), size)]
+        self._alive = np.array([[float(i not in each) for i in range(count)] for each in lost])
+        wrench = (
+            robot.actuators.thrust * robot.actuators.wrench_per_newton[:, [0, 1, 5]]
+        )  # ahead, left, yaw moment
+        self._doing = np.hstack((wrench, np.ones((count, 1))))  # and how many valves share the pressure
+        failure = self._suspicion.failure
+        chances = [failure ** len(each) * (1.0 - failure) ** (count - len(each)) for each in lost]
+        self._prior = np.array(chances) / sum(chances)
+        self._filters: dict[int, PushFilter] = {}
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._state: np.ndarray | None = None  # (..., hypotheses, 9): pose, velocity, push
+        self._chance = self._prior
+        self._count = 0
+
+    def see(self, measured: PlanarState, command: np.ndarray, dt: float) -> Health:
+        """Take a measurement.
+
+        Args:
+            measured: Odometry now, shapes (...,).
+            command: What was commanded since the last measurement, shape (..., n); another shape begins anew.
+            dt: How long that was, a multiple of the physics step [s].
+
+        Returns:
+            What is believed now.
+        """
+        command = np.asarray(command, dtype=float)
+        seen = np.empty((*command.shape[:-1], 6))
+        for i, name in enumerate(COLUMNS):
+            seen[..., i] = getattr(measured, name)
+        if self._state is None or self._state.shape[:-2] != seen.shape[:-1]:
+            self._begin(seen)
+        else:
+            self._follow(seen, command, dt)
+        return self._believed()
+
+    def _begin(self, seen: np.ndarray) -> None:
+        self._state = np.zeros((*seen.shape[:-1], len(self._alive), 9))
+        self._state[..., :6] = seen[..., None, :]
+        self._chance = np.broadcast_to(self._prior, self._state.shape[:-1])
+        self._yaw = seen[..., 2].copy()
+        self._count = 0
+
+    def _follow(self, seen: np.ndarray, command: np.ndarray, dt: float) -> None:
+        assert self._state is not None
+        equations = self._equations(dt)
+        turned = self._turn(seen[..., 2]) @ equations.driven
+        ahead = self._state @ equations.step + self._wrenches(command) @ turned
+        off = seen[..., None, :] - ahead[..., :6]
+        off[..., 2] = _wrapped(off[..., 2])
+        found = off @ equations.gain(self._count)
+        self._count += 1
+        self._state = ahead + found[..., :9]
+        odd = found[..., 9:]
+        surprise = 0.5 * (odd * odd).sum(axis=-1)
+        surprise -= surprise.min(axis=-1, keepdims=True)
+        chance = self._chance * np.exp(-np.minimum(surprise, self._suspicion.surprise))
+        change = self._suspicion.change * dt
+        chance *= (1.0 - change) / chance.sum(axis=-1, keepdims=True)
+        self._chance = chance + change * self._prior
+
+    def _wrenches(self, command: np.ndarray) -> np.ndarray:
+        """Force ahead, to the left and yaw moment of the valves under each hypothesis, shape (..., hypotheses, 3)."""
+        doing = (command[..., None, :] * self._alive) @ self._doing
+        if not self._shared:
+            return doing[..., :3]
+        return doing[..., :3] / np.maximum(doing[..., 3:], 1.0)
+
+    def _turn(self, yaw: np.ndarray) -> np.ndarray:
+        """From the body's frame to the world's, half-way between the last heading and this one, shape (..., 3, 3)."""
+        middle = self._yaw + 0.5 * _wrapped(yaw - self._yaw)
+        self._yaw = yaw.copy()
+        turn = np.zeros((*yaw.shape, 3, 3))
+        turn[..., 0, 0] = turn[..., 1, 1] = np.cos(middle)
+        turn[..., 0, 1] = np.sin(middle)
+        turn[..., 1, 0] = -turn[..., 0, 1]
+        turn[..., 2, 2] = 1.0
+        return turn
+
+    def _equations(self, dt: float) -> PushFilter:
+        steps = max(1, round(dt / self._robot.timing.physics_dt))
+        if steps not in self._filters:
+            seconds = steps * self._robot.timing.physics_dt
+            self._filters[steps] = PushFilter(self._robot, self._suspicion, seconds)
+        return self._filters[steps]
+
+    def _believed(self) -> Health:
+        assert self._state is not None
+        best = np.argmax(self._chance, axis=-1)
+        return Health(
+            self._chance @ self._alive,
+            self._alive[best],
+            (self._chance[..., None, :] @ self._state[..., 6:])[..., 0, :],
+        )
+
+
+def _wrapped(angle: np.ndarray) -> np.ndarray:
+    """As `planar.wrapped`, without asking which library an array is of: this runs at every control step."""
+    return angle - 2.0 * np.pi * np.round(angle * (0.5 / np.pi))
+
+
+def can_be_watched(robot: Robot) -> bool:
+    """Whether the health of a robot's actuators can be told."""
+    return isinstance(robot.actuators, Thrusters) and robot.body.planar and robot.hydrodynamics is None

@@ -1,0 +1,172 @@
+"""Which valves work, told from commands and odometry alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.disturbances.scenario import Actuation, Push, Scenario, Wave, load_scenario
+from fulmar_core.errors import ConfigError
+from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.thruster_health import ThrusterHealth, can_be_watched
+from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import load_robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import load_task
+
+ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+PLATFORM, TASK = ROBOTS["floating_platform"], load_task("drift_go_to_pose")
+STILL = Scenario("nothing happens", sensor_noise=False, body="nominal")
+DT = 0.2
+WORLDS = 32
+
+
+class Watched:
+    """Worlds whose valves open at random, one or two at a time, and an estimator that looks on."""
+
+    def __init__(self, scenario, *, robot=PLATFORM, worlds=WORLDS, seed=3):
+        self.simulation = BatchSimulation(
+            robot, TASK, scenario, worlds=worlds, seed=seed, control_hz=1.0 / DT
+        )
+        self.health = ThrusterHealth(robot)
+        self.rng = np.random.default_rng(seed)
+        self.dead = np.asarray(self.simulation.world.alive).T < 0.5
+        self.believed = self.health.see(self.simulation.measured, np.zeros((worlds, 8)), DT)
+
+    def go(self, steps, *, valves=2):
+        """Belief in each valve after each step, shape (steps, worlds, 8)."""
+        seen = []
+        for _ in range(steps):
+            lots = self.rng.uniform(size=(self.simulation.worlds, 8))
+            command = (lots.argsort(axis=1).argsort(axis=1) < self.rng.integers(0, valves + 1)).astype(float)
+            self.simulation.step(command)
+            self.believed = self.health.see(self.simulation.measured, command, DT)
+            seen.append(self.believed.effectiveness)
+        return np.array(seen)
+
+
+CONDITIONS = [name for name in config_names("scenarios") if name.startswith("drift_")]
+
+
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_under_every_condition_of_the_benchmark_lost_valves_are_found_and_no_other_is_accused(name):
+    watched = Watched(load_scenario(name))
+    seen = watched.go(75)
+    working = np.broadcast_to(~watched.dead, seen.shape)
+    assert seen[working].min() > 0.5
+    assert np.all(seen[-1][watched.dead] < 0.1)
+    assert np.all(watched.believed.alive == ~watched.dead)
+
+
+def test_a_lost_valve_is_found_with_its_first_or_second_command():
+    scenario = replace(STILL, actuation=Actuation(failures=1, failure_chance=1.0))
+    watched = Watched(scenario)
+    before = watched.believed
+    for _ in range(2):
+        command = watched.dead.astype(float)
+        watched.simulation.step(command)
+        watched.believed = watched.health.see(watched.simulation.measured, command, DT)
+    assert np.all(before.effectiveness > 0.9)
+    assert np.all(watched.believed.effectiveness[watched.dead] < 0.2)
+    assert np.all(watched.believed.effectiveness[~watched.dead] > 0.8)
+
+
+def test_force_and_torque_from_outside_are_told_from_lost_valves():
+    scenario = replace(
+        STILL, push=Push(0.2, 0.16, least=1.0), actuation=Actuation(failures=2, failure_chance=1.0)
+    )
+    watched = Watched(scenario)
+    watched.go(100)
+    world, push = watched.simulation.world, watched.believed.push
+    np.testing.assert_allclose(push[:, 0], world.force_x, atol=0.06)
+    np.testing.assert_allclose(push[:, 1], world.force_y, atol=0.06)
+    np.testing.assert_allclose(push[:, 2], world.torque, atol=0.02)
+    assert np.all(watched.believed.alive == ~watched.dead)
+
+
+def test_a_valve_that_dies_in_the_middle_of_an_episode_is_found_and_one_that_comes_back_is_believed_again():
+    watched = Watched(STILL, worlds=4)
+    watched.go(50)
+    watched.simulation.world.alive[2] = 0.0
+    seen = watched.go(75)
+    assert np.all(seen[-1][:, 2] < 0.1)
+    watched.simulation.world.alive[2] = 1.0
+    seen = watched.go(75)
+    assert np.all(seen[-1] > 0.9)
+
+
+def test_what_is_never_commanded_is_neither_accused_nor_acquitted():
+    watched = Watched(replace(STILL, push=Push(0.1, 0.0, least=1.0)), worlds=4)
+    for _ in range(50):
+        watched.simulation.step(np.zeros((4, 8)))
+        watched.believed = watched.health.see(watched.simulation.measured, np.zeros((4, 8)), DT)
+    np.testing.assert_allclose(watched.believed.effectiveness, 1.0 - Suspicion().failure, atol=0.01)
+    np.testing.assert_allclose(np.hypot(*watched.believed.push[:, :2].T), 0.1, atol=0.01)
+
+
+def test_an_uneven_floor_is_no_lost_valve():
+    watched = Watched(replace(STILL, wave=Wave(0.2, least=1.0, wave_number=(3.0, 3.0))))
+    assert watched.go(100).min() > 0.5
+
+
+@pytest.mark.parametrize("shared", [True, False], ids=["one pressure line", "a pressure line each"])
+def test_valves_that_open_by_degrees_are_watched_as_well(shared):
+    robot = ROBOTS["modular_freeflyer"]
+    robot = replace(robot, actuators=replace(robot.actuators, shared_pressure=shared))
+    watched = Watched(replace(STILL, actuation=Actuation(failures=1, failure_chance=1.0)), robot=robot)
+    watched.go(60)
+    assert np.all(watched.believed.alive == ~watched.dead)
+
+
+def test_one_robot_is_judged_as_in_a_batch():
+    many = Watched(load_scenario("drift_one_lost"), worlds=3)
+    alone = ThrusterHealth(PLATFORM)
+    rng = np.random.default_rng(1)
+    one = None
+    for step in range(30):
+        command = (rng.uniform(size=(3, 8)) > 0.8).astype(float)
+        many.simulation.step(command)
+        all_three = many.health.see(many.simulation.measured, command, DT)
+        if step == 0:
+            many.health.reset()
+            all_three = many.health.see(many.simulation.measured, command, DT)
+        one = alone.see(many.simulation.measured[1], command[1], DT)
+    assert one is not None
+    np.testing.assert_allclose(one.effectiveness, all_three.effectiveness[1], atol=1e-6)
+    np.testing.assert_allclose(one.push, all_three.push[1], atol=1e-6)
+
+
+def test_after_a_reset_nothing_of_the_past_counts():
+    watched = Watched(load_scenario("drift_two_lost"), worlds=4)
+    watched.go(60)
+    assert watched.believed.effectiveness.min() < 0.1
+    watched.health.reset()
+    fresh = watched.health.see(watched.simulation.measured, np.zeros((4, 8)), DT)
+    assert fresh.effectiveness.min() > 0.9
+    assert not fresh.push.any()
+
+
+def test_a_turn_across_the_half_circle_is_no_surprise():
+    health = ThrusterHealth(PLATFORM)
+    zero = np.float64(0.0)
+    for k in range(20):
+        yaw = np.float64((3.0 + 0.1 * k + np.pi) % (2.0 * np.pi) - np.pi)
+        believed = health.see(PlanarState(zero, zero, yaw, zero, zero, np.float64(0.5)), np.zeros(8), DT)
+    assert abs(believed.push[2]) < 1e-3
+
+
+def test_robots_that_roll_or_swim_are_refused():
+    for name, robot in ROBOTS.items():
+        assert can_be_watched(robot) == (name in ("floating_platform", "modular_freeflyer"))
+    with pytest.raises(ConfigError, match="kingfisher"):
+        ThrusterHealth(ROBOTS["kingfisher"])
+
+
+def test_suspicions_without_meaning_are_refused():
+    with pytest.raises(ValueError, match="greater than 0"):
+        Suspicion(velocity=0.0)
+    with pytest.raises(ValueError, match="one half"):
+        Suspicion(failure=0.6)
