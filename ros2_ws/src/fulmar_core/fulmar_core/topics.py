@@ -69,6 +69,14 @@ ACTUATORS_STATE = Wire(
     "every plant tick",
     "what was really applied, after limits and watchdog; `effort` by actuator name",
 )
+ACTUATORS_HEALTH = Wire(
+    "actuators/health",
+    "sensor_msgs/msg/JointState",
+    "controller",
+    "best_effort",
+    "control rate, where there are thrusters",
+    "share of its thrust that each valve is believed to give, 0 to 1; `effort` by actuator name",
+)
 CLOCK = Wire(
     "/clock",
     "rosgraph_msgs/msg/Clock",
@@ -188,6 +196,7 @@ WIRES: tuple[Wire, ...] = (
     IMU,
     TRUTH,
     ACTUATORS_STATE,
+    ACTUATORS_HEALTH,
     CLOCK,
     COMMAND,
     VELOCITY_COMMAND,

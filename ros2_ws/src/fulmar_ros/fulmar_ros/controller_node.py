@@ -16,7 +16,9 @@ from visualization_msgs.msg import MarkerArray
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
+from fulmar_core.planar import planar_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.command_gate import Rejections, command_problem
@@ -103,6 +105,7 @@ class ControllerNode(LifecycleNode):
         for _ in range(WARM_UP):
             self.controller.act(np.zeros(len(self.controller.observation_names)))
         self.controller.reset()
+        self._informer, self._seen_ns = Informer(self.robot, self.controller), 0
         self.wires = ControllerWires(
             self,
             self.robot,
@@ -291,6 +294,8 @@ class ControllerNode(LifecycleNode):
             decision = arbitrate(self._flags, time.monotonic_ns())
             observation = self._observe(measurement) if decision.may_act and measurement else None
         stamp = measurement.stamp_ns if measurement else 0
+        if measurement is not None and not self._watch_actuators(measurement):
+            return
         command = self.robot.actuators.safe_command
         if observation is not None:
             command = self._act(observation, stamp)
@@ -299,6 +304,26 @@ class ControllerNode(LifecycleNode):
         self._answered_ns, self._answer = stamp, command
         self._steps += 1
         self._tell_status(decision)
+
+    def _watch_actuators(self, measurement: Measurement) -> bool:
+        """Compare what was commanded with how the body moved; false where the controller cannot bear to hear it."""
+        passed_ns = measurement.stamp_ns - self._seen_ns
+        if passed_ns == 0:  # by the clock, one measurement may serve twice
+            return True
+        if not 0 < passed_ns <= self._pause_ns:
+            self._informer.reset()
+        self._seen_ns = measurement.stamp_ns
+        wanted = self.wires.health_wanted
+        try:
+            health = self._informer.see(
+                planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted
+            )
+        except Exception as error:  # noqa: BLE001 - as in `_act`
+            self._give_up(f"the controller raised {type(error).__name__}: {error}", measurement.stamp_ns)
+            return False
+        if health is not None and wanted:
+            self.wires.publish_actuators_health(health.effectiveness, measurement.stamp_ns)
+        return True
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""

@@ -17,12 +17,14 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import (
     ACTION,
+    ACTUATORS_HEALTH,
     BLOCK,
     DIAGNOSTICS,
     GOAL_WIRES,
@@ -82,6 +84,11 @@ class ControllerWires:
         self._command = node.create_publisher(kind, wire.name, publisher_qos(wire))
         self._observation = node.create_publisher(JointState, OBSERVATION.name, publisher_qos(OBSERVATION))
         self._action = node.create_publisher(JointState, ACTION.name, publisher_qos(ACTION))
+        self._health = None
+        if can_be_watched(robot):
+            self._health = node.create_publisher(
+                JointState, ACTUATORS_HEALTH.name, publisher_qos(ACTUATORS_HEALTH)
+            )
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
         diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
@@ -94,9 +101,11 @@ class ControllerWires:
             self._metadata,
             status,
             diagnostics,
+            *([self._health] if self._health else []),
         )
         self._write_command = self._command_writer()
         self._write_action = VectorWriter(robot.actuators.names)
+        self._write_health = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(controller.observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
         goal = GOAL_WIRES[task.goal_topic]
@@ -147,6 +156,16 @@ class ControllerWires:
             self._observation.publish(self._write_observation.write(observation, stamp))
         if self._action.get_subscription_count():
             self._action.publish(self._write_action.write(action, stamp))
+
+    @property
+    def health_wanted(self) -> bool:
+        """Whether somebody listens to the health of the actuators."""
+        return self._health is not None and bool(self._health.get_subscription_count())
+
+    def publish_actuators_health(self, effectiveness: np.ndarray, stamp: int) -> None:
+        """Publish what is believed of each actuator; only where that is wanted."""
+        assert self._health is not None
+        self._health.publish(self._write_health.write(effectiveness, stamp))
 
     def publish_metadata(self, metadata: dict[str, Any]) -> None:
         """Say who controls."""

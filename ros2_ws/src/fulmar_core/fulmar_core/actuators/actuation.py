@@ -29,7 +29,7 @@ class ActuationState:
         self.gain = array_namespace(safe).ones_like(safe)
         self._since_s = 0.0
         self._late: Array | None = None
-        self._open_late: Array | None = None
+        self._open_late: Array | None = None  # until closed valves are open
         self._slew: Array | None = None
         if response.slew:
             xp = array_namespace(safe)
@@ -82,7 +82,7 @@ class ActuationState:
         xp = array_namespace(target)
         now_s = self._since_s + 0.5 * dt
         if now_s < latest_s:
-            assert self._late is not None
+            assert self._late is not None and self._open_late is not None
             target = xp.where(now_s < self._open_late, xp.minimum(self._before, target), target)
             target = xp.where(now_s < self._late, self._before, target)
         self._since_s += dt

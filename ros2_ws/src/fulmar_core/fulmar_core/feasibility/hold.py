@@ -61,7 +61,7 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
         b_eq=np.tile(-push, 6),
         bounds=[(0.0, 1.0)] * (6 * count) + [(None, None)],
     )
-    return float(found.x[-1]) if found.success else -np.inf
+    return float(found.x[-1]) if found.x is not None else -np.inf
 
 
 def can_hold(

@@ -124,8 +124,8 @@ class ThrusterHealth:
         """Force ahead, to the left and yaw moment of the valves under each hypothesis, shape (..., hypotheses, 3)."""
         doing = (command[..., None, :] * self._alive) @ self._doing
         if not self._shared:
-            return doing[..., :3]
-        return doing[..., :3] / np.maximum(doing[..., 3:], 1.0)
+            return np.asarray(doing[..., :3])
+        return np.asarray(doing[..., :3] / np.maximum(doing[..., 3:], 1.0))
 
     def _turn(self, yaw: np.ndarray) -> np.ndarray:
         """From the body's frame to the world's, half-way between the last heading and this one, shape (..., 3, 3)."""
