@@ -178,7 +178,7 @@ def test_a_damaged_bundle_is_missing_with_its_reason(tmp_path):
 
 
 def test_the_fault_of_one_unit_is_a_sentence_and_costs_no_other(tmp_path, monkeypatch):
-    def broken(unit, progress):
+    def broken(unit, progress, *, pool=None):
         raise RuntimeError("it broke")
 
     unit = unit_of(tmp_path, way="ros", episodes=1)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fulmar_bringup.judged_task import task_of
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import load_scenario
@@ -15,8 +16,11 @@ from fulmar_core.episode import Episode, draw_episodes
 from fulmar_core.metrics import Trajectories, episode_metrics, successes, summarise
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import WORLDS, batches, roll_out_in_backends
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks import Task
 from fulmar_core.waypoint_score import bound_figures, has_bound, waypoint_bound
+
+if TYPE_CHECKING:
+    from fulmar_bringup.ros_evaluation import RosPool
 
 WAYS = ("batch", "mujoco", "ros")
 BOUNDED_EPISODES = 256  # whose bound `evaluate` computes: a boat's takes 40 ms each
@@ -41,8 +45,7 @@ class Trial:
     @property
     def task(self) -> Task:
         """The task, with the length of its episodes."""
-        task = load_task(self.plan.task)
-        return replace(task, episode_s=self.plan.duration_s) if self.plan.duration_s else task
+        return task_of(self.plan)
 
     def controller(self) -> Controller:
         """The controller, made anew."""
@@ -57,12 +60,15 @@ class Trial:
         return draw_episodes(self.robot, self.task, scenario, seed=self.plan.seed, numbers=numbers)
 
 
-def runs_of(trial: Trial, progress: Progress = lambda steps: None) -> Iterator[Trajectories]:
+def runs_of(
+    trial: Trial, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
+) -> Iterator[Trajectories]:
     """Run the episodes of a trial, in their order.
 
     Args:
         trial: What to run.
         progress: Told how many control steps have been done.
+        pool: Processes that stay for one trial after another, through ros; by default it has its own.
 
     Yields:
         What happened, for the next so many episodes.
@@ -76,7 +82,10 @@ def runs_of(trial: Trial, progress: Progress = lambda steps: None) -> Iterator[T
     if trial.through == "ros":
         from fulmar_bringup.ros_evaluation import roll_out_through_ros
 
-        yield roll_out_through_ros(plan, episodes=trial.episodes, jobs=trial.jobs, progress=progress)
+        if pool is not None:
+            yield pool.roll_out(plan, episodes=trial.episodes, progress=progress)
+        else:
+            yield roll_out_through_ros(plan, episodes=trial.episodes, jobs=trial.jobs, progress=progress)
         return
     robot, scenario, controller = trial.robot, load_scenario(plan.scenario), trial.controller()
     if trial.through == "batch":

@@ -25,6 +25,7 @@ class NodeSpec:
     module: str  # the same as a Python module
     namespace: str
     parameters: dict[str, Parameter] = field(default_factory=dict)
+    quiet: bool = False  # says only what is wrong
 
 
 @dataclass(frozen=True)

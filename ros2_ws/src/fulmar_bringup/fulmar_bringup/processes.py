@@ -117,6 +117,7 @@ def command_line(spec: NodeSpec) -> list[str]:
     arguments = ["-r", f"__ns:={spec.namespace}", "-r", f"__node:={spec.name}"]
     for key, value in spec.parameters.items():
         arguments += ["-p", f"{key}:={_yaml(value)}"]
+    arguments += ["--log-level", "warn"] if spec.quiet else []
     return [sys.executable, "-m", spec.module, "--ros-args", *arguments]
 
 

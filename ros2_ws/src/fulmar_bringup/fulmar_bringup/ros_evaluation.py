@@ -23,22 +23,24 @@ import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.domains import reserved_domains
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
+from fulmar_bringup.judged_task import task_of
+from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, run_goals_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode, episode_steps
+from fulmar_core.episode import Episode, draw_episode, episode_steps
 from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
 from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import SWITCH_INTERVAL_S, end_with_parent, spinning
 from sim_nodes.sim_node import make_backend
 
 Progress = Callable[[int], None]
+Alive = Callable[[], None]
 STOPS = (signal.SIGINT, signal.SIGTERM)  # what ends a worker, with its children, at any time
 
 
@@ -64,21 +66,43 @@ def roll_out_through_ros(
         RunFailed: The controller ended or refused to start.
         LockstepError: It did not answer in time.
     """
-    jobs = min(jobs, episodes)
-    shares = [range(first, episodes, jobs) for first in range(jobs)]
-    spawn = multiprocessing.get_context("spawn")  # a fork would copy threads of DDS that do not survive it
-    counts = [spawn.Value("q", 0) for _ in shares]
-    pool = ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts, os.getpid()))
-    with reserved_domains(jobs) as domains, _shut_down_in_the_end(pool):
+    with ros_pool(min(jobs, episodes)) as pool:
+        return pool.roll_out(plan, episodes=episodes, progress=progress)
+
+
+class RosPool:
+    """Worker processes, each with a ROS domain of its own, that stay for one evaluation after another."""
+
+    def __init__(self, executor: ProcessPoolExecutor, counts: list[Any], domains: list[int]) -> None:
+        """Take what `ros_pool` has made; a counter of control steps and a domain for each worker."""
+        self._executor, self._counts, self._domains = executor, counts, domains
+
+    def roll_out(
+        self, plan: RunPlan, *, episodes: int, progress: Progress = lambda steps: None
+    ) -> Trajectories:
+        """Run episodes; arguments, result and errors as of `roll_out_through_ros`."""
+        jobs = min(len(self._domains), episodes)
+        shares = [range(first, episodes, jobs) for first in range(jobs)]
+        for count in self._counts:
+            count.value = 0
         # Workers inherit that signals are held back, until they are ready for them: none is lost.
         with _signals_held_back():
             futures = [
-                pool.submit(_work, plan, share, domain, index)
-                for index, (share, domain) in enumerate(zip(shares, domains, strict=True))
+                self._executor.submit(_work, plan, share, self._domains[index], index)
+                for index, share in enumerate(shares)
             ]
-        _wait_for_all(futures, lambda: progress(sum(count.value for count in counts)))
-        runs = [future.result() for future in futures]
-    return _in_order(runs, shares)
+        _wait_for_all(futures, lambda: progress(sum(count.value for count in self._counts)))
+        return _in_order([future.result() for future in futures], shares)
+
+
+@contextlib.contextmanager
+def ros_pool(jobs: int) -> Iterator[RosPool]:
+    """A pool of so many workers until the context ends."""
+    spawn = multiprocessing.get_context("spawn")  # a fork would copy threads of DDS that do not survive it
+    counts = [spawn.Value("q", 0) for _ in range(jobs)]
+    executor = ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts, os.getpid()))
+    with reserved_domains(jobs) as domains, _shut_down_in_the_end(executor):
+        yield RosPool(executor, counts, domains)
 
 
 def _wait_for_all(futures: list[Future[Trajectories]], tick: Callable[[], None]) -> None:
@@ -182,7 +206,7 @@ def _episodes(
     numbers: range,
     progress: Progress,
 ) -> Trajectories:
-    robot, task, scenario = load_robot(plan.robot), _task_of(plan), load_scenario(plan.scenario)
+    robot, task, scenario = load_robot(plan.robot), task_of(plan), load_scenario(plan.scenario)
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
     steps = episode_steps(task, control_dt)
     runs: list[Trajectories] = []
@@ -206,7 +230,6 @@ def _episodes(
         episode = draw_episode(robot, task, scenario, seed=plan.seed, number=number)
         # The same instant twice would be the same goal: the clock moves on between episodes.
         plant.clock.advance(control_dt)
-        overseer.give_goal(episode.goal, time_ns=plant.clock.now_ns, alive=alive)
         log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, episode.goal, control_dt)
 
         def on_step(
@@ -216,17 +239,36 @@ def _episodes(
             truth = planar_of(sample.truth)
             log.add(truth, judge.see(truth, sample.block), command)
 
-        try:
-            plant.run_episode(episode, number=number, seed=plan.seed, steps=steps, on_step=on_step)
-        except LockstepError:
-            raise_if_ended()  # a controller that has ended is a better reason than its silence
-            raise
+        with _goal_told(plan, episode, plant, overseer, group, alive):
+            try:
+                plant.run_episode(episode, number=number, seed=plan.seed, steps=steps, on_step=on_step)
+            except LockstepError:
+                raise_if_ended()  # a controller that has ended is a better reason than its silence
+                raise
         runs.append(log.trajectories())
         progress(done * steps)
     return join(runs)
 
 
-def _task_of(plan: RunPlan) -> Task:
-    """The task, with the length of its episodes."""
-    task = load_task(plan.task)
-    return replace(task, episode_s=plan.duration_s) if plan.duration_s else task
+@contextlib.contextmanager
+def _goal_told(
+    plan: RunPlan, episode: Episode, plant: PlantNode, overseer: Supervisor, group: ProcessGroup, alive: Alive
+) -> Iterator[None]:
+    """While an episode lasts: the supervisor has told its goal, or a goal node tells it with each odometry."""
+    if not plan.goals:
+        overseer.give_goal(episode.goal, time_ns=plant.clock.now_ns, alive=alive)
+        yield
+        return
+    # A new node for each episode: it goes on along its path from where it was.
+    spec = replace(run_goals_spec(plan), quiet=True)
+    group.start(spec)
+    try:
+        while plant.wires.subscribers() < 2:
+            alive()
+            time.sleep(0.005)
+        yield
+    finally:
+        group.stop(spec.name)
+        while plant.wires.subscribers() > 1:
+            alive()
+            time.sleep(0.005)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of what is kept over time
-FIGURE = "figure:"  # prefix of figures in a file
+FIGURE, MORE = "figure:", "more:"  # prefixes of figures and of further arrays in a file
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,13 @@ class Judged:
     targets: np.ndarray  # (kept, k, 3) as in `Goal`
     goals: np.ndarray  # (kept, steps) targets reached, or over
     obstacles: np.ndarray  # (kept, m, 3) x, y, radius [m]
+    more: dict[str, np.ndarray] = field(default_factory=dict)  # whatever else a benchmark keeps
 
     def save(self, path: Path) -> None:
         """Write one file, whole or not at all."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {FIGURE + name: values for name, values in self.figures.items()}
+        arrays |= {MORE + name: values for name, values in self.more.items()}
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = path.with_suffix(f".{os.getpid()}.part")
         with unfinished.open("wb") as file:
@@ -47,10 +49,18 @@ class Judged:
             OSError, ValueError, KeyError: It is no such file.
         """
         with np.load(path, allow_pickle=False) as file:
-            figures = {name.removeprefix(FIGURE): file[name] for name in file.files if FIGURE in name}
+            named = {
+                prefix: {
+                    name.removeprefix(prefix): file[name] for name in file.files if name.startswith(prefix)
+                }
+                for prefix in (FIGURE, MORE)
+            }
             return cls(
-                json.loads(str(file["about"])), figures=figures, **{name: file[name] for name in _ARRAYS}
+                json.loads(str(file["about"])),
+                figures=named[FIGURE],
+                more=named[MORE],
+                **{name: file[name] for name in _ARRAYS},
             )
 
 
-_ARRAYS = tuple(field.name for field in fields(Judged) if field.name not in ("about", "figures"))
+_ARRAYS = tuple(each.name for each in fields(Judged) if each.name not in ("about", "figures", "more"))

@@ -55,13 +55,15 @@ def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) ->
     Returns:
         The pair, perhaps with a reason why nobody does.
     """
-    return _with_policy(robot, task, policies) if kind == "policy" else _classical(robot, task)
+    if kind == "policy":
+        return with_policy(robot, task, (policies or policies_directory()) / f"{robot}_{task}")
+    return with_law(robot, task, "classical")
 
 
-def _with_policy(robot: str, task: str, policies: Path | None) -> Pair:
+def with_policy(robot: str, task: str, folder: Path) -> Pair:
+    """A pair that the bundle of a folder drives, or why it cannot."""
     from policy_server.policy import Policy
 
-    folder = (policies or policies_directory()) / f"{robot}_{task}"
     if not folder.is_dir():
         return Pair(robot, task, "policy", reason="no policy is shipped")
     try:
@@ -80,17 +82,24 @@ def _with_policy(robot: str, task: str, policies: Path | None) -> Pair:
     )
 
 
-def _classical(robot: str, task: str) -> Pair:
+def with_law(robot: str, task: str, name: str) -> Pair:
+    """A pair that a controller without a bundle drives, or why it cannot.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+        name: Of the controller, one of `system.CONTROLLERS`.
+    """
     from fulmar_bringup.system import CONTROLLERS
 
-    the_robot, the_task, name = load_robot(robot), load_task(task), "classical"
+    the_robot, the_task = load_robot(robot), load_task(task)
     try:
         controller = CONTROLLERS[name].load(the_robot, the_task, the_robot.timing.control_hz, "")
     except ConfigError as error:
-        return Pair(robot, task, name, reason=str(error))
+        return Pair(robot, task, "classical", reason=str(error))
     told = controller.metadata()
     law = str(getattr(controller, "law", name))
-    return Pair(robot, task, name, name, law=law, sha256=str(told["sha256"]))
+    return Pair(robot, task, "classical", name, law=law, sha256=str(told["sha256"]))
 
 
 def units_of(
@@ -120,7 +129,7 @@ def units_of(
         lockstep=True,
     )
     return [
-        Unit(Trial(plan, way, episodes, worlds, jobs), _hash(pair.sha256, code_hash(way)), folder)
+        Unit(Trial(plan, way, episodes, worlds, jobs), hash_of(pair.sha256, code_hash(way)), folder)
         for way, episodes in ways.items()
     ]
 
@@ -133,11 +142,12 @@ def code_hash(way: str) -> str:
     ]
     files += sorted(
         path
-        for family in ("robots", "tasks", "scenarios", "controllers")
+        for family in ("robots", "tasks", "scenarios", "controllers", "goals")
         for path in (config_directory() / family).glob("*.yaml")
     )
-    return _hash(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))
+    return hash_of(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))
 
 
-def _hash(*parts: str) -> str:
+def hash_of(*parts: str) -> str:
+    """SHA-256 of some texts in their order."""
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

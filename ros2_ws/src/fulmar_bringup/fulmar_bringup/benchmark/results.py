@@ -83,7 +83,7 @@ def _way(outcome: Judged) -> dict[str, Any]:
     return entry
 
 
-_OF_THE_PAIR = ("key", "robot", "task", "controller", "through", "same_at_64_worlds")
+_OF_THE_PAIR = ("key", "robot", "task", "controller", "through", "same_at_64_worlds", "goals")
 
 
 def _value(outcome: Judged, figure: str, episodes: int | None = None) -> float:

@@ -7,6 +7,7 @@ import json
 import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,11 +20,29 @@ from fulmar_core.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.planar import wrapped
 from fulmar_core.waypoint_score import bound_figures, has_bound
 
+if TYPE_CHECKING:
+    from fulmar_bringup.ros_evaluation import RosPool
+
 KEPT = 48  # episodes whose paths are kept
 FEW_WORLDS = 64  # of the second run in batch, which must give the same numbers
 COMPARED = 256  # episodes of that second run
 # How long one step takes, in steps of a batch; for the progress bar.
 STEP_COSTS = {"batch": 1.0, "mujoco": 120.0, "ros": 600.0}
+
+
+class Extra:
+    """Gathers nothing; others have more arrays to keep of some runs, and more figures."""
+
+    def add(self, run: Trajectories) -> None:
+        """Take note of some more episodes, all their steps."""
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What to keep, by name."""
+        return {}
+
+    def figures(self) -> dict[str, np.ndarray]:
+        """Further figures of all episodes so far, shapes (episodes,)."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -33,6 +52,10 @@ class Unit:
     trial: Trial
     defines: str  # hash of whatever else the outcome depends on: code, configuration, controller
     folder: Path
+
+    def extra(self) -> Extra:
+        """What is gathered beside what every benchmark keeps."""
+        return Extra()
 
     @property
     def name(self) -> str:
@@ -68,12 +91,13 @@ class Unit:
         return judged if judged.about.get("key") == self.key else None
 
 
-def judge(unit: Unit, progress: Progress = lambda steps: None) -> Judged:
+def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None) -> Judged:
     """Run and judge a unit, and keep the outcome in its file.
 
     Args:
         unit: What to do.
         progress: Told how many steps have been done, of `cost`.
+        pool: Processes that stay for one unit after another, through ros.
 
     Returns:
         The outcome.
@@ -82,16 +106,17 @@ def judge(unit: Unit, progress: Progress = lambda steps: None) -> Judged:
     trial, weight = _long(unit.trial), STEP_COSTS[unit.trial.through]
     short = unit.trial.task
     steps = episode_steps(short, _control_dt(trial))
-    tally, errors, kept = Tally(short), [], _Kept()
+    tally, errors, kept, extra = Tally(short), [], _Kept(), unit.extra()
     goals: list[np.ndarray] = []
-    for run in runs_of(trial, lambda done: progress(int(weight * done))):
+    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool):
         beginning = first_steps(run, steps)
         tally.add(beginning)
         errors.append(_main_column(run, short))
         kept.add(beginning)
+        extra.add(beginning)
         goals.append(run.goals)
     drawn = trial.drawn(np.arange(trial.episodes))
-    figures, about = tally.figures, _about(unit, tally.steps)
+    figures, about = tally.figures | extra.figures(), _about(unit, tally.steps)
     if counts_targets(short):
         _count_goals(trial, drawn, np.concatenate(goals), figures, about, unit.folder)
     if trial.through == "batch":
@@ -109,6 +134,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None) -> Judged:
         targets=np.asarray(sample.goal.targets),
         goals=kept.goals,
         obstacles=np.asarray(sample.goal.obstacles),
+        more=extra.arrays(),
     )
     outcome.save(unit.path)
     return outcome
@@ -166,6 +192,7 @@ def _about(unit: Unit, steps: int) -> dict[str, object]:
         "controller": trial.plan.controller,
         "through": trial.through,
         "scenario": trial.plan.scenario,
+        "goals": trial.plan.goals,
         "seed": trial.plan.seed,
         "control_hz": trial.plan.control_hz,
         "control_dt": _control_dt(trial),

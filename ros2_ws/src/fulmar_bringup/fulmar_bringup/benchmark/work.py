@@ -9,11 +9,14 @@ import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.unit import Unit, judge
 from fulmar_core.errors import RunFailed
+
+if TYPE_CHECKING:
+    from fulmar_bringup.ros_evaluation import RosPool
 
 Outcome = Judged | str  # a sentence where a unit failed
 Done = Callable[[Unit, Outcome], None]
@@ -48,11 +51,21 @@ def do_all(
     pooled = [unit for unit in ordered if unit.trial.through != "ros"]
     if pooled:
         _in_a_pool(pooled, min(jobs, len(pooled)), progress, note)
-    done = sum(unit.cost for unit in pooled)
-    for unit in apart:
-        note(unit, _outcome_of(unit, lambda steps, done=done: progress(done + steps)))
-        done += unit.cost
+    if apart:
+        _through_ros(apart, jobs, sum(unit.cost for unit in pooled), progress, note)
     return outcomes
+
+
+def _through_ros(
+    units: list[Unit], jobs: int, done: float, progress: Callable[[float], None], note: Done
+) -> None:
+    """One after another, each on all workers: these are the deployed nodes, started once for all."""
+    from fulmar_bringup.ros_evaluation import ros_pool
+
+    with ros_pool(jobs) as pool:
+        for unit in units:
+            note(unit, _outcome_of(unit, lambda steps, done=done: progress(done + steps), pool))
+            done += unit.cost
 
 
 def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], note: Done) -> None:
@@ -122,8 +135,8 @@ def _work(unit: Unit, index: int) -> Outcome:
     return outcome
 
 
-def _outcome_of(unit: Unit, progress: Callable[[int], None]) -> Outcome:
+def _outcome_of(unit: Unit, progress: Callable[[int], None], pool: RosPool | None = None) -> Outcome:
     try:
-        return judge(unit, progress)
+        return judge(unit, progress, pool=pool)
     except Exception as error:  # noqa: BLE001 - the fault of one pair must not cost the others their figures
         return f"{type(error).__name__}: {error}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from fulmar_bringup.commands.benchmark_drift import drift
 from fulmar_bringup.commands.benchmark_roboran import roboran
 from fulmar_bringup.commands.benchmark_throughput import throughput
 from fulmar_bringup.commands.benchmark_training import training
@@ -13,6 +14,7 @@ benchmark = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
+benchmark.command()(drift)
 benchmark.command()(roboran)
 benchmark.command()(throughput)
 benchmark.command()(training)

@@ -86,8 +86,8 @@ def roboran(
     from fulmar_core.paths import config_names
 
     load_scenario(scenario)
-    ways = _chosen(through, "way", tuple(EPISODES))
-    kinds = _chosen(controllers, "kind of controller", KINDS)
+    ways = chosen(through, "way", tuple(EPISODES))
+    kinds = chosen(controllers, "kind of controller", KINDS)
     if "policy" in kinds:
         require("onnxruntime")
     if "mujoco" in ways or "ros" in ways:
@@ -95,8 +95,8 @@ def roboran(
     if report:
         require("matplotlib")
     request = Request(
-        robots=ROBOTS if robots is None else _chosen(robots, "robot", tuple(config_names("robots"))),
-        tasks=TASKS if tasks is None else _chosen(tasks, "task", tuple(config_names("tasks"))),
+        robots=ROBOTS if robots is None else chosen(robots, "robot", tuple(config_names("robots"))),
+        tasks=TASKS if tasks is None else chosen(tasks, "task", tuple(config_names("tasks"))),
         kinds=kinds,
         episodes={way: episodes or EPISODES[way] for way in ways},
         seed=seed,
@@ -132,7 +132,7 @@ def roboran(
         raise typer.Exit(FAILED)
 
 
-def _chosen(text: str, family: str, known: tuple[str, ...]) -> tuple[str, ...]:
+def chosen(text: str, family: str, known: tuple[str, ...]) -> tuple[str, ...]:
     """Names with commas between them, in the order of those known; "all" for each of them.
 
     Raises:

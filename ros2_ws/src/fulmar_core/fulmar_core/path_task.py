@@ -1,0 +1,73 @@
+"""A path that is followed by velocities, as a task: what the goal node tells a robot, for many at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.goal_files import FollowedPath
+from fulmar_core.planar import PlanarState, at_rest, to_body
+from fulmar_core.references.look_ahead import LookAhead
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks.track_velocities import TrackVelocities
+
+
+@dataclass(frozen=True)
+class FollowPath(TrackVelocities):
+    """Track the velocity that leads along a closed path without end, by `LookAhead`, without turning.
+
+    `Goal.done` counts the points of the path that have been passed. In NumPy only.
+    """
+
+    path: LookAhead
+
+    def __post_init__(self) -> None:
+        """Refuse paths that end."""
+        if not self.path.closed or self.path.loops:
+            raise ValueError("a path to be judged on must be closed and have no last round (loops: 0).")
+
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+        """Draw a start at rest, anywhere on the path and with any heading."""
+        count = len(self.path.points)
+        index = np.floor(draws.uniform(0.0, 1.0) * count) % count
+        yaw = draws.uniform(-math.pi, math.pi)
+        places = self.path.points[index.astype(int)]
+        state = at_rest(places[:, 0], places[:, 1], yaw)
+        targets = np.zeros((len(yaw), 1, 3))
+        goal = Goal(targets, index, no_obstacles(draws.worlds), np.zeros((len(yaw), 2)))
+        return state, self.advance(goal, state, np.zeros_like(yaw))
+
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The velocity towards the aim, from where the robot is; arguments and steps as of `LookAhead.aim`."""
+        path, count = self.path, len(self.path.points)
+        ahead = max(1, round(path.look_ahead / path.spacing))
+        here = np.stack((state.x, state.y), axis=-1)
+        passed = np.asarray(goal.done).astype(int)
+        window = passed[..., None] + np.arange(min(2 * ahead, count - 1) + 1)
+        offsets = path.points[window % count] - here[..., None, :]
+        passed = passed + np.argmin(np.sum(offsets * offsets, axis=-1), axis=-1)
+        way = path.points[(passed + ahead) % count] - here
+        speed = path.speed / np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
+        u, v = to_body(np.asarray(state.yaw), way[..., 0] * speed, way[..., 1] * speed)
+        target = np.stack((u, v, np.zeros_like(u)), axis=-1)[..., None, :]
+        targets = np.asarray(target, dtype=goal.targets.dtype)
+        return Goal(targets, passed.astype(goal.targets.dtype), goal.obstacles, goal.block)
+
+    def off_path(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Distance to the nearest point of the whole path, shapes (n,) [m]."""
+        points = self.path.points
+        return np.array(
+            [math.sqrt(np.min(np.sum((points - place) ** 2, axis=1))) for place in np.stack((x, y), -1)]
+        )
+
+
+def path_task(task: TrackVelocities, file: FollowedPath) -> FollowPath:
+    """The task of following a path, with the tolerances and the observation of tracking velocities."""
+    told = {field.name: getattr(task, field.name) for field in dataclasses.fields(task)}
+    return FollowPath(**told, path=file.planner())
