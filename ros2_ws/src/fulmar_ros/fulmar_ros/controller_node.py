@@ -314,6 +314,9 @@ class ControllerNode(LifecycleNode):
             self._informer.reset()
         self._seen_ns = measurement.stamp_ns
         wanted = self.wires.health_wanted
+        if not (wanted or self._informer.listens):
+            self._seen_ns = 0  # whoever comes to listen later begins anew
+            return True
         try:
             health = self._informer.see(
                 planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted

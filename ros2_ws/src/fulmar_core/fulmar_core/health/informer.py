@@ -29,6 +29,11 @@ class Informer:
         self._health = ThrusterHealth(robot) if can_be_watched(robot) else None
         self._listener = controller if isinstance(controller, Informed) else None
 
+    @property
+    def listens(self) -> bool:
+        """Whether the controller wants to know."""
+        return self._listener is not None
+
     def reset(self) -> None:
         """Forget everything: time jumped, or a new episode began."""
         if self._health is not None:
