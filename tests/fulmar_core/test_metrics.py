@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episodes
 from fulmar_core.figures import FIGURES
 from fulmar_core.goal import goal_at, stack_goals
 from fulmar_core.metrics import (
@@ -23,6 +25,7 @@ from fulmar_core.metrics import (
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.trajectories import COLUMNS
 
 POSE, POSITION = load_task("go_to_pose"), load_task("go_to_position")
 VELOCITIES, WAYPOINTS = load_task("track_velocities"), load_task("go_through_positions")
@@ -277,3 +280,22 @@ def test_the_judge_counts_waypoints_by_the_tolerance_and_not_by_the_reach_of_con
     state = states(between, 0.0, 0.0)[0]
     assert WAYPOINTS.advance(goal, state, np.asarray(0.0)).done == 0.0
     assert judge.see(state).done == 1.0
+
+
+@pytest.mark.parametrize("task", [POSE, WAYPOINTS], ids=lambda task: task.name)
+def test_a_whole_episode_noted_at_once_is_what_its_steps_are(task):
+    drawn = draw_episodes(PLATFORM, task, load_scenario("nominal"), seed=5, numbers=np.arange(1))[0]
+    rng = np.random.default_rng(5)
+    truths = [PlanarState(*np.cumsum(row)) for row in rng.normal(size=(12, 6))]
+    commands = list(rng.integers(0, 2, (12, 8)).astype(float))
+    judge = Judge(task, drawn.goal, DT)
+    goals = [judge.see(truth) for truth in truths]
+    single, whole = (TrajectoryLog(PLATFORM, task, DT) for _ in range(2))
+    for truth, goal, command in zip(truths, goals, commands, strict=True):
+        single.add(truth, goal, command)
+    whole.add_episode(truths, goals, commands)
+    one, other = single.trajectories(), whole.trajectories()
+    for name in COLUMNS:
+        left, right = getattr(one, name), getattr(other, name)
+        assert left.dtype == right.dtype
+        np.testing.assert_array_equal(left, right, err_msg=name)

@@ -31,8 +31,9 @@ from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode, episode_steps
 from fulmar_core.errors import LockstepError, RunFailed
+from fulmar_core.goal import Goal
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
-from fulmar_core.planar import planar_of
+from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
@@ -210,6 +211,7 @@ def _episodes(
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
     steps = episode_steps(task, control_dt)
     runs: list[Trajectories] = []
+    log = TrajectoryLog(robot, task, control_dt)
 
     began = time.monotonic()
 
@@ -230,14 +232,23 @@ def _episodes(
         episode = draw_episode(robot, task, scenario, seed=plan.seed, number=number)
         # The same instant twice would be the same goal: the clock moves on between episodes.
         plant.clock.advance(control_dt)
-        log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, episode.goal, control_dt)
+        judge = Judge(task, episode.goal, control_dt)
+        truths: list[PlanarState] = []
+        goals: list[Goal] = []
+        commands: list[np.ndarray] = []
 
         def on_step(
-            sample: Sample, command: np.ndarray, log: TrajectoryLog = log, judge: Judge = judge
+            sample: Sample,
+            command: np.ndarray,
+            judge: Judge = judge,
+            truths: list[PlanarState] = truths,
+            goals: list[Goal] = goals,
+            commands: list[np.ndarray] = commands,
         ) -> None:
             assert sample.truth is not None
-            truth = planar_of(sample.truth)
-            log.add(truth, judge.see(truth, sample.block), command)
+            truths.append(planar_of(sample.truth))
+            goals.append(judge.see(truths[-1], sample.block))
+            commands.append(np.array(command))
 
         with _goal_told(plan, episode, plant, overseer, group, alive):
             try:
@@ -245,6 +256,7 @@ def _episodes(
             except LockstepError:
                 raise_if_ended()  # a controller that has ended is a better reason than its silence
                 raise
+        log.add_episode(truths, goals, commands)
         runs.append(log.trajectories())
         progress(done * steps)
     return join(runs)

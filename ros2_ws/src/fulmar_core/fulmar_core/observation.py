@@ -41,7 +41,11 @@ class Observer:
         """
         terms = self._task.observe(state, goal)
         xp = array_namespace(state.x)
-        columns = [xp.broadcast_to(xp.asarray(term), state.x.shape) for term in terms]
+        shape = state.x.shape
+        columns = [
+            term if getattr(term, "shape", None) == shape else xp.broadcast_to(xp.asarray(term), shape)
+            for term in terms
+        ]
         if self._remembers:
             scale = xp.asarray(self._scale, dtype=previous_command.dtype, device=device(previous_command))
             share = previous_command / scale

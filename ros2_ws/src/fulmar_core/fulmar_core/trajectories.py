@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
+from fulmar_core.goal import Goal, stack_goals
+from fulmar_core.planar import PlanarState, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.push_block import PushBlock
@@ -78,6 +78,25 @@ class TrajectoryLog:
             kept = np.empty(value.shape if name == "shares" else shape, dtype)
             kept[...] = value
             column.append(kept)
+
+    def add_episode(self, truths: list[PlanarState], goals: list[Goal], commands: list[np.ndarray]) -> None:
+        """Note all control steps of one episode at once, which costs little more than one of them.
+
+        Args:
+            truths: True states after the steps, each of shape ().
+            goals: Goals that the judge counted then, same.
+            commands: What was applied in each, shapes (n,).
+        """
+        each = [goals[0]] if all(goal is goals[0] for goal in goals) else goals
+        counted = stack_goals(each)[np.zeros(len(goals), dtype=int)] if len(each) == 1 else stack_goals(each)
+        values = _step_columns(self._robot, self._task, stack_planar(truths), counted)
+        values["shares"] = np.stack(commands) / self._robot.actuators.scale
+        for name, column in self._columns.items():
+            value = np.asarray(values[name])
+            dtype = bool if value.dtype == bool else np.float32
+            kept = np.empty(value.shape if name == "shares" else (len(truths),), dtype)
+            kept[...] = value
+            column.extend(kept)
 
     def trajectories(self) -> Trajectories:
         """Everything noted so far; the log is empty afterwards."""

@@ -38,6 +38,8 @@ class Mission:
         self._obstacles: np.ndarray | None = None if sees_obstacles(task) else np.zeros((0, 3))
         self._block: np.ndarray | None = None if isinstance(task, PushBlock) else np.zeros(2)
         self._block_stamp_ns = 0
+        self._batched_of: tuple[object, object, object] = (None, None, None)
+        self._planar_of: RigidBodyState | None = None
         self.goal_stamp_ns = 0
         self.obstacles_stamp_ns = 0
 
@@ -97,7 +99,7 @@ class Mission:
         """From a state to the current target; 0 where the task has none, infinite before everything is known [m]."""
         if not self.complete:
             return math.inf
-        error = self._task.errors(_batch(state), self._batched()).position
+        error = self._task.errors(self._batch(state), self._batched()).position
         return 0.0 if error is None else float(error[0])
 
     def observe(self, state: RigidBodyState, stamp_ns: int, previous_command: np.ndarray) -> np.ndarray:
@@ -112,19 +114,33 @@ class Mission:
             What the controller sees, shape (n,).
         """
         assert self._goal is not None
-        body = _batch(state)
+        body = self._batch(state)
         if self._since_ns is None:
             self._since_ns = stamp_ns
         else:
             time_s = np.array([(stamp_ns - self._since_ns) / 1e9])
-            self._goal = self._task.advance(self._batched(), body, time_s)[0]
+            self._advance(body, time_s)
         return np.asarray(self._observer(body, self._batched(), previous_command[None]))[0]
 
+    def _advance(self, body: PlanarState, time_s: np.ndarray) -> None:
+        """Take the next goal, or keep the very one where it is the same."""
+        before = self._batched()
+        after = self._task.advance(before, body, time_s)
+        if after is not before:
+            self._goal = after[0]
+
     def _batched(self) -> Goal:
-        assert self._goal is not None and self._obstacles is not None and self._block is not None
-        goal = self._goal
-        return stack_goals([Goal(goal.targets, np.asarray(goal.done), self._obstacles, self._block)])
+        """Goal and surroundings as a batch of one; the same again while nothing of them changed."""
+        goal, obstacles, block = self._goal, self._obstacles, self._block
+        assert goal is not None and obstacles is not None and block is not None
+        parts = (goal, obstacles, block)
+        if any(new is not old for new, old in zip(parts, self._batched_of, strict=True)):
+            self._batched_goal = stack_goals([Goal(goal.targets, np.asarray(goal.done), obstacles, block)])
+            self._batched_of = parts
+        return self._batched_goal
 
-
-def _batch(state: RigidBodyState) -> PlanarState:
-    return planar_of(state)[None]
+    def _batch(self, state: RigidBodyState) -> PlanarState:
+        """A state as a batch of one; it is asked for several times in a row."""
+        if state is not self._planar_of:
+            self._planar_of, self._planar = state, planar_of(state)[None]
+        return self._planar

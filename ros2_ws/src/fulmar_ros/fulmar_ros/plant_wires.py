@@ -127,8 +127,9 @@ class PlantWires:
             self._truth.publish(self._write_truth.write(sample.truth, time_ns))
 
     def publish_applied(self, command: np.ndarray, time_ns: int) -> None:
-        """Publish what the actuators are doing from this time on."""
-        self._state.publish(self._write_state.write(command, time_ns))
+        """Publish what the actuators are doing from this time on, if somebody listens."""
+        if self._state.get_subscription_count():
+            self._state.publish(self._write_state.write(command, time_ns))
 
     def expect_no_answers(self) -> None:
         """Time no command any more that answers what was sent so far: the plant does not listen now."""
