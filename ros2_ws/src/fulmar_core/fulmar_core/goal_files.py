@@ -99,6 +99,8 @@ class FollowedPath:
     loops: int = 1  # rounds of a closed path; 0 means for ever
     turn_gain: float = 0.5  # yaw rate for each radian of bearing, of robots that cannot move sideways [1/s]
     max_yaw_rate_deg: float = 28.65  # of the same; 0.5 rad/s in RoboRAN's deployment [deg/s]
+    # The velocity is that of where the robot will be so much later: a command counts until the next one comes [s].
+    lead_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what leads nowhere."""
@@ -106,6 +108,8 @@ class FollowedPath:
             raise ValueError("speed, look_ahead, turn_gain and max_yaw_rate_deg must be greater than 0.")
         if self.loops < 0:
             raise ValueError("'loops' must not be negative; 0 means for ever.")
+        if self.lead_s < 0.0:
+            raise ValueError("'lead_s' must not be negative.")
 
     def planner(self) -> LookAhead:
         """What aims along the path."""

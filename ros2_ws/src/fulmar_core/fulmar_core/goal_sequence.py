@@ -161,7 +161,8 @@ class Following:
 
     def step(self, state: PlanarState, time_s: float) -> Goal:
         """The velocity towards the aim; see `GoalSequence.step`."""
-        position = np.array([float(state.x), float(state.y)])
+        lead_s = self._file.lead_s
+        position = np.array([float(state.x + lead_s * state.vx), float(state.y + lead_s * state.vy)])
         if self._on_path is None:
             self._on_path = self._enter(position)
         velocity, self._on_path = self._planner.aim(self._on_path, position)

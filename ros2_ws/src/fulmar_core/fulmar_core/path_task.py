@@ -26,6 +26,12 @@ class FollowPath(TrackVelocities):
     """
 
     path: LookAhead
+    lead_s: float = 0.0  # see `FollowedPath`
+
+    @property
+    def judged(self) -> FollowPath:
+        """What errors are told against: the velocity that counts where the robot is."""
+        return dataclasses.replace(self, lead_s=0.0)
 
     def __post_init__(self) -> None:
         """Refuse paths that end."""
@@ -47,7 +53,7 @@ class FollowPath(TrackVelocities):
         """The velocity towards the aim, from where the robot is; arguments and steps as of `LookAhead.aim`."""
         path, count = self.path, len(self.path.points)
         ahead = max(1, round(path.look_ahead / path.spacing))
-        here = np.stack((state.x, state.y), axis=-1)
+        here = np.stack((state.x + self.lead_s * state.vx, state.y + self.lead_s * state.vy), axis=-1)
         passed = np.asarray(goal.done).astype(int)
         window = passed[..., None] + np.arange(min(2 * ahead, count - 1) + 1)
         offsets = path.points[window % count] - here[..., None, :]
@@ -70,4 +76,4 @@ class FollowPath(TrackVelocities):
 def path_task(task: TrackVelocities, file: FollowedPath) -> FollowPath:
     """The task of following a path, with the tolerances and the observation of tracking velocities."""
     told = {field.name: getattr(task, field.name) for field in dataclasses.fields(task)}
-    return FollowPath(**told, path=file.planner())
+    return FollowPath(**told, path=file.planner(), lead_s=file.lead_s)

@@ -133,7 +133,7 @@ class Judge:
 
     def __init__(self, task: Task, goal: Goal, control_dt: float) -> None:
         """Begin an episode, or a batch of them."""
-        self._task, self._dt, self._steps = task, control_dt, 0
+        self._task, self._dt, self._steps = getattr(task, "judged", task), control_dt, 0
         self.goal = goal
 
     def see(self, truth: PlanarState, block: np.ndarray | None = None) -> Goal:
