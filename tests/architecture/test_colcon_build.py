@@ -17,6 +17,7 @@ PROGRAMS = {
     "fulmar_ros/goal_node": "fulmar_ros.goal_node",
     "fulmar_ros/recorder_node": "fulmar_ros.recorder_node",
     "policy_server/classical_node": "policy_server.classical_node",
+    "policy_server/lqr_drift_node": "policy_server.lqr_drift_node",
     "policy_server/lqr_node": "policy_server.lqr_node",
     "policy_server/policy_node": "policy_server.policy_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.config import load_config
-from fulmar_core.controllers.classical import LAWS, load_classical
+from fulmar_core.controllers.classical import LAWS, OTHERS, load_classical
 from fulmar_core.controllers.guidance import way_to_face
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
@@ -191,5 +191,13 @@ def test_a_heading_gain_that_would_not_be_stable_is_refused():
 
 
 def test_every_file_of_gains_belongs_to_a_robot_and_its_law():
-    expected = {f"{robot.name}_{LAWS[robot.actuators.kind].law.law}" for robot in ROBOTS.values()}
-    assert set(config_names("controllers")) == expected
+    every = {f"{robot.name}_{LAWS[robot.actuators.kind].law.law}" for robot in ROBOTS.values()}
+    others = {
+        f"{robot.name}_{law}"
+        for law, (family, _) in OTHERS.items()
+        for robot in ROBOTS.values()
+        if robot.actuators.kind == family
+    }
+    found = set(config_names("controllers"))
+    assert every <= found <= every | others
+    assert {name.removeprefix("floating_platform_") for name in found & others} == set(OTHERS)

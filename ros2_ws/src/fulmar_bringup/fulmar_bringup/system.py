@@ -25,12 +25,20 @@ def _load_lqr(robot: Robot, task: Task, control_hz: float, _policy: str) -> Cont
     return load_lqr(robot, task, control_hz=control_hz)
 
 
+def _load_lqr_drift(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
+    return load_classical(robot, task, control_hz=control_hz, law="lqr_drift")
+
+
 def _load_classical(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
     return load_classical(robot, task, control_hz=control_hz)
 
 
 def _check_lqr(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr")
+
+
+def _check_lqr_drift(robot: Robot, task: Task) -> None:
+    check_pair(robot, task, law="lqr_drift")
 
 
 def _any_pair(robot: Robot, task: Task) -> None:
@@ -55,6 +63,9 @@ CONTROLLERS = {
     ),
     "lqr": ControllerEntry(
         "linear-quadratic regulator with valve allocation", "lqr_node", _load_lqr, _check_lqr
+    ),
+    "lqr_drift": ControllerEntry(
+        "the published LQR of DRIFT, to compare with", "lqr_drift_node", _load_lqr_drift, _check_lqr_drift
     ),
     "classical": ControllerEntry(
         f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair

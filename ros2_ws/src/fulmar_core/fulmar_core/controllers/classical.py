@@ -12,6 +12,7 @@ from fulmar_core.config import load_config
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.line_of_sight import LineOfSight, LineOfSightGains
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
+from fulmar_core.controllers.lqr_drift import DriftWeights, LqrDrift
 from fulmar_core.controllers.polar import Polar, PolarGains
 from fulmar_core.controllers.pure_pursuit import PurePursuit, PurePursuitGains
 from fulmar_core.errors import ConfigError
@@ -40,6 +41,16 @@ LAWS = {
     "ackermann": Entry(PurePursuit, PurePursuitGains, POSITIONS + VELOCITIES),  # no law here parks a car
 }
 
+# Laws beside that of the family, by their own names.
+OTHERS = {
+    "lqr_drift": ("thrusters", Entry(LqrDrift, DriftWeights, ("go_to_pose",))),
+}
+
+
+def entry_of(robot: Robot, law: str | None) -> Entry:
+    """The line of a law, or of the robot's family; `check_pair` says whether it is for this robot."""
+    return OTHERS[law][1] if law in OTHERS else LAWS[robot.actuators.kind]
+
 
 def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
     """Refuse a robot and a task that no law here is for.
@@ -53,9 +64,12 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
         ConfigError: With what would be allowed.
     """
     family = robot.actuators.kind
-    entry = LAWS[family]
-    if law is not None and entry.law.law != law:
-        families = ", ".join(name for name, other in LAWS.items() if other.law.law == law)
+    entry = entry_of(robot, law)
+    if law in OTHERS:
+        families = OTHERS[law][0]
+    else:
+        families = ", ".join(name for name, other in LAWS.items() if law in (None, other.law.law))
+    if family not in families.split(", "):
         raise ConfigError(
             f"controller '{law}' is for robots with {families}; '{robot.name}' has {family}. "
             "Use --controller classical."
@@ -65,6 +79,8 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
             f"no classical law does '{task.name}' on '{robot.name}' ({family}); there is one for: "
             f"{', '.join(entry.tasks)}. Use --controller policy."
         )
+    if law in OTHERS:
+        _gains_of(robot, entry)
 
 
 def load_classical(
@@ -86,18 +102,23 @@ def load_classical(
             cannot keep.
     """
     check_pair(robot, task, law=law)
-    entry = LAWS[robot.actuators.kind]
-    name = f"{robot.name}_{entry.law.law}"
-    if name not in config_names("controllers"):
-        raise ConfigError(
-            f"no gains of '{entry.law.law}' for '{robot.name}'. Write configs/controllers/{name}.yaml."
-        )
-    gains = load_config(entry.gains, config_path("controllers", name))
+    entry = entry_of(robot, law)
+    gains = load_config(entry.gains, config_path("controllers", _gains_of(robot, entry)))
     try:
         return entry.law(robot, task, gains, control_hz=control_hz, name=law or "classical")
     except ValueError as error:
         hz = control_hz or robot.timing.control_hz
         raise ConfigError(f"{entry.law.law} for '{robot.name}' at {hz:g} Hz: {error}") from error
+
+
+def _gains_of(robot: Robot, entry: Entry) -> str:
+    """Name of the file with a law's gains for a robot."""
+    name = f"{robot.name}_{entry.law.law}"
+    if name not in config_names("controllers"):
+        raise ConfigError(
+            f"no gains of '{entry.law.law}' for '{robot.name}'. Write configs/controllers/{name}.yaml."
+        )
+    return name
 
 
 def load_lqr(robot: Robot, task: Task, *, control_hz: float | None = None) -> Law:

@@ -18,14 +18,19 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
+from fulmar_core.controllers.reach import Reach
 from fulmar_core.controllers.seen import Vector
+from fulmar_core.controllers.situation import Situation, Watch, raw_situation
 from fulmar_core.controllers.valve_allocation import ValveAllocation
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.dynamics.free_body import free_body_step
+from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+
+FAR = 1.0  # from where a valve costs most [m]
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,10 @@ class LqrWeights:
     heading_error_limit_deg: float  # same for the turn rate [deg]
     tracking_torque: float = 0.0  # as 'torque', where a turn rate is the goal; 0: the same
     overshoot: float = 0.0  # how far beyond a waypoint to aim where the course goes straight on [m]
+    open_valve_far: float = 0.0  # same, more of it, from `FAR` on, where precision is worth less
+    braking: float = 0.0  # share of the deceleration that valves and push allow; 0: no heed [-]
+    least_open_s: float = 0.0  # on/off valves are left as they are for so long [s]
+    observer: Suspicion | None = None  # how far to trust what; without, observations are believed as they are
     around: Around | None = None  # how to keep off obstacles; tasks without any need nothing
 
     def __post_init__(self) -> None:
@@ -54,8 +63,10 @@ class LqrWeights:
             raise ValueError("weights must not be negative.")
         if min(self.force, self.torque, self.position_error_limit, self.heading_error_limit_deg) <= 0.0:
             raise ValueError("force, torque and the error limits must be greater than 0.")
-        if min(self.overshoot, self.tracking_torque) < 0.0:
-            raise ValueError("'overshoot' and 'tracking_torque' must not be negative.")
+        if min(self.overshoot, self.tracking_torque, self.least_open_s) < 0.0:
+            raise ValueError("'overshoot', 'tracking_torque' and 'least_open_s' must not be negative.")
+        if not 0.0 <= self.braking <= 1.0:
+            raise ValueError("'braking' must lie in [0, 1].")
 
 
 def linear_model(robot: Robot, control_dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -106,6 +117,7 @@ class Lqr(Law):
             control_hz: Command rate; the robot's own by default [Hz].
             name: Under which it was chosen.
         """
+        self.watch: Watch | None = None
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         if not isinstance(robot.actuators, Thrusters):
             raise ValueError("the LQR allocates valves; this robot has none.")
@@ -121,41 +133,92 @@ class Lqr(Law):
         )
         a, b = a[np.ix_(used, used)], b[used]
         p = solve_discrete_are(a, b, dt * np.diag(q[used]), r)
+        self.cost_to_go = p
         self._hessian = hessian = r + b.T @ p @ b
-        self._gain = np.linalg.solve(hessian, b.T @ p @ a)
+        self.gain = np.linalg.solve(hessian, b.T @ p @ a)
         allocation = OpeningAllocation if robot.actuators.continuous else ValveAllocation
-        self._allocation = allocation(robot.actuators, weight=hessian, valve_cost=dt * gains.open_valve)
+        self.reach = Reach(robot.actuators)
+        # How far from the goal the law asks for 1 m/s [s].
+        self.lead = 1.0 if self.reader.tracks else float(self.gain[0, used.index(3)] / self.gain[0, 0])
+        if gains.observer:
+            self.watch = Watch(robot, self.reader, gains.observer, dt)
+        self.allocation = allocation(robot.actuators, weight=hessian, valve_cost=dt * gains.open_valve)
+
+    def reset(self) -> None:
+        """Forget the past."""
+        super().reset()
+        self._last: np.ndarray | None = None
+        self._age_s = 0.0  # of the last choice
+        if self.watch is not None:
+            self.watch.reset()
 
     def command(self, observation: np.ndarray) -> np.ndarray:
         """Choose valves; shapes as in `Controller.act`."""
-        wrench = -self._error_state(observation) @ self._gain.T
+        now = self.watch.look(observation) if self.watch else raw_situation(self.reader, observation)
+        far = np.minimum(np.hypot(*now.goal) / FAR, 1.0) ** 2
+        dearer = (
+            far * self._weights.open_valve_far / self.control_hz if self._weights.open_valve_far else None
+        )
+        chosen = self._steady(
+            np.asarray(self.allocation.best(self.wanted(observation, now), now.alive, dearer))
+        )
+        if self.watch:
+            self.watch.acts(chosen)
+        return chosen
+
+    def _steady(self, command: np.ndarray) -> np.ndarray:
+        """What was chosen last, until valves have had the time to open and close."""
+        self._age_s += 1.0 / self.control_hz
+        hasty = self.robot.actuators.binary and self._age_s < self._weights.least_open_s - 1e-6
+        if self._last is None or self._last.shape != command.shape or not hasty:
+            self._last, self._age_s = command, 0.0
+        return self._last
+
+    def wanted(self, observation: np.ndarray, now: Situation) -> np.ndarray:
+        """Wrench that the valves should bring up, in the body's frame, shape (..., 3) [N, N, N·m].
+
+        Args:
+            observation: Says what is wanted; not looked at where the task is a pose.
+            now: Where the robot is and what pushes it.
+        """
+        wrench = -self.error_state(observation, now) @ self.gain.T
         if self.reader.tracks:
-            u, v, r = self.reader.motion(observation)
+            u, v, r = now.motion
             m = self.robot.body.mass
             wrench = wrench + np.stack(
                 (-m * r * v, m * r * u, 0.0 * r), axis=-1
             )  # what keeps u and v in a turn
-        return np.asarray(self._allocation.best(wrench))
+        return np.asarray(wrench - now.push)
 
-    def _error_state(self, observation: np.ndarray) -> np.ndarray:
+    def error_state(self, observation: np.ndarray, now: Situation) -> np.ndarray:
         """State minus goal in the body frame, with far errors cut to the limits."""
         if self.reader.tracks:
-            return -np.stack(self.reader.velocity_error(observation), axis=-1)
-        to_goal = np.stack(self._aim(observation), axis=-1)
+            wanted = [
+                e + m
+                for e, m in zip(
+                    self.reader.velocity_error(observation), self.reader.motion(observation), strict=True
+                )
+            ]
+            return np.stack(now.motion, axis=-1) - np.stack(wanted, axis=-1)
+        to_goal = np.stack(self._aim(observation, now), axis=-1)
         distance = np.linalg.norm(to_goal, axis=-1, keepdims=True)
         limit = self._weights.position_error_limit * self.share_of_speed
+        if self._weights.braking:
+            brake = self.reach.along(-to_goal / np.maximum(distance, 1e-9), now.push[..., :2])[..., None]
+            fastest = np.sqrt(2.0 * self._weights.braking * brake / self.robot.body.mass * distance)
+            limit = np.minimum(limit, self.lead * fastest) + 1e-9
         parts = [-to_goal * (limit / np.maximum(distance, limit))]
         if self.reader.heads:
             most = np.deg2rad(self._weights.heading_error_limit_deg)
-            parts.append(-np.clip(self.reader.turn(observation), -most, most)[..., None])
-        parts.append(np.stack(self.reader.motion(observation), axis=-1))
+            parts.append(-np.clip(now.turn, -most, most)[..., None])
+        parts.append(np.stack(now.motion, axis=-1))
         return np.concatenate(parts, axis=-1)
 
-    def _aim(self, observation: np.ndarray) -> Vector:
+    def _aim(self, observation: np.ndarray, now: Situation) -> Vector:
         """Where to go: the goal, beyond a waypoint, or around an obstacle, in the body frame [m]."""
-        x, y = self.reader.goal(observation)
+        x, y = now.goal
         if self.reader.crosses_obstacles:
-            u, v, _ = self.reader.motion(observation)
+            u, v, _ = now.motion
             course = np.where(np.hypot(u, v) > 0.05, np.arctan2(v, u), np.arctan2(y, x))
             (x, y), room = self.around((x, y), observation, course)
             shorter = np.minimum(1.0, room / np.maximum(np.hypot(x, y), 1e-6))
@@ -171,6 +234,6 @@ class Lqr(Law):
     def derived(self) -> dict[str, Any]:
         """What else the commands depend on."""
         return super().derived() | {
-            "gain": np.round(self._gain, 9).tolist(),
+            "gain": np.round(self.gain, 9).tolist(),
             "hessian": np.round(self._hessian, 9).tolist(),
         }

@@ -66,11 +66,13 @@ class OpeningAllocation:
         self._prices = prices.T, fees
         self._valves = count
 
-    def best(self, wanted: Array) -> Array:
+    def best(self, wanted: Array, alive: Array | None = None, dearer: Array | None = None) -> Array:
         """Openings with the least weighted error and price.
 
         Args:
             wanted: Wrench [F_x, F_y, M_z] in the body frame, shape (..., 3) [N, N, N·m].
+            alive: 1, or 0 for valves that are dead, shape (..., n); all live by default.
+            dearer: As of `ValveAllocation.best`; openings cost so little each that nobody needs it here.
 
         Returns:
             Openings from 0 to 1 that add up to at most 1, shape (..., n).
@@ -81,6 +83,11 @@ class OpeningAllocation:
         error = (wanted @ self._errors[0]).reshape(*leading, count, 3) + self._errors[1]
         cost = np.sum(error * error, axis=-1) + wanted @ self._prices[0] + self._prices[1]
         cost = np.where(np.min(parts, axis=-1) >= -ROUNDING, cost, np.inf)
+        if alive is not None and not np.all(alive):
+            lives = np.concatenate(
+                (np.ones((*leading, 1)), np.asarray(alive)), axis=-1
+            )  # as doing nothing does
+            cost = np.where(np.min(lives[..., self._members], axis=-1) > 0.5, cost, np.inf)
         least = np.min(cost, axis=-1, keepdims=True)
         best = np.argmax(cost <= least + ROUNDING * (1.0 + least), axis=-1)  # of equals always the same
         chosen = np.take_along_axis(parts, best[..., None, None], axis=-2)[..., 0, :]

@@ -17,7 +17,12 @@ MAX_VALVES = 12  # 4,096 combinations; beyond it the table costs more than it is
 
 
 class ValveAllocation:
-    """Table of every combination of valves that is worth opening."""
+    """Table of every combination of valves that is worth opening.
+
+    Attributes:
+        every: Commands (k, n), wrenches (k, 3), and costs of these without the part that depends on what is wanted,
+        (k,). weight: Cost of a wrench error, shape (3, 3).
+    """
 
     def __init__(self, thrusters: Thrusters, *, weight: np.ndarray, valve_cost: float) -> None:
         """List the combinations.
@@ -34,22 +39,33 @@ class ValveAllocation:
         force, torque = thrusters.wrench_in_body(commands)
         wrench = np.concatenate((force[:, 0:2], torque[:, 2:3]), axis=1)
         cost = valve_cost * commands.sum(axis=1)
-        keep = _cheapest_of_equal_wrench(wrench, cost)
-        self._commands, self._wrench, self._weight = commands[keep], wrench[keep], weight
         # (w - w*)ᵀ H (w - w*) + cost, less the part that does not depend on the choice.
-        self._offset = np.einsum("ki,ij,kj->k", self._wrench, weight, self._wrench) + cost[keep]
+        offset = np.einsum("ki,ij,kj->k", wrench, weight, wrench) + cost
+        keep = _cheapest_of_equal_wrench(wrench, cost)
+        self.every, self._worth = (commands, wrench, offset), (commands[keep], wrench[keep], offset[keep])
+        self.weight = weight
 
-    def best(self, wanted: Array) -> Array:
+    def best(self, wanted: Array, alive: Array | None = None, dearer: Array | None = None) -> Array:
         """Combination with the least weighted error.
+
+        A dead valve stays closed and takes no gas from the others, so nothing is lost by never opening it.
 
         Args:
             wanted: Wrench [F_x, F_y, M_z] in the body frame, shape (..., 3) [N, N, N·m].
+            alive: 1, or 0 for valves that are dead, shape (..., n); all live by default.
+            dearer: Cost of each open valve beyond `valve_cost`, shape (...,); none by default.
 
         Returns:
             Valves, open (1) or closed (0), shape (..., n).
         """
-        cost = self._offset - 2.0 * (np.asarray(wanted) @ self._weight) @ self._wrench.T
-        return self._commands[np.argmin(cost, axis=-1)]
+        some_dead = alive is not None and not np.all(alive)
+        commands, wrench, offset = self.every if some_dead else self._worth
+        cost = offset - 2.0 * (np.asarray(wanted) @ self.weight) @ wrench.T
+        if dearer is not None:
+            cost = cost + np.asarray(dearer)[..., None] * commands.sum(axis=-1)
+        if some_dead:
+            cost = np.where((1.0 - np.asarray(alive)) @ commands.T > 0.5, np.inf, cost)
+        return commands[np.argmin(cost, axis=-1)]
 
 
 def _cheapest_of_equal_wrench(wrench: np.ndarray, cost: np.ndarray) -> np.ndarray:

@@ -32,6 +32,9 @@ class Health:
 
     effectiveness: np.ndarray  # (..., n) expected share of its thrust that each valve gives, 0 to 1 [-]
     alive: np.ndarray  # (..., n) 1 or 0, of the likeliest set [-]
+    motion: (
+        np.ndarray
+    )  # (..., 6) the measured columns without their noise, of the likeliest set [m, rad, m/s, rad/s]
     push: np.ndarray  # (..., 3) force from outside along the world's x and y [N], torque [N·m]
 
 
@@ -151,6 +154,7 @@ class ThrusterHealth:
         return Health(
             self._chance @ self._alive,
             self._alive[best],
+            np.take_along_axis(self._state, best[..., None, None], axis=-2)[..., 0, :6],
             (self._chance[..., None, :] @ self._state[..., 6:])[..., 0, :],
         )
 

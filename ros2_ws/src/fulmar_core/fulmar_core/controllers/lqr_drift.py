@@ -1,0 +1,187 @@
+"""DRIFT's own LQR, as published: what ours and the policy are compared with.
+
+Source: RANS at 3572d88, omniisaacgymenvs/mujoco_envs/controllers/discrete_LQR_controller.py and cfg/controller; thesis
+§3.5.4 and Table 3.4. Seven states [x, y, v_x, v_y, q_w, q_z, yaw rate] in the world; at every control step the model is
+found by central differences through the simulator, the gain by the Riccati equation, and the eight numbers that come
+out are made valves by a threshold, a normalisation and a rounding that know nothing of shared pressure or of
+directions.
+
+The published model has three peculiarities, and its behaviour depends on all of them, so they are here as well:
+
+- The simulator normalises quaternions, so the model has only the part of their error that turns; but what q_w makes of
+  itself is written over with 1.
+- Thrusts are off by -0.01 √½ where they should be off by -0.01, so that the inputs' effects come out a seventh too
+  small.
+- Exact zeros among these effects are written over with 1e-4.
+
+What is different here, and why:
+
+- The weights. With those of Table 3.4 (`Optimal_LQR_DC.yaml`; 1e-4 and 1e-5 per m², 100 per (m/s)²) and the order of
+  states that the code has, commands do not reach the threshold of 0.25 three metres away and the platform stays where
+  it is: PT5 0 %, AAS 0.02. Its other file of weights, `Optimal_LQR_DAC.yaml`, behaves as Table 3.5 says; it is ours.
+- Differences go through the core's own dynamics in its own steps, not through one step of 0.2 s; and through a copy.
+  The published ones go through the simulation that is being judged, and leave it 0.2 s later than it was.
+- Gains are kept for headings and turn rates that are the same to 1° and 0.05 rad/s, and not solved for again.
+
+Measured in MuJoCo (256 trajectories; published in brackets), PT5 PT1 / OT5 OT1 in per cent, AAS: ideal 63 7 / 59 22,
+0.08 (73 17 / 27 5, 0.10); torque 76 18 / 26 4, 0.09 (57 6 / 3 0, 0.35); force 0.4 N 0 0 / 71 21, 0.15 (23 0 / 30 6,
+0.15); force and torque 41 0 / 43 8, 0.10 (13 0 / 3 1, 0.32); one valve lost 49 6 / 39 10, 0.11 (40 5 / 20 4, 0.16);
+two 21 2 / 18 5, 0.18 (12 1 / 11 2, 0.22). So positions are good and headings poor, a torque takes the rest of the
+heading, a force the position, and lost valves both. What is not reproduced is the collapse under velocity noise: 0.04
+m/s gives 75 13 / 79 23, 0.15 (14 0 / 2 0, 0.29).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.controllers.around import Around
+from fulmar_core.controllers.law import Law
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import wrap_angle
+from fulmar_core.tasks import Task
+
+STEP, LEAST_STEP = 0.01, 1e-3  # differences of states, relative and at least; inputs: STEP
+SHORT = np.sqrt(0.5)  # of the negative difference of inputs
+INSTEAD_OF_ZERO = 1e-4
+SAME_HEADING, SAME_RATE = np.deg2rad(1.0), 0.05  # [rad], [rad/s]
+
+
+@dataclass(frozen=True)
+class DriftWeights:
+    """Weights and rounding, as read from `configs/controllers/<robot>_lqr_drift.yaml`."""
+
+    states: tuple[float, float, float, float, float, float, float]  # Q's diagonal, in the order of the states
+    input: float  # R's diagonal
+    threshold: float  # inputs nearer to 0 are 0
+    bias: float  # a normalised input opens its valve above one half and this
+    around: Around | None = None  # nothing stands about where this law goes
+
+    def __post_init__(self) -> None:
+        """Refuse weights without a solution."""
+        if min(self.states) <= 0.0 or self.input <= 0.0:
+            raise ValueError("the weights of states and inputs must be greater than 0.")
+
+
+class LqrDrift(Law):
+    """The published law; remembers its heading, whose quaternion does not jump after half a turn."""
+
+    law = "lqr_drift"
+    title = "DRIFT's published LQR"
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        gains: DriftWeights,
+        *,
+        control_hz: float | None = None,
+        name: str | None = None,
+    ) -> None:
+        """Bind the law; arguments as of `Law`."""
+        super().__init__(robot, task, gains, control_hz=control_hz, name=name)
+        if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
+            raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")
+        self._valves, self._weights = robot.actuators, gains
+        self._known: dict[tuple[int, int], np.ndarray] = {}
+
+    def reset(self) -> None:
+        """Forget the heading."""
+        super().reset()
+        self._heading: np.ndarray | None = None
+
+    def command(self, observation: np.ndarray) -> np.ndarray:
+        """Choose valves; shapes as in `Controller.act`."""
+        yaw = self._unwound(-self.reader.turn(observation))
+        (x, y), (u, v, rate) = self.reader.goal(observation), self.reader.motion(observation)
+        c, s = np.cos(yaw), np.sin(yaw)
+        # Target minus state, in the frame of the target.
+        error = np.stack(
+            (
+                c * x - s * y,
+                s * x + c * y,
+                -(c * u - s * v),
+                -(s * u + c * v),
+                1.0 - np.cos(0.5 * yaw),
+                -np.sin(0.5 * yaw),
+                -rate,
+            ),
+            axis=-1,
+        )
+        return self._valves_of(np.einsum("...ij,...j->...i", self._gains(yaw, rate), error))
+
+    def _valves_of(self, inputs: np.ndarray) -> np.ndarray:
+        """Numbers to valves, shape (..., n)."""
+        inputs = np.where(np.abs(inputs) < self._weights.threshold, 0.0, inputs)
+        low, high = np.min(inputs, axis=-1, keepdims=True), np.max(inputs, axis=-1, keepdims=True)
+        share = (inputs - low) / np.where(high > low, high - low, 1.0)
+        return np.where(high != 0.0, np.round(share - self._weights.bias), 0.0)
+
+    def _unwound(self, yaw: np.ndarray) -> np.ndarray:
+        """A heading that does not jump, shape (...,) [rad]."""
+        if self._heading is not None and self._heading.shape == yaw.shape:
+            yaw = self._heading + wrap_angle(yaw - self._heading)
+        self._heading = yaw
+        return yaw
+
+    def _gains(self, yaw: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Gain of each row, shape (..., n, 7)."""
+        keys = np.stack((np.round(yaw / SAME_HEADING), np.round(rate / SAME_RATE)), axis=-1).astype(int)
+        rows = [self._gain(int(a), int(b)) for a, b in keys.reshape(-1, 2)]
+        return np.stack(rows).reshape(*yaw.shape, -1, 7)
+
+    def _gain(self, heading: int, rate: int) -> np.ndarray:
+        """Gain for a heading and a turn rate, in the steps within which they count as the same."""
+        if (heading, rate) not in self._known:
+            a, b = self.model(heading * SAME_HEADING, rate * SAME_RATE)
+            r = self._weights.input * np.eye(b.shape[1])
+            p = solve_discrete_are(a, b, np.diag(self._weights.states), r)
+            self._known[heading, rate] = np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a)
+        return self._known[heading, rate]
+
+    def model(self, yaw: float, rate: float) -> tuple[np.ndarray, np.ndarray]:
+        """Differences through the simulator; place and velocity make no difference to them.
+
+        Args:
+            yaw: Heading [rad].
+            rate: Turn rate [rad/s].
+
+        Returns:
+            A (7, 7) and B (7, n) of x⁺ = A x + B u.
+        """
+        state = np.array([0.0, 0.0, 0.0, 0.0, np.cos(0.5 * yaw), np.sin(0.5 * yaw), rate])
+        steps = np.maximum(LEAST_STEP, state * STEP)
+        closed, one = np.zeros(len(self._valves.nozzles)), STEP * np.eye(len(self._valves.nozzles))
+        either = self._moved(state + np.diag(steps), closed) - self._moved(state - np.diag(steps), closed)
+        a = (either / (2.0 * steps)[:, None]).T
+        a[4, 4] = 1.0
+        b = (self._moved(state, one) - self._moved(state, -SHORT * one)).T / (2.0 * STEP)
+        b[b == 0.0] = INSTEAD_OF_ZERO
+        return a, b
+
+    def _moved(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """States (..., 7) one control step later, under inputs (..., n) that do not share pressure."""
+        body, dt = self.robot.body, self.robot.timing.physics_dt
+        wrench = self._valves.thrust * inputs @ self._valves.wrench_per_newton
+        ahead, left, moment = wrench[..., 0], wrench[..., 1], wrench[..., 5]
+        x, y, vx, vy, w, z, rate = np.moveaxis(states, -1, 0)
+        yaw = 2.0 * np.arctan2(z, w)
+        for _ in range(self.robot.timing.substeps(self.control_hz)):
+            c, s = np.cos(yaw), np.sin(yaw)
+            vx, vy = (
+                vx + dt * (c * ahead - s * left) / body.mass,
+                vy + dt * (s * ahead + c * left) / body.mass,
+            )
+            rate = rate + dt * moment / body.inertia[2]
+            x, y, yaw = x + dt * vx, y + dt * vy, yaw + dt * rate
+        parts = (x, y, vx, vy, np.cos(0.5 * yaw), np.sin(0.5 * yaw), rate)
+        return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+    def derived(self) -> dict[str, Any]:
+        """What else the commands depend on."""
+        return super().derived() | {"physics_dt": self.robot.timing.physics_dt}

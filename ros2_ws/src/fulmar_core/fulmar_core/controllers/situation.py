@@ -1,0 +1,107 @@
+"""Where a platform is and what pushes it, put together from what a task shows and what was commanded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fulmar_core.controllers.seen import Reader, Vector
+from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.thruster_health import ThrusterHealth
+from fulmar_core.planar import PlanarState, wrapped
+from fulmar_core.robot import Robot
+
+UNSEEN = 1e3  # standard deviation of what is not measured at all, in any unit
+
+
+@dataclass(frozen=True)
+class Situation:
+    """One moment of some robots, all in their bodies' own frames; shapes (...,) unless said."""
+
+    goal: Vector  # way to the current target [m]
+    turn: np.ndarray  # wanted heading minus heading, 0 where a task has none [rad]
+    motion: tuple[np.ndarray, np.ndarray, np.ndarray]  # speed ahead, to the left [m/s], turn rate [rad/s]
+    push: np.ndarray  # force and torque from outside, shape (..., 3) [N, N, N·m]
+    alive: np.ndarray | None  # 1, or 0 for a dead valve, shape (..., n); None where nobody looks
+
+
+def raw_situation(reader: Reader, observation: np.ndarray) -> Situation:
+    """What the observation says, and nothing else."""
+    motion = reader.motion(observation)
+    zero = np.zeros_like(motion[0])
+    goal = (zero, zero) if reader.tracks else reader.goal(observation)
+    turn = reader.turn(observation) if reader.heads else zero
+    return Situation(goal, turn, motion, np.zeros((*zero.shape, 3)), None)
+
+
+class Watch:
+    """Observations through the estimator of the actuators' health.
+
+    Its world has the target in its origin and the target's heading along its x axis. Where a target has no heading, is
+    passed by, or is a velocity, no place stays: then only velocities are looked at, and the heading is what the turn
+    rates add up to, which drifts slowly enough for a force to stay where it is.
+    """
+
+    def __init__(self, robot: Robot, reader: Reader, suspicion: Suspicion, dt: float) -> None:
+        """Build the estimator for what the reader sees.
+
+        Args:
+            robot: A planar robot on air, with thrusters.
+            reader: Of its observations.
+            suspicion: How far to trust what.
+            dt: Time between two observations, a multiple of the physics step [s].
+        """
+        self._reader, self._dt = reader, dt
+        self._sees_pose = reader.heads and not (reader.tracks or reader.passes)
+        place = suspicion.position if self._sees_pose else UNSEEN
+        heading = suspicion.heading if self._sees_pose else UNSEEN
+        self._estimator = ThrusterHealth(robot, replace(suspicion, position=place, heading=heading))
+        self._closed = robot.actuators.safe_command
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._estimator.reset()
+        self._heading: np.ndarray | None = None  # expected at the next observation
+        self._command: np.ndarray | None = None
+
+    def look(self, observation: np.ndarray) -> Situation:
+        """Take an observation, shape (n,) or (rows, n); another number of rows than before begins anew."""
+        reader, shape = self._reader, observation.shape[:-1]
+        if self._heading is not None and self._heading.shape != shape:
+            self.reset()
+        raw = raw_situation(reader, observation)
+        u, v, r = raw.motion
+        yaw = -raw.turn if self._sees_pose or self._heading is None else self._heading
+        (x, y), (vx, vy) = _turned((-raw.goal[0], -raw.goal[1]), yaw), _turned((u, v), yaw)
+        command = (
+            self._command
+            if self._command is not None
+            else np.broadcast_to(self._closed, (*shape, len(self._closed)))
+        )
+        health = self._estimator.see(PlanarState(x, y, yaw, vx, vy, r), command, self._dt)
+        x, y, yaw, vx, vy, r = np.moveaxis(health.motion, -1, 0)
+        self._heading = yaw + self._dt * r
+        goal, turn = raw.goal, raw.turn
+        if self._sees_pose:
+            goal = _turned((-x, -y), -yaw)
+            turn = np.asarray(wrapped(-yaw))
+        push = _turned((health.push[..., 0], health.push[..., 1]), -yaw)
+        return Situation(
+            goal,
+            turn,
+            (*_turned((vx, vy), -yaw), r),
+            np.stack((*push, health.push[..., 2]), axis=-1),
+            health.alive,
+        )
+
+    def acts(self, command: np.ndarray) -> None:
+        """Hear what is commanded until the next observation, shape (..., n)."""
+        self._command = command
+
+
+def _turned(vector: Vector, angle: np.ndarray) -> Vector:
+    """A vector turned counterclockwise."""
+    c, s = np.cos(angle), np.sin(angle)
+    return c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]

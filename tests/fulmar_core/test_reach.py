@@ -1,0 +1,35 @@
+"""How hard valves push in a direction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.controllers.reach import Reach
+from fulmar_core.robot import load_robot
+
+VALVES = load_robot("floating_platform").actuators
+
+
+@pytest.mark.parametrize(
+    ("degrees", "most"), [(45.0, 1.0), (0.0, np.sqrt(0.5)), (90.0, np.sqrt(0.5)), (225.0, 1.0)]
+)
+def test_valves_that_share_pressure_push_hardest_along_their_nozzles(degrees, most):
+    way = np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))])
+    assert Reach(VALVES).along(way, np.zeros(2)) == pytest.approx(most, abs=1e-5)
+
+
+def test_a_push_adds_along_its_own_direction_and_takes_away_against_it():
+    reach, way = Reach(VALVES), np.array([1.0, 1.0]) / np.sqrt(2.0)
+    assert reach.along(way, 0.4 * way) == pytest.approx(1.4, abs=1e-5)
+    assert reach.along(way, -0.4 * way) == pytest.approx(0.6, abs=1e-5)
+    assert reach.along(way, -1.4 * way) == 0.0
+
+
+def test_without_shared_pressure_two_nozzles_push_twice_as_hard():
+    way = np.array([1.0, 1.0]) / np.sqrt(2.0)
+    assert Reach(replace(VALVES, shared_pressure=False)).along(way, np.zeros(2)) == pytest.approx(
+        2.0, abs=1e-5
+    )
