@@ -120,7 +120,7 @@ def unmet(document: dict[str, Any]) -> list[str]:
             continue
         sign = "≥" if check["better"] == "more" else "≤"
         digits = 1 if check["limit"] >= 1.0 else 3
-        found = f"{check['measured']:.{digits}f}"
+        found = f"{check['measured']:.{digits + (digits > 1)}f}"
         title = document["rows"][check["row"]]["title"]
         figure = check["figure"].replace("_", " ")
         sentences.append(

@@ -27,7 +27,7 @@ _MARKS = {GOOD: " ✓", BAD: " ✗", "": ""}
 _STYLE = (
     "".join(f".{band.name} {{ background: {band.paper} }} " for band in BANDS)
     + """
-th, td { padding: .28rem .45rem; font-size: .9rem }
+th, td { padding: .25rem .4rem; font-size: .87rem } th { white-space: normal; vertical-align: bottom }
 td:first-child { white-space: nowrap } td:nth-child(2) { text-align: left; white-space: nowrap }
 tr.published td { color: var(--faint) } tr.bound td { font-style: italic }
 tr.first td { border-top: 2px solid var(--rule) }
