@@ -19,6 +19,7 @@ PROGRAMS = {
     "policy_server/classical_node": "policy_server.classical_node",
     "policy_server/lqr_drift_node": "policy_server.lqr_drift_node",
     "policy_server/lqr_node": "policy_server.lqr_node",
+    "policy_server/mpc_node": "policy_server.mpc_node",
     "policy_server/policy_node": "policy_server.policy_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",
 }

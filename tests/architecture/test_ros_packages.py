@@ -121,6 +121,7 @@ def test_the_programs_are_those_that_systems_start(packages):
         ("policy_server", "classical_node"),
         ("policy_server", "lqr_drift_node"),
         ("policy_server", "lqr_node"),
+        ("policy_server", "mpc_node"),
         ("policy_server", "policy_node"),
         ("sim_nodes", "sim_node"),
     }

@@ -24,6 +24,7 @@ setup(
         "console_scripts": [
             "policy_node = policy_server.policy_node:main",
             "lqr_node = policy_server.lqr_node:main",
+            "mpc_node = policy_server.mpc_node:main",
             "lqr_drift_node = policy_server.lqr_drift_node:main",
             "classical_node = policy_server.classical_node:main",
         ]

@@ -25,6 +25,10 @@ def _load_lqr(robot: Robot, task: Task, control_hz: float, _policy: str) -> Cont
     return load_lqr(robot, task, control_hz=control_hz)
 
 
+def _load_mpc(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
+    return load_classical(robot, task, control_hz=control_hz, law="mpc")
+
+
 def _load_lqr_drift(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
     return load_classical(robot, task, control_hz=control_hz, law="lqr_drift")
 
@@ -35,6 +39,10 @@ def _load_classical(robot: Robot, task: Task, control_hz: float, _policy: str) -
 
 def _check_lqr(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr")
+
+
+def _check_mpc(robot: Robot, task: Task) -> None:
+    check_pair(robot, task, law="mpc")
 
 
 def _check_lqr_drift(robot: Robot, task: Task) -> None:
@@ -63,6 +71,9 @@ CONTROLLERS = {
     ),
     "lqr": ControllerEntry(
         "linear-quadratic regulator with valve allocation", "lqr_node", _load_lqr, _check_lqr
+    ),
+    "mpc": ControllerEntry(
+        "predictive control that tries combinations of valves", "mpc_node", _load_mpc, _check_mpc
     ),
     "lqr_drift": ControllerEntry(
         "the published LQR of DRIFT, to compare with", "lqr_drift_node", _load_lqr_drift, _check_lqr_drift

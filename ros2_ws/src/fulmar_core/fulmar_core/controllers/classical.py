@@ -13,6 +13,7 @@ from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.line_of_sight import LineOfSight, LineOfSightGains
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.controllers.lqr_drift import DriftWeights, LqrDrift
+from fulmar_core.controllers.mpc import Mpc, MpcGains
 from fulmar_core.controllers.polar import Polar, PolarGains
 from fulmar_core.controllers.pure_pursuit import PurePursuit, PurePursuitGains
 from fulmar_core.errors import ConfigError
@@ -43,6 +44,7 @@ LAWS = {
 
 # Laws beside that of the family, by their own names.
 OTHERS = {
+    "mpc": ("thrusters", Entry(Mpc, MpcGains, ("go_to_pose",))),
     "lqr_drift": ("thrusters", Entry(LqrDrift, DriftWeights, ("go_to_pose",))),
 }
 

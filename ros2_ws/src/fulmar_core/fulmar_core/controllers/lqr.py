@@ -172,7 +172,7 @@ class Lqr(Law):
         hasty = self.robot.actuators.binary and self._age_s < self._weights.least_open_s - 1e-6
         if self._last is None or self._last.shape != command.shape or not hasty:
             self._last, self._age_s = command, 0.0
-        return self._last
+        return np.asarray(self._last)
 
     def wanted(self, observation: np.ndarray, now: Situation) -> np.ndarray:
         """Wrench that the valves should bring up, in the body's frame, shape (..., 3) [N, N, N·m].
@@ -199,7 +199,7 @@ class Lqr(Law):
                     self.reader.velocity_error(observation), self.reader.motion(observation), strict=True
                 )
             ]
-            return np.stack(now.motion, axis=-1) - np.stack(wanted, axis=-1)
+            return np.asarray(np.stack(now.motion, axis=-1) - np.stack(wanted, axis=-1))
         to_goal = np.stack(self._aim(observation, now), axis=-1)
         distance = np.linalg.norm(to_goal, axis=-1, keepdims=True)
         limit = self._weights.position_error_limit * self.share_of_speed

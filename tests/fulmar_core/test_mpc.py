@@ -1,0 +1,54 @@
+"""The MPC: what it does to a platform, and that it looks further than the LQR that it follows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.config import load_config
+from fulmar_core.controllers.mpc import Mpc, MpcGains
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.metrics import episode_metrics
+from fulmar_core.paths import config_path
+from fulmar_core.robot import load_robot
+from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.tasks import load_task
+
+ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
+GAINS = load_config(MpcGains, config_path("controllers", "floating_platform_mpc"))
+
+
+def figures(scenario, gains=GAINS, episodes=8):
+    law = Mpc(ROBOT, TASK, gains)
+    run = roll_out_in_batch(law, ROBOT, TASK, load_scenario(scenario), episodes=episodes, seed=3)
+    return {name: values.mean() for name, values in episode_metrics(run, TASK).items()}
+
+
+@pytest.mark.parametrize("scenario", ["drift_force_4", "drift_one_lost"])
+def test_it_holds_its_pose_against_a_force_and_without_a_valve(scenario):
+    found = figures(scenario)
+    assert found["PT2_percent"] >= 65.0
+    assert found["OT5_percent"] >= 85.0
+
+
+def test_dearer_gas_is_saved():
+    saved, spent = (figures("drift_ideal", replace(GAINS, gas=gas), episodes=4) for gas in (1.0, 0.0))
+    assert saved["AAS"] < 0.8 * spent["AAS"]
+
+
+def test_one_robot_is_steered_as_in_a_batch():
+    law = Mpc(ROBOT, TASK, GAINS)
+    rows = np.random.default_rng(1).uniform(-1.0, 1.0, (6, len(TASK.observation_names)))
+    many = law.act(rows)
+    for row, expected in zip(rows, many, strict=True):
+        law.reset()
+        np.testing.assert_array_equal(law.act(row), expected)
+
+
+def test_gains_that_lead_nowhere_are_refused():
+    with pytest.raises(ValueError, match="'choices' and 'steps'"):
+        replace(GAINS, steps=0)
+    with pytest.raises(ValueError, match="'observer' is missing"):
+        replace(GAINS, observer=None)
