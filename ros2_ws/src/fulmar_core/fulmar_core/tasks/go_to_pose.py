@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from array_api_compat import array_namespace
 
+from fulmar_core.arrays import clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.planar import PlanarState
@@ -40,6 +42,8 @@ class PoseReward:
     facing: float  # times exp(-d / 1 m) (1 + cos e) / 2: no plateau at a quarter turn, once there
     approach: float  # times metres come nearer
     turn: float  # times radians come nearer
+    fine: float = 0.0  # times exp(-d / 0.03 m - |e| / 0.03 rad): asks for a centimetre and a degree at once
+    aligned: float = 0.0  # times exp(-|e| / 0.03 rad), wherever the robot is
 
 
 @dataclass(frozen=True)
@@ -54,14 +58,24 @@ class GoToPose:
     tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PoseReward
+    fine_heading_deg: float = 0.0  # where the magnified heading error saturates; 0: it is not told [deg]
+    fine_speed: float = 0.0  # where magnified velocities saturate; 0: they are not told [m/s]
+    fine_yaw_rate: float = 0.0  # same of the turn rate; 0: it is not told [rad/s]
 
     goal_topic: ClassVar[str] = "goal_pose"
-    observation_names: ClassVar[tuple[str, ...]] = (
-        *POSITION_TERMS,
-        *HEADING_TERMS,
-        *MOTION_TERMS,
-        *FINE_TERMS,
-    )
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot saturate."""
+        if min(self.fine_heading_deg, self.fine_speed, self.fine_yaw_rate) < 0.0:
+            raise ValueError("'fine_heading_deg', 'fine_speed' and 'fine_yaw_rate' must not be negative.")
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Where the goal is, how the robot moves, and both magnified near the goal."""
+        heading = ("fine_heading_error",) if self.fine_heading_deg else ()
+        speed = ("fine_velocity_x_in_body", "fine_velocity_y_in_body") if self.fine_speed else ()
+        turning = ("fine_yaw_rate",) if self.fine_yaw_rate else ()
+        return (*POSITION_TERMS, *HEADING_TERMS, *MOTION_TERMS, *FINE_TERMS, *heading, *speed, *turning)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw starts and goals; see `TaskProtocol.draw`."""
@@ -73,7 +87,16 @@ class GoToPose:
         """What every controller of this task sees; see `TaskProtocol.observe`."""
         x, y = goal_terms(state, goal.current)
         fine = fine_terms(x, y, saturation=self.fine_distance)
-        return (x, y, *heading_terms(state, goal.current), *motion_terms(state), *fine)
+        motion = motion_terms(state)
+        terms: tuple[Array, ...] = (x, y, *heading_terms(state, goal.current), *motion, *fine)
+        if self.fine_heading_deg:
+            error = self.errors(state, goal).heading
+            terms += (clip(error / math.radians(self.fine_heading_deg), -1.0, 1.0),)
+        if self.fine_speed:
+            terms += tuple(clip(speed / self.fine_speed, -1.0, 1.0) for speed in motion[:2])
+        if self.fine_yaw_rate:
+            terms += (clip(motion[2] / self.fine_yaw_rate, -1.0, 1.0),)
+        return terms
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
         """The goal stays."""
@@ -94,6 +117,8 @@ class GoToPose:
             + w.facing * xp.exp(-d) * 0.5 * (1.0 + xp.cos(e))
             + w.approach * (old.position - d)
             + w.turn * (xp.abs(old.heading) - e)
+            + w.fine * xp.exp(-d / 0.03 - e / 0.03)
+            + w.aligned * xp.exp(-e / 0.03)
         )
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
