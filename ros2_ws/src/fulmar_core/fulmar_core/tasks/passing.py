@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -63,7 +64,7 @@ class WaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PassingTask:
+class PassingTask(ABC):
     """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
 
     name: str
@@ -90,9 +91,9 @@ class PassingTask:
         if not 0.0 <= self.start_cone_deg <= 180.0:
             raise ValueError("'start_cone_deg' must lie in [0, 180].")
 
+    @abstractmethod
     def places(self, draws: Draws) -> np.ndarray:
         """Draw where the targets are, shape (worlds, k, 2) [m]."""
-        raise NotImplementedError
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw a start at rest and a closed course."""
