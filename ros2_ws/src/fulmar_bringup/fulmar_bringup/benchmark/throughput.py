@@ -19,10 +19,10 @@ from typing import Any
 import mujoco
 import mujoco.rollout
 import numpy as np
-from array_api_compat import array_namespace
 
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
+from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
@@ -96,7 +96,6 @@ class BatchPace:
         rng = np.random.default_rng(SEED)
         self._age = rng.integers(0, self._horizon, worlds)
         self._commands = [library.array(_random_commands(robot, worlds, rng)) for _ in range(DIFFERENT)]
-        self._scale = library.array(robot.actuators.scale)
         self._at = 0
 
     def steps_per_s(self, seconds: float) -> float:
@@ -109,24 +108,23 @@ class BatchPace:
         return count * worlds / (time.perf_counter() - began)
 
     def _step(self) -> None:
-        simulation, task, robot = self._simulation, self._task, self._robot
+        simulation = self._simulation
         before, goal, previous = simulation.truth, simulation.goal, simulation.command
         simulation.step(self._commands[self._at])
         self._at = (self._at + 1) % DIFFERENT
-        after = simulation.truth
-        xp = array_namespace(after.x)
-        share, old = simulation.command / self._scale, previous / self._scale
-        change = share - old
-        costs = robot.costs.effort * xp.sum(xp.abs(share), axis=1)
-        costs = costs + robot.costs.change * xp.sum(change * change, axis=1)
-        self.reward = task.reward(before, after, goal) - costs
+        self.reward, ended_early = learning_step(
+            self._robot,
+            self._task,
+            before=before,
+            after=simulation.truth,
+            goal=goal,
+            ended=simulation.goal,
+            previous=previous,
+            command=simulation.command,
+        )
         self._age += 1
         ended = self._age >= self._horizon
-        errors, touching = task.errors(after, simulation.goal), task.collides(after, goal, robot)
-        if errors.position is not None:
-            ended[self._library.numbers(errors.position > robot.limits.geofence)] = True
-        if touching is not None:
-            ended[self._library.numbers(touching)] = True
+        ended[self._library.numbers(ended_early)] = True
         self.observation = simulation.observe()
         over = np.flatnonzero(ended)
         if over.size:
