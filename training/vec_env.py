@@ -145,7 +145,8 @@ class BatchVecEnv(VecEnv):
                     "TimeLimit.truncated": bool(timed_out[world]),
                 }
             self.begin_anew(ended)
-            observations = np.asarray(simulation.observe())
+            observations = observations.copy(order="K")  # the last ones are still in the infos
+            observations[ended] = simulation.observe(ended)
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
 
     def close(self) -> None:
