@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from array_api_compat import array_namespace, device
+from array_api_compat import device, is_numpy_array
 
+from fulmar_core.arrays import array_namespace, sum_of
 from fulmar_core.goal import Goal
+from fulmar_core.observation import shares
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
@@ -57,11 +59,17 @@ def learning_step(
 def _cost(robot: Robot, previous: Array, command: Array) -> Array:
     """What using the actuators costs, shape (worlds,)."""
     costs = robot.costs
-    xp = array_namespace(command)
-    scale = xp.asarray(robot.actuators.scale, dtype=command.dtype, device=device(command))
-    share = command / scale
-    cost = costs.effort * xp.sum(xp.abs(share), axis=1)
+    scale = robot.actuators.scale
+    share = shares(command, scale)
+    cost = costs.effort * _sum(array_namespace(share).abs(share))
     if costs.change:
-        change = share - previous / scale
-        cost = cost + costs.change * xp.sum(change * change, axis=1)
+        change = share - shares(previous, scale)
+        cost = cost + costs.change * _sum(change * change)
     return cost
+
+
+def _sum(rows: Array) -> Array:
+    """Sum of each row, shape (worlds,)."""
+    if not is_numpy_array(rows):
+        return array_namespace(rows).sum(rows, axis=1)
+    return sum_of([rows[:, i] for i in range(rows.shape[1])])

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from array_api_compat import array_namespace, device
+from array_api_compat import device
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import NOISE, Keys, normal_from, uniform_from, words, world_keys
 from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
@@ -109,12 +109,12 @@ class Odometer:
             return truth
         xp = array_namespace(truth.x)
         if only is not None:
-            return self._restart(truth[only], world[only], numbers[only], repeats[only], only)
+            return self._restart(truth[only], world, numbers[only], repeats[only], only)
         columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
         if self._keys is None:
             self._keys = world_keys(self._seed, numbers, repeats, NOISE)
         bits = words(self._keys, steps, 7)
-        reading = self._disturbed(columns, world, bits)
+        reading = self._disturbed(columns, (world.sensor_scale, world.sensor_bias, world.noise), bits)
         if self._depth > 1:
             reading = self._delayed(reading, world)
         lost = uniform_from(bits[6], columns.dtype) < world.dropout
@@ -136,7 +136,8 @@ class Odometer:
         assert self._keys is not None
         for every, some in zip(self._keys, keys, strict=True):
             every[only] = some
-        reading = self._disturbed(columns, world, words(keys, 0, 7))
+        errors = world.sensor_scale[:, only], world.sensor_bias[:, only], world.noise[only]
+        reading = self._disturbed(columns, errors, words(keys, 0, 7))
         # Copies: who was given these readings keeps them.
         self._held, *self._past = (xp.asarray(old, copy=True) for old in (self._held, *self._past))
         for old in (self._held, *self._past):
@@ -149,14 +150,16 @@ class Odometer:
             self._constants[part] = xp.asarray(self._spec.column(part), dtype=like.dtype, device=device(like))
         return self._constants[part]
 
-    def _disturbed(self, columns: Array, world: World, bits: Array) -> Array:
+    def _disturbed(self, columns: Array, errors: tuple[Array, Array, Array], bits: Array) -> Array:
+        """Columns, shape (6, n), with the scale, bias and noise that worlds have, and with random bits."""
         xp = array_namespace(columns)
+        scale, bias, loudness = errors
         if "scale_std" in self._used:
-            columns = columns * (1.0 + self._constant("scale_std", columns) * world.sensor_scale)
+            columns = columns * (1.0 + self._constant("scale_std", columns) * scale)
         if "bias_std" in self._used:
-            columns = columns + self._constant("bias_std", columns) * world.sensor_bias
+            columns = columns + self._constant("bias_std", columns) * bias
         if "std" in self._used:
-            noise = normal_from(bits[:6], columns.dtype) * world.noise
+            noise = normal_from(bits[:6], columns.dtype) * loudness
             columns = columns + self._constant("std", columns) * noise
         if "limit" in self._used:
             limit = self._constant("limit", columns)

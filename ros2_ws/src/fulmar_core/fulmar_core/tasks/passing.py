@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from array_api_compat import array_namespace
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.planar import PlanarState, at_rest, wrapped
