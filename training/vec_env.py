@@ -11,10 +11,10 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
+from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.push_block import PushBlock
 
 
 class BatchVecEnv(VecEnv):
@@ -121,21 +121,17 @@ class BatchVecEnv(VecEnv):
         simulation = self.simulation
         before, goal, previous = simulation.truth, simulation.goal, simulation.command
         simulation.step(self._actions * self._scale)
-        after = simulation.truth
-        reward = self._task.reward(before, after, goal) - self._cost(previous)
+        reward, ended_early = learning_step(
+            self._robot,
+            self._task,
+            before=before,
+            after=simulation.truth,
+            goal=goal,
+            ended=simulation.goal,
+            previous=previous,
+            command=simulation.command,
+        )
         self._age += 1
-        errors = self._task.errors(after, simulation.goal)
-        ended_early = np.zeros(self.num_envs, dtype=bool)
-        if errors.position is not None:
-            ended_early = errors.position > self._robot.limits.geofence
-        touching = self._task.collides(after, goal, self._robot)
-        if touching is not None:
-            ended_early = ended_early | touching
-        if isinstance(self._task, PushBlock):
-            reward = reward + self._task.block_reward(goal, simulation.goal)
-        penalty = getattr(self._task, "penalty", None)  # tasks where nothing is in the way have none
-        if penalty is not None:
-            reward = reward - penalty(after, goal, self._robot)
         timed_out = (self._age >= self._horizon) & ~ended_early
         done = ended_early | timed_out
         observations = np.asarray(simulation.observe())
@@ -149,17 +145,9 @@ class BatchVecEnv(VecEnv):
                     "TimeLimit.truncated": bool(timed_out[world]),
                 }
             self.begin_anew(ended)
-            observations = np.asarray(simulation.observe())
+            observations = observations.copy(order="K")  # the last ones are still in the infos
+            observations[ended] = simulation.observe(ended)
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
-
-    def _cost(self, previous: np.ndarray) -> np.ndarray:
-        """What using the actuators costs, shape (worlds,)."""
-        costs = self._robot.costs
-        share = self.simulation.command / self._scale
-        cost = costs.effort * np.sum(np.abs(share), axis=1)
-        if costs.change:
-            cost = cost + costs.change * np.sum(np.square(share - previous / self._scale), axis=1)
-        return np.asarray(cost)
 
     def close(self) -> None:
         """Nothing to release."""

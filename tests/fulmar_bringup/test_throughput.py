@@ -41,6 +41,9 @@ def test_the_json_has_both_paces_of_each_robot_and_their_ratio(command, cores):
     for found in figures["robots"].values():
         assert found["batch_steps_per_s"] > 0.0
         assert found["ratio"] == pytest.approx(found["batch_steps_per_s"] / found["mujoco_steps_per_s"])
+    wet = [name for name, found in figures["robots"].items() if "mujoco_with_water_steps_per_s" in found]
+    assert wet == ["kingfisher"]
+    assert figures["robots"]["kingfisher"]["mujoco_with_water_steps_per_s"] > 0.0
     assert (figures["worlds"], figures["scenario"], figures["cores"]) == (16, "randomised", int(cores))
 
 

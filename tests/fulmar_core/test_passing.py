@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.references.race_corners import draw_corners
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.passing import PassingTask
 from fulmar_core.tasks.race_gates import crossings
 from fulmar_core.tasks.race_track import RaceTrack
 from fulmar_core.tasks.waypoints import Course, headings_along
@@ -308,3 +309,8 @@ def test_courses_and_tracks_that_cannot_be_are_refused():
         replace(TASKS["go_through_poses"], reach_heading_deg=20.0)
     with pytest.raises(ValueError, match="'start_cone_deg'"):
         replace(POSITIONS, start_cone_deg=200.0)
+
+
+def test_a_kind_that_does_not_say_where_its_targets_lie_is_none():
+    with pytest.raises(TypeError, match="places"):
+        PassingTask(**{field.name: getattr(POSITIONS, field.name) for field in fields(PassingTask)})

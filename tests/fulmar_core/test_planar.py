@@ -17,7 +17,7 @@ from fulmar_core.planar import (
     to_body,
     wrapped,
 )
-from fulmar_core.state import planar_state
+from tests.states import planar_state
 
 
 def crowd(count=20, seed=1):

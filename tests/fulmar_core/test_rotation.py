@@ -41,19 +41,6 @@ def test_multiply_is_composition_of_rotations(quats):
     np.testing.assert_allclose(Rotation.from_quat(rotation.multiply(p, q)).as_matrix(), expected, **EXACT)
 
 
-@pytest.mark.parametrize("length", [0.0, 1e-12, 1e-5, 1.9e-4, 2.1e-4, 0.1, 3.0, 6.0])
-def test_the_exponential_map_is_scipys_from_zero_to_nearly_a_full_turn(length):
-    phi = length * np.array([0.48, -0.6, 0.64])
-    expected = Rotation.from_rotvec(phi).as_matrix()
-    np.testing.assert_allclose(
-        Rotation.from_quat(rotation.from_rotation_vector(phi)).as_matrix(), expected, **EXACT
-    )
-
-
-def test_the_exponential_map_of_nothing_is_exactly_one():
-    assert rotation.from_rotation_vector(np.zeros(3)).tolist() == [0.0, 0.0, 0.0, 1.0]
-
-
 def test_the_cross_product_is_numpys(vectors):
     np.testing.assert_allclose(
         rotation.cross(vectors, vectors[::-1]), np.cross(vectors, vectors[::-1]), **EXACT
@@ -86,7 +73,6 @@ def test_wrapping_changes_an_angle_by_whole_turns_only(angle):
         (rotation.rotate, "qv"),
         (rotation.rotate_inverse, "qv"),
         (rotation.multiply, "qq"),
-        (rotation.from_rotation_vector, "v"),
         (rotation.cross, "vv"),
         (rotation.yaw_of, "q"),
         (rotation.from_yaw, "a"),

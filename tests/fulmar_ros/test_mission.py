@@ -9,9 +9,9 @@ import pytest
 
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import load_robot
-from fulmar_core.state import planar_state
 from fulmar_core.tasks import load_task
 from fulmar_ros.mission import Mission
+from tests.states import planar_state
 
 S = 1_000_000_000
 ROBOT = load_robot("turtlebot2")

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.dynamics.rigid_body import Disturbance, MassProperties, step
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.observation import slewed
@@ -17,14 +16,12 @@ from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Rolling, load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 
 mujoco = pytest.importorskip("mujoco")
 
 from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
-from sim_nodes.mujoco_model import BODY, build_model  # noqa: E402
 
 PLATFORM = load_robot("floating_platform")
 FLYER = load_robot("modular_freeflyer")
@@ -144,45 +141,6 @@ def test_robots_on_wheels_drive_alike_within_a_few_per_cent_of_the_way(name, way
     # Tyres creep a little under load, and servos take a moment that the core's model does not have.
     assert np.hypot(*(theirs[-1, :2] - ours[-1, :2])) < 0.01 + 0.02 * length
     assert np.degrees(turned(ours, theirs)) < 1.0 + 0.015 * np.degrees(angle)
-
-
-def test_a_free_body_tumbles_in_mujoco_as_in_the_core():
-    robot = replace(PLATFORM, body=replace(PLATFORM.body, planar=False, inertia=(0.1, 0.2, 0.3)))
-    model = build_model(robot)
-    data = mujoco.MjData(model)
-    body = model.body(BODY).id
-    model.body_ipos[body] = 0.0
-    quat = np.array([0.1, -0.3, 0.2, 0.9])
-    quat /= np.linalg.norm(quat)
-    state = RigidBodyState(
-        np.array([0.3, -0.2, 0.1]), quat, np.array([0.1, -0.05, 0.02]), np.array([0.2, -0.1, 0.15])
-    )
-    data.qpos[:] = (*state.position_in_world, quat[3], *quat[:3])
-    data.qvel[:] = (*state.velocity_in_world, *state.angular_velocity_in_body)
-    force, torque = np.array([0.05, -0.03, 0.02]), np.array([0.003, -0.002, 0.004])
-    data.xfrc_applied[body] = (*force, *torque)
-    rng = np.random.default_rng(6)
-    for _ in range(100):
-        command = (rng.uniform(size=8) > 0.7).astype(float)
-        state = step(
-            state,
-            *robot.actuators.wrench_in_body(command),
-            body=MassProperties(np.array([robot.body.mass]), np.array(robot.body.inertia)),
-            disturbance=Disturbance(force, torque),
-            planar=False,
-            dt=0.02,
-            substeps=10,
-        )
-        data.ctrl[:] = robot.actuators.thrusts(command)
-        mujoco.mj_step(model, data, 10)
-    tight = {"rtol": 0.0, "atol": 1e-8}
-    np.testing.assert_allclose(data.qpos[:3], state.position_in_world, **tight)
-    np.testing.assert_allclose(data.qvel[:3], state.velocity_in_world, **tight)
-    np.testing.assert_allclose(data.qvel[3:], state.angular_velocity_in_body, **tight)
-    x, y, z, w = state.quat_xyzw
-    assert abs(np.dot(data.qpos[3:7], (w, x, y, z))) == pytest.approx(
-        1.0, abs=1e-9
-    )  # q and -q are one attitude
 
 
 class Swaying:

@@ -16,7 +16,6 @@ from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.state import planar_state
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     COMMAND,
@@ -29,6 +28,7 @@ from fulmar_core.topics import (
 from fulmar_ros.convert import OdometryWriter, VectorWriter
 from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.qos import publisher_qos, subscriber_qos
+from tests.states import planar_state
 
 ROBOT = "floating_platform"
 NAMESPACE = f"/{ROBOT}"

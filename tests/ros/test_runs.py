@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 
 from fulmar_bringup.bag_reader import read_run
 from tests.conftest import RosDomain
-from tests.ros.cli import fulmar, json_of
+from tests.ros.cli import fulmar, json_of, run_in_real_time
 
 REQUIRED = {
     "robot",
@@ -161,7 +161,7 @@ def test_a_realtime_run_holds_its_rate_and_records_every_wire(ros_domain: RosDom
         "--duration",
         "8",
     )
-    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    done = run_in_real_time(*asked, env=ros_domain.env, cwd=tmp_path)
     summary = json_of(done.stdout)
     assert summary["failure"] is None, done.stderr
     assert summary["control_rate_hz"] == pytest.approx(5.0, rel=0.02)

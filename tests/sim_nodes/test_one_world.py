@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.robot import load_robot
-from fulmar_core.state import planar_state
 from sim_nodes.one_world import OneWorld
+from tests.states import planar_state
 
 ROBOT = load_robot("floating_platform")  # ten ticks to a control step
 LATE = replace(

@@ -9,7 +9,8 @@ import pytest
 
 from fulmar_core.robot import Limits
 from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
-from fulmar_core.state import RigidBodyState, planar_state
+from fulmar_core.state import RigidBodyState
+from tests.states import planar_state
 
 LIMITS = Limits(geofence=8.0, speed=2.0, yaw_rate=6.0)
 

@@ -11,8 +11,9 @@ import math
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace, device, is_numpy_array
+from array_api_compat import device, is_numpy_array
 
+from fulmar_core.arrays import array_namespace
 from fulmar_core.rotation import Array
 
 START, NOISE, WORLD = 0, 1, 2  # streams that do not disturb one another
@@ -41,7 +42,7 @@ def world_keys(seed: int, numbers: Array, repeats: Array, stream: int) -> Keys:
     keys = []
     for odd in (GOLDEN, OTHER):
         start = _mix_number(_mix_number((seed & MASK) ^ odd) ^ (seed >> 32 & MASK) ^ (stream * odd & MASK))
-        keys.append(_mix(_mix(n * odd + start & MASK) + r * GOLDEN & MASK))
+        keys.append(_mix(_low(_mix(_low(n * odd + start)) + r * GOLDEN)))
     return keys[0], keys[1]
 
 
@@ -58,17 +59,20 @@ def words(keys: Keys, counter: Array | int, count: int) -> Array:
     """
     first, second = keys
     xp = array_namespace(first)
-    here = counter * OTHER & MASK if isinstance(counter, int) else _counter(counter) * OTHER & MASK
-    base = _mix(first + here & MASK) ^ second
+    here = counter * OTHER & MASK if isinstance(counter, int) else _low(_counter(counter) * OTHER)
+    base = _mix(_low(first + here)) ^ second
     channel = xp.asarray(
         [(i + 1) * GOLDEN & MASK for i in range(count)], dtype=base.dtype, device=device(base)
     )
-    return _mix(base[None, :] + channel[:, None] & MASK)
+    return _mix(_low(base[None, :] + channel[:, None]))
 
 
 def uniform_from(bits: Array, dtype: Any) -> Array:
     """Words as numbers in (0, 1), same shape; float32 may round the largest up to 1."""
-    return (array_namespace(bits).astype(bits, dtype) + 0.5) * 2.0**-32
+    unit = array_namespace(bits).astype(bits, dtype)
+    unit += 0.5
+    unit *= 2.0**-32
+    return unit
 
 
 def normal_from(bits: Array, dtype: Any) -> Array:
@@ -147,9 +151,19 @@ def _counter(values: Array) -> Array:
 
 
 def _mix(x: Array) -> Array:
-    x = (x ^ (x >> 16)) * 0x7FEB352D & MASK
-    x = (x ^ (x >> 15)) * 0x846CA68B & MASK
-    return x ^ (x >> 16)
+    x = x ^ (x >> 16)
+    x *= 0x7FEB352D
+    x = _low(x)
+    x ^= x >> 15
+    x *= 0x846CA68B
+    x = _low(x)
+    x ^= x >> 16
+    return x
+
+
+def _low(x: Array) -> Array:
+    """The low half of words; those of 32 bits have no other."""
+    return x if is_numpy_array(x) else x & MASK
 
 
 def _mix_number(x: int) -> int:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace
 
+from fulmar_core.arrays import array_namespace
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 

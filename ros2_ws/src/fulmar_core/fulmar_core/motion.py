@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from array_api_compat import array_namespace
-
 from fulmar_core.actuators.actuation import ActuationState
+from fulmar_core.arrays import array_namespace
 from fulmar_core.disturbances.outside import outside_wrench
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import World

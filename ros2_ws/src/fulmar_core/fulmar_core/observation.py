@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from array_api_compat import array_namespace, device
+from array_api_compat import device
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
@@ -47,8 +47,7 @@ class Observer:
             for term in terms
         ]
         if self._remembers:
-            scale = xp.asarray(self._scale, dtype=previous_command.dtype, device=device(previous_command))
-            share = previous_command / scale
+            share = shares(previous_command, self._scale)
             columns += [share[..., i] for i in range(share.shape[-1])]
         # Stacked in front and turned about: each column is written in one piece.
         return xp.moveaxis(xp.stack(columns, axis=0), 0, -1)
@@ -70,7 +69,16 @@ def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> 
     """
     if not robot.actuators.response.slew:
         return command
-    xp = array_namespace(command)
-    most = control_dt * np.asarray(robot.actuators.response.slew)
-    limit = xp.asarray(most, dtype=command.dtype, device=device(command))
+    slew = robot.actuators.response.slew
+    limit: Array = control_dt * slew[0]
+    if any(rate != slew[0] for rate in slew):
+        most = control_dt * np.asarray(slew)
+        limit = array_namespace(command).asarray(most, dtype=command.dtype, device=device(command))
     return robot.actuators.limited(previous + clip(command - previous, -limit, limit))
+
+
+def shares(command: Array, scale: np.ndarray) -> Array:
+    """Commands as shares of the largest ones, shapes (..., n), (n,) and (..., n)."""
+    if (scale == 1.0).all():
+        return command
+    return command / array_namespace(command).asarray(scale, dtype=command.dtype, device=device(command))

@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace
 
+from fulmar_core.arrays import array_namespace
 from fulmar_core.rotation import Array, from_yaw
 from fulmar_core.state import RigidBodyState
 

@@ -68,23 +68,6 @@ def multiply(p_xyzw: Array, q_xyzw: Array) -> Array:
     )
 
 
-def from_rotation_vector(phi: Array) -> Array:
-    """Exponential map: rotation vector to quaternion.
-
-    Args:
-        phi: Axis times angle, shape (..., 3) [rad].
-
-    Returns:
-        Unit quaternion, shape (..., 4).
-    """
-    xp = array_namespace(phi)
-    half = 0.5 * xp.sqrt(xp.sum(phi * phi, axis=-1, keepdims=True))
-    # sin(h)/h by its series where h is small, so that zero needs no branch of its own.
-    safe = xp.where(half > 1e-4, half, xp.ones_like(half))
-    ratio = xp.where(half > 1e-4, xp.sin(safe) / safe, 1.0 - half * half / 6.0)
-    return xp.concat((0.5 * ratio * phi, xp.cos(half)), axis=-1)
-
-
 def from_yaw(yaw: Array) -> Array:
     """Quaternion of a rotation about +z, shape (...,) [rad] to (..., 4)."""
     xp = array_namespace(yaw)

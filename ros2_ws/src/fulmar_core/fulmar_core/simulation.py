@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace, is_numpy_namespace
+from array_api_compat import is_numpy_namespace
 
+from fulmar_core.arrays import array_namespace
 from fulmar_core.counter_rng import uniform_from, words, world_keys
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import FIELDS, World

@@ -3,7 +3,8 @@
 Both are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
 count. A step of the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward
 and, where episodes end, new ones; worlds are shared out among processes. A step of MuJoCo is its physics alone, over
-the same control period; MuJoCo's own drag in a fluid stands for the water, which it would need a callback for.
+the same control period; MuJoCo's own drag in a fluid stands for the water, which it would need a callback for. What
+the plant's own water costs is measured beside it: the plant's simulator, one in one thread of Python.
 """
 
 from __future__ import annotations
@@ -19,14 +20,15 @@ from typing import Any
 import mujoco
 import mujoco.rollout
 import numpy as np
-from array_api_compat import array_namespace
 
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import episode_steps
+from fulmar_core.episode import draw_episode, episode_steps
+from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
+from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.mujoco_model import Scene
 
 DIFFERENT = 16  # batches of random commands, used again and again
@@ -96,7 +98,6 @@ class BatchPace:
         rng = np.random.default_rng(SEED)
         self._age = rng.integers(0, self._horizon, worlds)
         self._commands = [library.array(_random_commands(robot, worlds, rng)) for _ in range(DIFFERENT)]
-        self._scale = library.array(robot.actuators.scale)
         self._at = 0
 
     def steps_per_s(self, seconds: float) -> float:
@@ -109,24 +110,23 @@ class BatchPace:
         return count * worlds / (time.perf_counter() - began)
 
     def _step(self) -> None:
-        simulation, task, robot = self._simulation, self._task, self._robot
+        simulation = self._simulation
         before, goal, previous = simulation.truth, simulation.goal, simulation.command
         simulation.step(self._commands[self._at])
         self._at = (self._at + 1) % DIFFERENT
-        after = simulation.truth
-        xp = array_namespace(after.x)
-        share, old = simulation.command / self._scale, previous / self._scale
-        change = share - old
-        costs = robot.costs.effort * xp.sum(xp.abs(share), axis=1)
-        costs = costs + robot.costs.change * xp.sum(change * change, axis=1)
-        self.reward = task.reward(before, after, goal) - costs
+        self.reward, ended_early = learning_step(
+            self._robot,
+            self._task,
+            before=before,
+            after=simulation.truth,
+            goal=goal,
+            ended=simulation.goal,
+            previous=previous,
+            command=simulation.command,
+        )
         self._age += 1
         ended = self._age >= self._horizon
-        errors, touching = task.errors(after, simulation.goal), task.collides(after, goal, robot)
-        if errors.position is not None:
-            ended[self._library.numbers(errors.position > robot.limits.geofence)] = True
-        if touching is not None:
-            ended[self._library.numbers(touching)] = True
+        ended[self._library.numbers(ended_early)] = True
         self.observation = simulation.observe()
         over = np.flatnonzero(ended)
         if over.size:
@@ -228,6 +228,26 @@ class MujocoPace:
         return count / (time.perf_counter() - began)
 
 
+class PlantPace:
+    """The plant's own simulator, at random commands: MuJoCo with the core's water at every physics step."""
+
+    def __init__(self, robot: Robot, task: Task, scenario: Scenario) -> None:
+        """Begin an episode and draw commands."""
+        self._backend = MujocoBackend.of(robot, task, scenario)
+        self._backend.reset(draw_episode(robot, task, scenario, seed=SEED, number=0), seed=SEED)
+        self._ticks = robot.timing.substeps(robot.timing.control_hz)
+        self._commands = _random_commands(robot, DIFFERENT, np.random.default_rng(SEED))
+
+    def steps_per_s(self, seconds: float) -> float:
+        """Step for a while; returns how many control steps were made a second."""
+        began, count = time.perf_counter(), 0
+        while time.perf_counter() - began < seconds or not count:
+            for command in self._commands:
+                self._backend.step(command, self._ticks)
+            count += DIFFERENT
+        return count / (time.perf_counter() - began)
+
+
 def measure(
     robots: list[Robot],
     task: Task,
@@ -250,11 +270,12 @@ def measure(
         library: Of the batch.
         cores: Processes of the batch, and threads of MuJoCo's rollout.
         seconds: Of each measurement [s].
-        rounds: Measurements of each of the two, in turns.
+        rounds: Measurements of each, in turns.
         progress: Told after every round.
 
     Returns:
-        For each robot's name the medians `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`.
+        For each robot's name the medians `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`; for robots on
+        water also `mujoco_with_water_steps_per_s`.
     """
     found = {}
     with ExitStack() as stack:
@@ -266,19 +287,23 @@ def measure(
             if shared is not None:
                 shared.take(robot, task, scenario, worlds=worlds, library=library)
             batch = shared or BatchPace(robot, task, scenario, worlds=worlds, library=library)
-            paces = batch, MujocoPace(robot, threads=cores)
+            paces = [batch, MujocoPace(robot, threads=cores)]
+            if robot.hydrodynamics is not None:
+                paces.append(PlantPace(robot, task, scenario))
             for pace in paces:
                 pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
             measured = []
             for _ in range(rounds):
                 measured.append([pace.steps_per_s(seconds) for pace in paces])
                 progress()
-            ours, theirs = (float(value) for value in np.median(np.array(measured), axis=0))
+            ours, theirs, *wet = (float(value) for value in np.median(np.array(measured), axis=0))
             found[robot.name] = {
                 "batch_steps_per_s": ours,
                 "mujoco_steps_per_s": theirs,
                 "ratio": ours / theirs,
             }
+            if wet:
+                found[robot.name]["mujoco_with_water_steps_per_s"] = wet[0]
     return found
 
 

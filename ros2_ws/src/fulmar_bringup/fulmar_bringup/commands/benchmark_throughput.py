@@ -42,7 +42,8 @@ def throughput(
     """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
 
     A step of the batch has all that training asks for: disturbances, odometry, observation, reward and new episodes.
-    MuJoCo's is physics alone. Both are measured in turns in this run, on the same cores; the medians are printed.
+    MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
+    the medians are printed. For robots on water the plant's own simulator, with its water, is measured in one thread.
 
     Try:
 
@@ -111,7 +112,7 @@ def _print(figures: dict[str, Any]) -> None:
         f"{figures['library']} on {figures['device']} · {figures['cores']} cores"
     )
     table.add_column("robot")
-    for column in ("batch, steps/s", "MuJoCo, steps/s", "ratio"):
+    for column in ("batch, steps/s", "MuJoCo, steps/s", "ratio", "MuJoCo with the plant's water, steps/s"):
         table.add_column(column, justify="right")
     for name, found in figures["robots"].items():
         table.add_row(
@@ -119,5 +120,8 @@ def _print(figures: dict[str, Any]) -> None:
             f"{found['batch_steps_per_s']:,.0f}",
             f"{found['mujoco_steps_per_s']:,.0f}",
             f"{found['ratio']:.1f}",
+            f"{found['mujoco_with_water_steps_per_s']:,.0f}"
+            if "mujoco_with_water_steps_per_s" in found
+            else "",
         )
     output.print(table)

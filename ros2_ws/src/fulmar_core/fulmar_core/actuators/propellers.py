@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from array_api_compat import array_namespace, device
+from array_api_compat import device
 
 from fulmar_core.actuators.response import Response
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip, sum_of
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
@@ -81,8 +81,9 @@ class Propellers:
         xp = array_namespace(command)
         start, rise = _table(self.curve, xp, command.dtype, device(command))
         place = clip((command + 1.0) * (0.5 * (len(self.curve) - 1)), 0.0, len(self.curve) - 1.0)
-        i = xp.astype(place, xp.int64)
-        return start[i] + rise[i] * (place - xp.astype(i, command.dtype))
+        below = xp.floor(place)
+        i = xp.astype(below, xp.int64)
+        return start[i] + rise[i] * (place - below)
 
     def planar_wrench(self, applied: Array, gain: Array) -> tuple[Array, Array, Array]:
         """Force and moment in the body's plane.
@@ -96,9 +97,8 @@ class Propellers:
         """
         xp = array_namespace(applied)
         thrust = self.thrust(applied) * gain
-        arms = self.lever_arms
-        ahead = sum(thrust[i] for i in range(len(arms)))
-        moment = sum(float(arms[i]) * thrust[i] for i in range(len(arms)))
+        ahead = sum_of([thrust[i] for i in range(len(self.propellers))])
+        moment = sum_of([float(arm) * thrust[i] for i, arm in enumerate(self.lever_arms)])
         return ahead, xp.zeros_like(ahead), moment
 
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fulmar_core.controllers.around import Around
+from fulmar_core.controllers.guidance import passing_speed
 from fulmar_core.controllers.seen import Reader, Vector
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
@@ -80,6 +81,19 @@ class Law(ABC):
             self._side = np.zeros_like(goal[0])
         goal, room, self._side = around.aim(goal, self.reader.obstacles(observation), course, self._side)
         return goal, room
+
+    def last_speed(self, goal: Vector, observation: np.ndarray, *, cruise: np.ndarray | float) -> np.ndarray:
+        """Speed at the current target, shape (...,) [m/s]: that of passing it, or none where the robot shall stay.
+
+        Args:
+            goal: Way to the target, shapes (...,) [m].
+            observation: Says where the next one is.
+            cruise: Speed where the course goes straight on [m/s].
+        """
+        if not self.reader.passes:
+            return np.zeros_like(goal[0])
+        leg = self.reader.next_leg(observation)
+        return passing_speed(goal, leg, cruise=cruise, corner=self.gains.corner)
 
     @abstractmethod
     def command(self, observation: np.ndarray) -> np.ndarray:

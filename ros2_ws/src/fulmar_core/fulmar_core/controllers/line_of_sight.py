@@ -17,7 +17,6 @@ from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
-    passing_speed,
     stopping_speed,
     way_to_face,
     way_to_turn_least,
@@ -103,10 +102,7 @@ class LineOfSight(Law):
             way = way_to_face(goal, u, backwards=gains.astern > 0.0)
         alpha = bearing(goal, way)
         cruise = np.where(way < 0.0, gains.astern, gains.cruise) * share
-        last = np.zeros_like(rho)
-        if self.reader.passes and not self.reader.heads:
-            leg = self.reader.next_leg(observation)
-            last = passing_speed(goal, leg, cruise=cruise, corner=gains.corner)
+        last = np.zeros_like(rho) if self.reader.heads else self.last_speed(goal, observation, cruise=cruise)
         fastest = stopping_speed(
             np.minimum(rho, room), gain=gains.approach * share, deceleration=gains.braking, last=last
         )

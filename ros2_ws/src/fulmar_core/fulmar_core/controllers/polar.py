@@ -19,7 +19,6 @@ from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
-    passing_speed,
     stopping_speed,
     way_to_face,
 )
@@ -67,10 +66,7 @@ class Polar(Law):
         if self.reader.heads:
             return self._to_pose(goal, self.reader.turn(observation), u)
         goal, room = self.around(goal, observation, end_that_goes_first(u))
-        last = np.zeros_like(u)
-        if self.reader.passes:
-            leg = self.reader.next_leg(observation)
-            last = passing_speed(goal, leg, cruise=self._drive.max_speed, corner=self.gains.corner)
+        last = self.last_speed(goal, observation, cruise=self._drive.max_speed)
         return self._to_position(goal, u, room, last)
 
     def _at_velocity(self, observation: np.ndarray) -> np.ndarray:

@@ -21,7 +21,6 @@ from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
-    passing_speed,
     stopping_speed,
     way_to_face,
 )
@@ -64,10 +63,7 @@ class PurePursuit(Law):
             eu, _, er = self.reader.velocity_error(observation)
             return self._at_velocity(u + eu, r + er, u)
         goal, room = self.around(self.reader.goal(observation), observation, end_that_goes_first(u))
-        last = np.zeros_like(u)
-        if self.reader.passes:
-            leg = self.reader.next_leg(observation)
-            last = passing_speed(goal, leg, cruise=self.gains.cruise, corner=self.gains.corner)
+        last = self.last_speed(goal, observation, cruise=self.gains.cruise)
         return self._pursuit(goal, u, room, last)
 
     def _pursuit(self, goal: Vector, u: np.ndarray, room: np.ndarray, last: np.ndarray) -> np.ndarray:

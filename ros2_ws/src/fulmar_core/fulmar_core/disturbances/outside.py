@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from array_api_compat import array_namespace
-
+from fulmar_core.arrays import array_namespace
 from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from array_api_compat import array_namespace
-
 from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.arrays import array_namespace
 from fulmar_core.config import load_config
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.world import World

@@ -6,8 +6,7 @@ world, where nothing but forces changes it; the body's own frame would need Cori
 
 from __future__ import annotations
 
-from array_api_compat import array_namespace
-
+from fulmar_core.arrays import array_namespace
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.planar import PlanarState
@@ -51,7 +50,8 @@ def free_body_step(
         ahead, left = ahead + world.drag * drag[0], left + world.drag * drag[1]
         moment = moment + world.drag * drag[2]
         mu, mv, ir = water.planar_added_mass
-        mass, yaw_inertia = mass + mu, yaw_inertia + ir
+        if mu or ir:
+            mass, yaw_inertia = mass + mu, yaw_inertia + ir
         if mv != mu:
             # As if the sway's mass were the surge's, with what that leaves out as forces of their own.
             across = c * outside[1] - s * outside[0]

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from array_api_compat import array_namespace, device
+from array_api_compat import device
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.rotation import Array, cross
 
 Six = tuple[float, float, float, float, float, float]
@@ -79,13 +79,8 @@ class Hydrodynamics:
         Returns:
             Force ahead [N], to the left [N], and yaw moment [N·m], shapes (...,).
         """
-        xp = array_namespace(u)
         (du, dv, dr), (qu, qv, qr) = _planar(self.linear_damping), _planar(self.quadratic_damping)
-        return (
-            -(du + qu * xp.abs(u)) * u,
-            -(dv + qv * xp.abs(v)) * v,
-            -(dr + qr * xp.abs(r)) * r,
-        )
+        return _drag(u, du, qu), _drag(v, dv, qv), _drag(r, dr, qr)
 
     def damping(self, velocity: Array) -> Array:
         """Drag of the water.
@@ -133,6 +128,15 @@ class Hydrodynamics:
     def planar_added_mass(self) -> tuple[float, float, float]:
         """Of surge [kg], sway [kg] and yaw [kg·m²]."""
         return _planar(self.added_mass)
+
+
+def _drag(speed: Array, linear: float, quadratic: float) -> Array:
+    """-(linear + quadratic |speed|) speed, in as few arrays as that takes."""
+    drag = array_namespace(speed).abs(speed)
+    drag *= -quadratic
+    drag -= linear
+    drag *= speed
+    return drag
 
 
 def _planar(six: Six) -> tuple[float, float, float]:

@@ -11,9 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from array_api_compat import array_namespace
-
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.planar import PlanarState, to_body

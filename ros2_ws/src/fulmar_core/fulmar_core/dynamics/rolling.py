@@ -6,11 +6,9 @@ allow. A push from outside only counts along the way the wheels roll, and only w
 
 from __future__ import annotations
 
-from array_api_compat import array_namespace
-
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.dynamics.hydrodynamics import GRAVITY

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from array_api_compat import array_namespace, device
+from array_api_compat import device
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import NOISE, Keys, normal_from, uniform_from, words, world_keys
 from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
@@ -119,12 +119,12 @@ class Odometer:
             return truth
         xp = array_namespace(truth.x)
         if only is not None:
-            return self._restart(truth[only], world[only], numbers[only], repeats[only], only)
+            return self._restart(truth[only], world, numbers[only], repeats[only], only)
         columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
         if self._keys is None:
             self._keys = world_keys(self._seed, numbers, repeats, NOISE)
         bits = words(self._keys, steps, self._words)
-        reading = self._disturbed(columns, world, bits)
+        reading = self._disturbed(columns, _errors(world), bits)
         if self._depth > 1:
             reading = self._delayed(reading, world)
         lost = uniform_from(bits[6], columns.dtype) < (world.dropout if self._noisy else 0.0)
@@ -146,7 +146,8 @@ class Odometer:
         assert self._keys is not None
         for every, some in zip(self._keys, keys, strict=True):
             every[only] = some
-        reading = self._disturbed(columns, world, words(keys, 0, self._words))
+        errors = tuple(error[..., only] for error in _errors(world))
+        reading = self._disturbed(columns, errors, words(keys, 0, self._words))
         # Copies: who was given these readings keeps them.
         self._held, *self._past = (xp.asarray(old, copy=True) for old in (self._held, *self._past))
         for old in (self._held, *self._past):
@@ -164,21 +165,23 @@ class Odometer:
             self._constants[part] = xp.asarray(self._spec.column(part), dtype=like.dtype, device=device(like))
         return self._constants[part]
 
-    def _disturbed(self, columns: Array, world: World, bits: Array) -> Array:
+    def _disturbed(self, columns: Array, errors: tuple[Array, ...], bits: Array) -> Array:
+        """Columns, shape (6, n), with the `_errors` that worlds have, and with random bits."""
         xp = array_namespace(columns)
+        scale, bias, loudness, blur, spin_blur = errors
         if "scale_std" in self._used:
-            columns = columns * (1.0 + self._constant("scale_std", columns) * world.sensor_scale)
+            columns = columns * (1.0 + self._constant("scale_std", columns) * scale)
         if "bias_std" in self._used:
-            columns = columns + self._constant("bias_std", columns) * world.sensor_bias
+            columns = columns + self._constant("bias_std", columns) * bias
         if "std" in self._used:
-            noise = normal_from(bits[:6], columns.dtype) * world.noise
+            noise = normal_from(bits[:6], columns.dtype) * loudness
             columns = columns + self._constant("std", columns) * noise
         if self._blurred:
             share = 2.0 * uniform_from(bits[7:10], columns.dtype) - 1.0
             error = (
-                world.velocity_noise * share[0],
-                world.velocity_noise * share[1],
-                world.yaw_rate_noise * share[2],
+                blur * share[0],
+                blur * share[1],
+                spin_blur * share[2],
             )
             columns = xp.stack(
                 (*(columns[i] for i in range(3)), *(columns[3 + i] + error[i] for i in range(3)))
@@ -203,3 +206,8 @@ class Odometer:
         for age, old in enumerate(self._past[1:], start=1):
             chosen = xp.where(back == age, old, chosen)
         return chosen
+
+
+def _errors(world: World) -> tuple[Array, ...]:
+    """How far off sensors are in each world: scale, bias, noise, and what blurs velocities and turn rates."""
+    return world.sensor_scale, world.sensor_bias, world.noise, world.velocity_noise, world.yaw_rate_noise

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from array_api_compat import array_namespace
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.planar import PlanarState, at_rest, wrapped
@@ -63,7 +63,7 @@ class WaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PassingTask:
+class PassingTask(ABC):
     """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
 
     name: str
@@ -90,9 +90,9 @@ class PassingTask:
         if not 0.0 <= self.start_cone_deg <= 180.0:
             raise ValueError("'start_cone_deg' must lie in [0, 180].")
 
+    @abstractmethod
     def places(self, draws: Draws) -> np.ndarray:
         """Draw where the targets are, shape (worlds, k, 2) [m]."""
-        raise NotImplementedError
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw a start at rest and a closed course."""

@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from array_api_compat import array_namespace
-
+from fulmar_core.arrays import array_namespace
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.rotation import Array

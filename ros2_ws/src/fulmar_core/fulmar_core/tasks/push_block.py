@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
-from array_api_compat import array_namespace
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.dynamics.pushing import Block, push

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
-from array_api_compat import array_namespace
 
+from fulmar_core.arrays import array_namespace
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState, to_body

@@ -1,0 +1,75 @@
+"""What a control step is worth to a learner, and whether it ends an episode: one rule for everyone who steps worlds."""
+
+from __future__ import annotations
+
+from array_api_compat import device, is_numpy_array
+
+from fulmar_core.arrays import array_namespace, sum_of
+from fulmar_core.goal import Goal
+from fulmar_core.observation import shares
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.push_block import PushBlock
+
+
+def learning_step(
+    robot: Robot,
+    task: Task,
+    *,
+    before: PlanarState,
+    after: PlanarState,
+    goal: Goal,
+    ended: Goal,
+    previous: Array,
+    command: Array,
+) -> tuple[Array, Array]:
+    """Judge one control step of some worlds.
+
+    Args:
+        robot: Says what using its actuators costs, and how far off it may be.
+        task: Says what the step is worth.
+        before: True state when the step began, shapes (worlds,).
+        after: When it ended.
+        goal: What the step was for.
+        ended: The goal after it.
+        previous: Command of the step before, shape (worlds, n).
+        command: Of this step.
+
+    Returns:
+        The reward, less what the actuators cost and what is in the way; and whether the episode is over before its
+        time, because the robot left the geofence or touched something. Shapes (worlds,).
+    """
+    reward = task.reward(before, after, goal) - _cost(robot, previous, command)
+    if isinstance(task, PushBlock):
+        reward = reward + task.block_reward(goal, ended)
+    penalty = getattr(task, "penalty", None)  # tasks where nothing is in the way have none
+    if penalty is not None:
+        reward = reward - penalty(after, goal, robot)
+    xp = array_namespace(after.x)
+    over = xp.zeros(after.x.shape, dtype=xp.bool, device=device(after.x))
+    away = task.errors(after, ended).position
+    if away is not None:
+        over = away > robot.limits.geofence
+    touching = task.collides(after, goal, robot)
+    return reward, over if touching is None else over | touching
+
+
+def _cost(robot: Robot, previous: Array, command: Array) -> Array:
+    """What using the actuators costs, shape (worlds,)."""
+    costs = robot.costs
+    scale = robot.actuators.scale
+    share = shares(command, scale)
+    cost = costs.effort * _sum(array_namespace(share).abs(share))
+    if costs.change:
+        change = share - shares(previous, scale)
+        cost = cost + costs.change * _sum(change * change)
+    return cost
+
+
+def _sum(rows: Array) -> Array:
+    """Sum of each row, shape (worlds,)."""
+    if not is_numpy_array(rows):
+        return array_namespace(rows).sum(rows, axis=1)
+    return sum_of([rows[:, i] for i in range(rows.shape[1])])

@@ -1,0 +1,106 @@
+"""What a control step is worth to a learner, and whether it ends an episode."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.goal import Goal
+from fulmar_core.learning_step import learning_step
+from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState, at_rest
+from fulmar_core.robot import load_robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import load_task
+
+BASE = load_robot("turtlebot2")
+POSITION, PUSH = load_task("go_to_position"), load_task("push_block")
+OBSTACLES, VELOCITIES = load_task("go_to_position_with_obstacles"), load_task("track_velocities")
+STILL = np.zeros((1, 2))
+
+
+def place(x):
+    return at_rest(np.array([float(x)]), np.zeros(1), np.zeros(1))
+
+
+def goal_at(x=0.0, *, disc=None, block=(0.0, 0.0)):
+    discs = np.zeros((1, 0, 3)) if disc is None else np.array([[disc]])
+    return Goal(np.array([[[x, 0.0, 0.0]]]), np.zeros(1), discs, np.array([block]))
+
+
+def judged(task, here, *, before=None, goal=None, ended=None, previous=STILL, command=STILL, robot=BASE):
+    goal = goal_at() if goal is None else goal
+    reward, over = learning_step(
+        robot,
+        task,
+        before=place(here if before is None else before),
+        after=place(here),
+        goal=goal,
+        ended=goal if ended is None else ended,
+        previous=previous,
+        command=command,
+    )
+    return float(reward[0]), bool(over[0])
+
+
+def test_actuators_cost_by_their_share_of_full_command_and_by_its_change():
+    robot = replace(BASE, costs=replace(BASE.costs, effort=0.3, change=0.2))
+    full = robot.actuators.scale[None]
+    free, _ = judged(POSITION, 1.0, robot=robot)
+    held, _ = judged(POSITION, 1.0, robot=robot, previous=full, command=-full)
+    assert free - held == pytest.approx(0.3 * 2 + 0.2 * 2 * 2.0**2)
+
+
+def test_an_episode_ends_outside_the_geofence_and_not_before():
+    fence = BASE.limits.geofence
+    assert not judged(POSITION, fence - 0.01)[1]
+    assert judged(POSITION, fence + 0.01)[1]
+
+
+def test_touching_ends_an_episode_and_costs_what_the_task_says():
+    goal = goal_at(4.0, disc=(0.0, 0.0, 0.3))
+    near, touches = judged(OBSTACLES, 0.0, goal=goal)
+    away, clear = judged(OBSTACLES, 0.0, goal=goal_at(4.0, disc=(-9.0, 0.0, 0.3)))
+    assert (touches, clear) == (True, False)
+    assert away - near == pytest.approx(OBSTACLES.collision_cost + OBSTACLES.nearness_cost)
+
+
+def test_a_task_without_a_place_has_no_geofence():
+    assert not judged(VELOCITIES, 1e6)[1]
+
+
+def test_where_the_block_went_counts_and_where_it_is_may_be_outside():
+    start, moved = goal_at(block=(2.0, 0.0)), goal_at(block=(1.9, 0.0))
+    stayed, _ = judged(PUSH, 3.0, goal=start)
+    pushed, over = judged(PUSH, 3.0, goal=start, ended=moved)
+    assert not over
+    gain = float((PUSH.block_reward(start, moved) - PUSH.block_reward(start, start))[0])
+    assert pushed - stayed == pytest.approx(gain)
+    far = goal_at(block=(BASE.limits.geofence + 0.1, 0.0))
+    assert judged(PUSH, 3.0, goal=start, ended=far)[1]
+
+
+@pytest.mark.parametrize("name", config_names("tasks"))
+def test_torch_judges_as_numpy_does(name):
+    torch = pytest.importorskip("torch")
+    task = load_task(name)
+    simulation = BatchSimulation(BASE, task, load_scenario("randomised"), worlds=40, seed=2, dtype=np.float64)
+    before, goal, previous = simulation.truth, simulation.goal, simulation.command
+    simulation.step(np.tile(BASE.actuators.scale, (40, 1)))
+    given = {
+        "before": before, "after": simulation.truth, "goal": goal, "ended": simulation.goal,
+        "previous": previous, "command": simulation.command,
+    }  # fmt: skip
+    ours = learning_step(BASE, task, **given)
+    theirs = learning_step(BASE, task, **{key: in_torch(value, torch) for key, value in given.items()})
+    np.testing.assert_allclose(theirs[0].numpy(), ours[0], rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(theirs[1].numpy(), ours[1])
+
+
+def in_torch(value, torch):
+    if isinstance(value, PlanarState | Goal):
+        return type(value)(*(torch.as_tensor(getattr(value, name)) for name in value.__slots__))
+    return torch.as_tensor(value)
