@@ -49,6 +49,7 @@ class LqrWeights:
     open_valve: float  # of each open valve
     position_error_limit: float  # errors beyond count as this, which sets the cruising speed [m]
     heading_error_limit_deg: float  # same for the turn rate [deg]
+    tracking_velocity: float = 0.0  # as 'velocity', where velocities are the goal; 0: the same
     tracking_torque: float = 0.0  # as 'torque', where a turn rate is the goal; 0: the same
     overshoot: float = 0.0  # how far beyond a waypoint to aim where the course goes straight on [m]
     open_valve_far: float = 0.0  # same, more of it, from `FAR` on, where precision is worth less
@@ -63,8 +64,8 @@ class LqrWeights:
             raise ValueError("weights must not be negative.")
         if min(self.force, self.torque, self.position_error_limit, self.heading_error_limit_deg) <= 0.0:
             raise ValueError("force, torque and the error limits must be greater than 0.")
-        if min(self.overshoot, self.tracking_torque, self.least_open_s) < 0.0:
-            raise ValueError("'overshoot', 'tracking_torque' and 'least_open_s' must not be negative.")
+        if min(self.overshoot, self.tracking_velocity, self.tracking_torque, self.least_open_s) < 0.0:
+            raise ValueError("'overshoot', 'least_open_s' and what is for tracking must not be negative.")
         if not 0.0 <= self.braking <= 1.0:
             raise ValueError("'braking' must lie in [0, 1].")
 
@@ -124,7 +125,8 @@ class Lqr(Law):
         self._weights = gains
         dt = 1.0 / self.control_hz
         a, b = linear_model(robot, dt)
-        q = np.array([gains.position] * 2 + [gains.heading] + [gains.velocity] * 2 + [gains.yaw_rate])
+        velocity = (self.reader.tracks and gains.tracking_velocity) or gains.velocity
+        q = np.array([gains.position] * 2 + [gains.heading] + [velocity] * 2 + [gains.yaw_rate])
         torque = (self.reader.tracks and gains.tracking_torque) or gains.torque
         r = dt * np.diag([gains.force, gains.force, torque])
         # What has no goal is not a state.
