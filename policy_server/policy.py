@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import onnxruntime
 
+from fulmar_core.controllers.told import told_for
 from fulmar_core.errors import BundleError
+from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import (
     GOLDEN,
     NETWORK,
@@ -49,7 +51,8 @@ class Policy:
         self.passport = read_passport(folder)
         self.control_hz = control_hz or robot.timing.control_hz
         check_fit(self.passport, robot, task, self.control_hz, where=str(folder))
-        self.observation_names = self.passport.observation_names
+        self._told = told_for(robot, task, self.control_hz, len(self.passport.observation_names))
+        self.observation_names = Observer(robot, task).names
         self._session = _open(folder)
         self._memory: np.ndarray | None = None
         _check_shapes(self._session, self.passport, folder)
@@ -58,13 +61,16 @@ class Policy:
     def reset(self) -> None:
         """Forget what was seen, if the network remembers anything."""
         self._memory = None
+        if self._told:
+            self._told.reset()
 
     def act(self, observation: Array) -> Array:
         """Choose actuators; shapes as in `Controller.act`.
 
         A network with memory remembers every row by itself, until `reset` or another number of rows.
         """
-        batch = np.atleast_2d(np.asarray(observation, dtype=np.float32))
+        rows = np.atleast_2d(np.asarray(observation))
+        batch = np.asarray(self._told.complete(rows) if self._told else rows, dtype=np.float32)
         if self.passport.memory:
             if self._memory is None or len(self._memory) != len(batch):
                 self._memory = np.zeros((len(batch), self.passport.memory), dtype=np.float32)
@@ -73,6 +79,8 @@ class Policy:
             )
         else:
             (command,) = self._session.run(["command"], {"observation": batch})
+        if self._told:
+            self._told.acts(command)
         return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
 
     def metadata(self) -> dict[str, Any]:

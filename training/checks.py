@@ -9,7 +9,6 @@ from typing import Any
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.metrics import summary
-from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import Task
@@ -43,10 +42,9 @@ class Check:
 def held_out_judge(robot: Robot, task: Task, scenario: Scenario) -> Judge:
     """Judge in the training scenario and in the nominal one: a network may be good at either alone."""
     worlds = (scenario, load_scenario("nominal"))
-    names = Observer(robot, task).names
 
     def judge(network: DeployedNetwork) -> tuple[float, float]:
-        controller = NetworkController(network, names, robot.timing.control_hz)
+        controller = NetworkController(network, robot, task, robot.timing.control_hz)
         figures = [
             summary(
                 roll_out_in_batch(controller, robot, task, world, episodes=EPISODES, seed=HELD_OUT_SEED), task

@@ -11,6 +11,7 @@ import numpy as np
 import onnx
 import torch
 
+from fulmar_core.controllers.told import Told, told_for, told_terms
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
@@ -44,6 +45,8 @@ def export(run: Path, out: Path) -> Passport:
     robot, task = load_robot(record["robot"]), load_task(record["task"])
     network, names = load_network(run / NETWORK_FILE), Observer(robot, task).names
     plan = network.plan
+    told = told_for(robot, task, float(record["control_hz"]), plan.inputs)
+    names += told_terms(robot) if told else ()
     if plan.inputs != len(names):
         raise ConfigError(
             f"{run}: the network takes {plan.inputs} terms, '{robot.name}' and '{task.name}' now have {len(names)}. "
@@ -71,7 +74,7 @@ def export(run: Path, out: Path) -> Passport:
         | {"curve": _curve(record)}
         | _verdict(record),
     )
-    return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
+    return write_bundle(out, _to_onnx(network), _golden(network, robot, task, told), passport)
 
 
 def _curve(record: dict[str, Any]) -> list[dict[str, float]]:
@@ -137,7 +140,7 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
         part.doc_string = ""
 
 
-def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
+def _golden(network: DeployedNetwork, robot: Robot, task: Task, told: Told | None) -> Golden:
     """What the network makes of held-out episodes at their start, and a few commands later."""
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
@@ -145,9 +148,12 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
     memory = np.zeros((GOLDEN_VECTORS // 2, network.plan.memory), dtype=np.float32)
     moments = []
     for _ in range(GOLDEN_STEPS + 1):
-        seen = np.asarray(simulation.observe(), dtype=np.float32)
+        seen = np.asarray(simulation.observe())
+        seen = np.asarray(told.complete(seen) if told else seen, dtype=np.float32)
         command, logits, after = network.infer(seen, memory)
         moments.append((seen, memory, command, logits, after))
         simulation.step(command)
+        if told:
+            told.acts(command)
         memory = after
     return Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))

@@ -8,7 +8,6 @@ from typing import Any
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import JUDGE_SEED
 from fulmar_core.metrics import summary
-from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import load_task
@@ -30,9 +29,7 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
     """
     record = read_run_record(run)
     robot, task, world = load_robot(record["robot"]), load_task(record["task"]), load_scenario(scenario)
-    controller = NetworkController(
-        load_network(run / NETWORK_FILE), Observer(robot, task).names, record["control_hz"]
-    )
+    controller = NetworkController(load_network(run / NETWORK_FILE), robot, task, record["control_hz"])
     trajectories = roll_out_in_backends(
         controller,
         lambda: MujocoBackend.of(robot, task, world),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import pickle
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -13,8 +12,12 @@ import numpy as np
 import torch
 from torch import nn
 
+from fulmar_core.controllers.told import told_for
 from fulmar_core.errors import ConfigError
+from fulmar_core.observation import Observer
+from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.tasks import Task
 
 
 @dataclass(frozen=True)
@@ -152,23 +155,30 @@ class NetworkController:
 
     name = "policy"
 
-    def __init__(self, network: DeployedNetwork, observation_names: Sequence[str], control_hz: float) -> None:
+    def __init__(self, network: DeployedNetwork, robot: Robot, task: Task, control_hz: float) -> None:
         """Wrap a network; rate in Hz."""
         self._network = network
-        self.observation_names = tuple(observation_names)
+        self.observation_names = Observer(robot, task).names
         self.control_hz = control_hz
         self._memory: np.ndarray | None = None
+        self._told = told_for(robot, task, control_hz, network.plan.inputs)
 
     def reset(self) -> None:
         """Forget what was seen."""
         self._memory = None
+        if self._told:
+            self._told.reset()
 
     def act(self, observation: Array) -> Array:
         """Choose actuators; shapes as in `Controller.act`."""
         batch = np.atleast_2d(observation)
         if self._memory is not None and len(self._memory) != len(batch):
             self._memory = None
+        if self._told:
+            batch = self._told.complete(batch)
         command, _, self._memory = self._network.infer(batch, self._memory)
+        if self._told:
+            self._told.acts(command)
         return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
 
     def metadata(self) -> dict[str, Any]:

@@ -127,6 +127,7 @@ class TrainingSettings:
     threads: int = 1  # of PyTorch; a second one gains little and loses much on a shared machine
     curriculum: Curriculum | None = None
     stop_at_success: StopAtSuccess | None = None
+    told: bool = False  # whether the network is told pushes and dead valves, of robots with on/off valves
 
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""

@@ -104,6 +104,7 @@ def train(
         seed=seed,
         reward_scale=settings.reward_scale,
         strength=settings.strength(0.0),
+        told=settings.told,
     )
     story = Story()
     if resume:

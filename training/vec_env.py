@@ -9,12 +9,14 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
+from fulmar_core.controllers.told import told_terms
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
+from training.told_truth import ToldTruth
 
 
 class BatchVecEnv(VecEnv):
@@ -37,6 +39,7 @@ class BatchVecEnv(VecEnv):
         training: bool = True,
         strength: float = 1.0,
         staggered: bool = True,
+        told: bool = False,
     ) -> None:
         """Build the worlds.
 
@@ -50,16 +53,19 @@ class BatchVecEnv(VecEnv):
             training: Start episodes where learning starts.
             strength: How much of the scenario counts, from 0 to 1; may be moved later by `set_strength` [-].
             staggered: First episodes have random lengths.
+            told: Observations also tell pushes and dead valves (`fulmar_core.controllers.told`).
         """
         self._robot, self._task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
+        self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
+        more = len(told_terms(robot)) if told else 0
         observation_space = gymnasium.spaces.Box(
-            -np.inf, np.inf, (len(self.simulation.observer.names),), np.float32
+            -np.inf, np.inf, (len(self.simulation.observer.names) + more,), np.float32
         )
         action_space: gymnasium.Space[Any] = (
             gymnasium.spaces.MultiBinary(count)
@@ -83,12 +89,15 @@ class BatchVecEnv(VecEnv):
 
     def state(self) -> dict[str, Any]:
         """Everything that a step changes, as values that pickle; for an exact resume."""
-        return {"simulation": self.simulation.snapshot(), "age": self._age.copy()}
+        state = {"simulation": self.simulation.snapshot(), "age": self._age.copy()}
+        return state | ({"told": self._told.state()} if self._told else {})
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what `state` returned."""
         self.simulation.restore(state["simulation"])
         self._age = state["age"].copy()
+        if self._told:
+            self._told.set_state(state["told"])
 
     def set_strength(self, strength: float) -> None:
         """How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-]."""
@@ -105,12 +114,19 @@ class BatchVecEnv(VecEnv):
         rng = np.random.Generator(np.random.Philox(self._seed))
         self._age = rng.integers(0, self._horizon if self._staggered else 1, self.num_envs)
         self.reset_infos = [{} for _ in range(self.num_envs)]
-        return np.asarray(self.simulation.observe())
+        if self._told:
+            self._told.forget()
+        return self._completed(np.asarray(self.simulation.observe()))
 
     def begin_anew(self, worlds: Sequence[int] | np.ndarray) -> None:
         """Begin the next episode in some worlds, whatever has become of the last one."""
         self.simulation.reset(worlds)
         self._age[np.asarray(worlds)] = 0
+        if self._told:
+            self._told.forget(worlds)
+
+    def _completed(self, observations: np.ndarray) -> np.ndarray:
+        return np.hstack((observations, self._told.told(self.simulation))) if self._told else observations
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
@@ -134,7 +150,9 @@ class BatchVecEnv(VecEnv):
         self._age += 1
         timed_out = (self._age >= self._horizon) & ~ended_early
         done = ended_early | timed_out
-        observations = np.asarray(simulation.observe())
+        if self._told:
+            self._told.learn(simulation)
+        observations = self._completed(np.asarray(simulation.observe()))
         # One shared dictionary where nothing ended: a thousand empty ones a step would cost more than the physics.
         infos: list[dict[str, Any]] = [_NOTHING_TO_SAY] * self.num_envs
         ended = np.flatnonzero(done)
@@ -146,8 +164,14 @@ class BatchVecEnv(VecEnv):
                 }
             self.begin_anew(ended)
             observations = observations.copy(order="K")  # the last ones are still in the infos
-            observations[ended] = simulation.observe(ended)
+            observations[ended] = self._observed(ended)
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
+
+    def _observed(self, worlds: np.ndarray) -> np.ndarray:
+        observations = np.asarray(self.simulation.observe(worlds))
+        if self._told:
+            observations = np.hstack((observations, self._told.told(self.simulation)[worlds]))
+        return observations
 
     def close(self) -> None:
         """Nothing to release."""

@@ -63,7 +63,7 @@ def sights(count):
 def test_commands_are_the_deterministic_actions_in_the_units_of_the_actuators(learners, name):
     learner, env = learners[name]
     network = deployed_network(learner, env, ROBOT.actuators.scale)
-    controller = NetworkController(network, NAMES, 10.0)
+    controller = NetworkController(network, ROBOT, TASK, 10.0)
     state, begins = None, np.ones(ROWS, dtype=bool)
     for seen in sights(4):
         actions, state = learner.predict(
@@ -88,7 +88,7 @@ def test_only_a_recurrent_policy_has_memory_and_it_forgets_on_reset(learners):
     plans = {name: deployed_network(*made, ROBOT.actuators.scale).plan for name, made in learners.items()}
     assert {name: plan.memory for name, plan in plans.items() if plan.memory} == {"recurrent_ppo": 12}
     network = deployed_network(*learners["recurrent_ppo"], ROBOT.actuators.scale)
-    controller, seen = NetworkController(network, NAMES, 10.0), sights(1)[0]
+    controller, seen = NetworkController(network, ROBOT, TASK, 10.0), sights(1)[0]
     first, second = controller.act(seen), controller.act(seen)
     assert not np.array_equal(first, second)
     controller.reset()
@@ -107,7 +107,7 @@ def test_a_bundle_commands_what_the_network_does_from_the_first_command_to_the_l
     passport = export(tmp_path / "run", tmp_path / "bundle")
     assert (passport.action, passport.memory) == ("continuous", network.plan.memory)
     assert passport.command_scale == tuple(ROBOT.actuators.scale)
-    served, known = Policy(tmp_path / "bundle", ROBOT, TASK), NetworkController(network, NAMES, 10.0)
+    served, known = Policy(tmp_path / "bundle", ROBOT, TASK), NetworkController(network, ROBOT, TASK, 10.0)
     for seen in sights(4):
         np.testing.assert_allclose(served.act(seen), known.act(seen), atol=1e-5)
     one = sights(4)[:, 0]

@@ -57,9 +57,9 @@ def test_the_best_check_is_kept_and_not_the_last(run):
     assert record["best"]["score"] == max(check["score"] for check in record["curve"])
 
 
-def test_the_network_of_a_run_can_be_loaded_and_used(run, task):
+def test_the_network_of_a_run_can_be_loaded_and_used(run, robot, task):
     network = load_network(run[0] / NETWORK_FILE)
-    controller = NetworkController(network, task.observation_names, 5.0)
+    controller = NetworkController(network, robot, task, 5.0)
     assert network.plan.inputs == len(task.observation_names)
     assert controller.act(np.zeros(10)).shape == (8,)
     assert controller.act(np.zeros((3, 10))).shape == (3, 8)

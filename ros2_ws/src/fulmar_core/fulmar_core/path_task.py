@@ -18,7 +18,7 @@ from fulmar_core.rotation import Array
 from fulmar_core.tasks.track_velocities import TrackVelocities
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FollowPath(TrackVelocities):
     """Track the velocity that leads along a closed path without end, by `LookAhead`, without turning.
 

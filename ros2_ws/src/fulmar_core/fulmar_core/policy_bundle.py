@@ -19,6 +19,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from fulmar_core.controllers.told import told_terms
 from fulmar_core.errors import BundleError, did_you_mean
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
@@ -181,7 +182,8 @@ def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *
             f"policy '{where}' was trained at {passport.control_hz:g} Hz, but would run at {control_hz:g} Hz. "
             f"Train and export it at {control_hz:g} Hz, or run it with control_hz = {passport.control_hz:g}."
         )
-    _check_names("observation", passport.observation_names, Observer(robot, task).names, where)
+    seen = Observer(robot, task).names
+    _check_names("observation", passport.observation_names, seen + _told(passport, robot, len(seen)), where)
     _check_names("actuator", passport.actuator_names, robot.actuators.names, where)
     action = action_of(robot)
     if passport.action != action:
@@ -194,6 +196,11 @@ def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *
             f"policy '{where}' was trained for full commands of {list(passport.command_scale)}, those of "
             f"'{robot.name}' are {list(scale)}. Train and export it again."
         )
+
+
+def _told(passport: Passport, robot: Robot, seen: int) -> tuple[str, ...]:
+    """What a network that takes more than is seen must be told."""
+    return told_terms(robot) if len(passport.observation_names) > seen else ()
 
 
 def action_of(robot: Robot) -> Action:

@@ -16,6 +16,7 @@ from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_term
 
 ERROR_TERMS = ("velocity_error_x_in_body", "velocity_error_y_in_body", "yaw_rate_error")
 FINE_ERROR_TERMS = ("fine_velocity_error_x_in_body", "fine_velocity_error_y_in_body", "fine_yaw_rate_error")
+STEP_S = 0.2  # between targets that turn [s]
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class VelocityReward:
     yaw_rate: float  # times exp(-|e| / 0.1 rad/s)
     yaw_rate_far: float  # times exp(-|e| / 0.5 rad/s): RoboRAN, same file
     joint: float  # times exp(-e / 0.1 m/s - |e| / 0.1 rad/s): asks for both at once
+    fine: float = 0.0  # times exp(-e / 0.02 m/s): asks for a centimetre per second
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,16 @@ class TrackVelocities:
     fine_velocity: float  # where the magnified velocity error saturates [m/s]
     fine_yaw_rate: float  # same for the turn rate [rad/s]
     reward_weights: VelocityReward
+    turning: float = 0.0  # how fast the direction of a target turns at most, by `STEP_S`; 0: not at all [rad/s]
+    spin: float = 1.0  # largest turn rate of targets, as a share of the robot's [-]
 
     goal_topic: ClassVar[str] = "goal_velocity"
     observation_names: ClassVar[tuple[str, ...]] = (*ERROR_TERMS, *MOTION_TERMS, *FINE_ERROR_TERMS)
+
+    @property
+    def step_s(self) -> float:
+        """Time from a target to the next one in the list [s]."""
+        return STEP_S if self.turning else self.hold_s
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw a start at rest, and as many targets as the episode has time for."""
@@ -56,16 +65,28 @@ class TrackVelocities:
         can = robot.performance
         ahead = draws.uniform(-can.reverse_speed, can.speed, count)
         left = draws.uniform(-can.lateral_speed, can.lateral_speed, count)
-        turn = draws.uniform(-can.yaw_rate, can.yaw_rate, count)
+        turn = self.spin * draws.uniform(-can.yaw_rate, can.yaw_rate, count)
         yaw = draws.uniform(-math.pi, math.pi)
         xp = array_namespace(ahead)
         speed = xp.sqrt(ahead * ahead + left * left)
         fastest = can.turning_acceleration / clip(speed, 1e-6, None)
         targets = xp.stack((ahead, left, clip(turn, -fastest, fastest)), axis=-1)
+        if self.turning:
+            targets = self._turned(targets, draws.uniform(-self.turning, self.turning, count))
         zero = xp.zeros_like(yaw)
         return at_rest(zero, zero, yaw), Goal(
             targets, zero, no_obstacles(draws.worlds), targets[:, 0, :2] * 0.0
         )
+
+    def _turned(self, targets: Array, rates: Array) -> Array:
+        """Targets at every `STEP_S`, which turn at some rates [rad/s] while they hold, shape (worlds, steps, 3)."""
+        xp = array_namespace(targets)
+        steps = round(self.hold_s / STEP_S)
+        angle = rates[..., None] * STEP_S * xp.arange(steps, dtype=targets.dtype)
+        c, s = xp.cos(angle), xp.sin(angle)
+        u, v = targets[..., 0, None], targets[..., 1, None]
+        turned = xp.stack((c * u - s * v, s * u + c * v, targets[..., 2, None] + 0.0 * c), axis=-1)
+        return xp.reshape(turned, (targets.shape[0], -1, 3))
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `TaskProtocol.observe`."""
@@ -82,7 +103,7 @@ class TrackVelocities:
         if goal.targets.shape[-2] == 1:
             return goal
         xp = array_namespace(goal.targets)
-        done = xp.floor((time_s + 1e-6) / self.hold_s)
+        done = xp.floor((time_s + 1e-6) / self.step_s)
         last = goal.targets.shape[-2] - 1
         done = xp.astype(clip(done, 0.0, float(last)), goal.done.dtype)
         return Goal(goal.targets, xp.zeros_like(goal.done) + done, goal.obstacles, goal.block)
@@ -99,6 +120,7 @@ class TrackVelocities:
             + w.yaw_rate * xp.exp(-r / 0.1)
             + w.yaw_rate_far * xp.exp(-r / 0.5)
             + w.joint * xp.exp(-e / 0.1 - r / 0.1)
+            + w.fine * xp.exp(-e / 0.02)
         )
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 ROBOT = "floating_platform"
 POSE_TASK = "drift_go_to_pose"
-PATH_TASK = "track_velocities"
+PATH_TASK = "drift_track_velocities"
 EPISODES = 256  # of each condition: thesis §3.5.7
 PATH_EPISODES = 4  # of each path: the thesis has one run, ours begin at several places of it
 CONTROLLERS = ("policy", "lqr")
