@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -64,16 +64,29 @@ def load_policy_table() -> PolicyTable:
 
 
 def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
-    """Hash of everything a policy is made from: robot, task, scenario, settings, seed and number of updates."""
+    """Hash of everything a policy is made from: robot, task, scenario, settings, seed and number of updates.
+
+    What is at its default does not count, so that a new option leaves policies that do without it as they are.
+    """
     ingredients = {
-        "robot": asdict(load_robot(policy.robot)),
-        "task": asdict(load_task(policy.task)),
-        "scenario": asdict(load_scenario(settings.scenario)),
-        "settings": asdict(settings),
+        "robot": _chosen(load_robot(policy.robot)),
+        "task": _chosen(load_task(policy.task)),
+        "scenario": _chosen(load_scenario(settings.scenario)),
+        "settings": _chosen(settings),
         "policy": asdict(policy) | {"success": None},
         "format": FORMAT,
     }
     return hashlib.sha256(json.dumps(ingredients, sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+def _chosen(values: Any) -> Any:
+    """A dataclass as a dictionary, without what is at its default."""
+    if is_dataclass(values) and not isinstance(values, type):
+        found = {field: getattr(values, field.name) for field in fields(values)}
+        return {field.name: _chosen(value) for field, value in found.items() if value != field.default}
+    if isinstance(values, tuple | list):
+        return [_chosen(value) for value in values]
+    return values
 
 
 def policy_job(
