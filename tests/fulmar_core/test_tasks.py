@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -113,6 +114,26 @@ def test_turning_to_the_goal_s_heading_pays_in_the_pose_task_alone():
     ]
     assert gains[0] > 0.05
     assert gains[1] == 0.0
+
+
+@settings(derandomize=True, deadline=None)
+@given(x=st.floats(-4.0, 4.0), yaw=radians, speed=st.floats(-0.2, 0.2), rate=st.floats(-0.5, 0.5))
+def test_magnified_terms_are_shares_of_where_they_saturate(x, yaw, speed, rate):
+    task = load_task("drift_go_to_pose")
+    terms = seen(task, body(x, yaw=yaw, vx=speed, yaw_rate=rate), goal_at((0.0, 0.0, 0.0)))
+    error = math.atan2(terms["sin_heading_error"], terms["cos_heading_error"])
+    for magnified, value, saturation in (
+        ("fine_heading_error", error, math.radians(task.fine_heading_deg)),
+        ("fine_velocity_x_in_body", terms["velocity_x_in_body"], task.fine_speed),
+        ("fine_velocity_y_in_body", terms["velocity_y_in_body"], task.fine_speed),
+        ("fine_yaw_rate", terms["yaw_rate"], task.fine_yaw_rate),
+    ):
+        assert terms[magnified] == pytest.approx(max(-1.0, min(1.0, value / saturation)), abs=1e-6)
+
+
+def test_a_magnified_term_that_could_not_saturate_is_refused():
+    with pytest.raises(ValueError, match="must not be negative"):
+        replace(POSE, fine_speed=-0.1)
 
 
 def test_spinning_costs_in_the_position_task():

@@ -94,3 +94,18 @@ def test_moving_as_wanted_is_worth_more_than_anything_else():
     best = TASK.reward(moving(0, 0, 0), moving(0.3, 0.1, 0.2), wanted)
     for other in ((0.2, 0.1, 0.2), (0.3, 0.0, 0.2), (0.3, 0.1, 0.0), (0.0, 0.0, 0.0)):
         assert best > TASK.reward(moving(0, 0, 0), moving(*other), wanted)
+
+
+def test_targets_that_turn_keep_their_speed_and_turn_no_faster_than_the_task_says():
+    task = load_task("drift_track_velocities")
+    targets = task.draw(Draws(3, np.arange(50), np.zeros(50)), ROBOTS["floating_platform"], training=False)[
+        1
+    ].targets
+    assert targets.shape[1] * task.step_s >= task.episode_s
+    held = targets.reshape(50, -1, round(task.hold_s / task.step_s), 3)
+    velocity = held[..., 0] + 1j * held[..., 1]
+    np.testing.assert_allclose(np.abs(velocity), np.abs(velocity[..., :1]).repeat(held.shape[2], axis=-1))
+    rate = np.angle(velocity[..., 1:] / velocity[..., :-1]) / task.step_s
+    np.testing.assert_allclose(rate, rate[..., :1].repeat(rate.shape[-1], axis=-1), atol=1e-9)
+    assert 0.9 * task.turning < np.abs(rate).max() <= task.turning + 1e-9
+    assert not held[..., 2].any()
