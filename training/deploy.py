@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,7 +15,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
-from training.network import DeployedNetwork, NetworkPlan
+from training.network import Decision, DeployedNetwork, NetworkPlan
+from training.vec_env import BatchVecEnv
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class _Trained:
     """What deterministic actions of a learner come from."""
 
     layers: list[nn.Module]  # hidden layers and output layer, with activations between
-    decision: Literal["threshold", "clamp", "squash"]
+    decision: Decision
     lstm: nn.LSTM | None = None
 
     @property
@@ -46,7 +47,9 @@ def deployed_network(
     """
     statistics = normaliser.obs_rms
     assert not isinstance(statistics, dict)
-    trained = _trained(learner)
+    worlds = normaliser.unwrapped
+    choice = worlds.choice if isinstance(worlds, BatchVecEnv) else None
+    trained = _trained(learner, wrench=choice is not None)
     plan = NetworkPlan(
         inputs=len(statistics.mean),
         hidden=tuple(layer.out_features for layer in trained.linear[:-1]),
@@ -56,6 +59,8 @@ def deployed_network(
         command_scale=tuple(float(value) for value in command_scale),
         limit=float(normaliser.clip_obs),
         memory=2 * trained.lstm.hidden_size if trained.lstm else 0,
+        combinations=len(choice.commands) if choice else 0,
+        knows_dead=choice is not None and worlds.told,
     )
     with torch.random.fork_rng(devices=[]):  # whoever looks at a learner must not change what it draws next
         network = DeployedNetwork(plan)
@@ -66,12 +71,14 @@ def deployed_network(
         twins = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
         for twin, layer in zip(twins, trained.linear, strict=True):
             twin.load_state_dict(layer.state_dict())
+        if choice is not None:
+            network.take_choice(choice)
         if trained.lstm is not None:
             _copy_memory(trained.lstm, network)
     return network
 
 
-def _trained(learner: BaseAlgorithm) -> _Trained:
+def _trained(learner: BaseAlgorithm, *, wrench: bool) -> _Trained:
     policy: Any = learner.policy
     if isinstance(learner, SAC):
         return _Trained([*policy.actor.latent_pi, policy.actor.mu], "squash")
@@ -79,9 +86,8 @@ def _trained(learner: BaseAlgorithm) -> _Trained:
         return _Trained(list(policy.actor.mu)[:-1], "squash")  # its last layer is the tanh that `squash` is
     assert isinstance(learner, PPO | RecurrentPPO)
     layers = [*policy.mlp_extractor.policy_net, policy.action_net]
-    decision: Literal["threshold", "clamp"] = (
-        "threshold" if isinstance(learner.action_space, spaces.MultiBinary) else "clamp"
-    )
+    on_off = isinstance(learner.action_space, spaces.MultiBinary)
+    decision: Decision = "choose" if wrench else "threshold" if on_off else "clamp"
     return _Trained(layers, decision, getattr(policy, "lstm_actor", None))
 
 

@@ -52,7 +52,7 @@ def export(run: Path, out: Path) -> Passport:
             f"{run}: the network takes {plan.inputs} terms, '{robot.name}' and '{task.name}' now have {len(names)}. "
             "Train again."
         )
-    if plan.on_off != robot.actuators.binary or plan.outputs != len(robot.actuators.names):
+    if plan.on_off != robot.actuators.binary or len(plan.command_scale) != len(robot.actuators.names):
         raise ConfigError(f"{run}: the actuators of '{robot.name}' have changed since. Train again.")
     passport = Passport(
         format=FORMAT,

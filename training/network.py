@@ -13,11 +13,14 @@ import torch
 from torch import nn
 
 from fulmar_core.controllers.told import told_for
+from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.errors import ConfigError
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
+
+Decision = Literal["threshold", "clamp", "squash", "choose"]
 
 
 @dataclass(frozen=True)
@@ -26,17 +29,19 @@ class NetworkPlan:
 
     inputs: int  # observation terms
     hidden: tuple[int, ...]  # sizes of the hidden layers
-    outputs: int  # actuators
+    outputs: int  # of the last layer: actuators, or the terms of a wrench
     activation: Literal["tanh", "relu"]
-    decision: Literal["threshold", "clamp", "squash"]  # how raw outputs become shares of full command
+    decision: Decision  # how raw outputs become shares of full command
     command_scale: tuple[float, ...]  # full command of each actuator, in its own unit
     limit: float  # normalised observations are cut to this
     memory: int = 0  # numbers that an LSTM before the hidden layers carries over; 0: there is none
+    combinations: int = 0  # of valves, to choose from for a wrench
+    knows_dead: bool = False  # its last inputs are 1 for each valve, or 0 where it is dead
 
     @property
     def on_off(self) -> bool:
         """Whether its commands are zeros and ones."""
-        return self.decision == "threshold"
+        return self.decision in ("threshold", "choose")
 
 
 class DeployedNetwork(nn.Module):
@@ -45,6 +50,9 @@ class DeployedNetwork(nn.Module):
     mean: torch.Tensor
     scale: torch.Tensor
     command_scale: torch.Tensor
+    choice_commands: torch.Tensor
+    choice_slope: torch.Tensor
+    choice_offset: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
         """Build an untrained network."""
@@ -53,6 +61,11 @@ class DeployedNetwork(nn.Module):
         self.register_buffer("mean", torch.zeros(plan.inputs))
         self.register_buffer("scale", torch.ones(plan.inputs))
         self.register_buffer("command_scale", torch.tensor(plan.command_scale, dtype=torch.float32))
+        count, valves = plan.combinations, len(plan.command_scale)
+        if count:
+            self.register_buffer("choice_commands", torch.zeros(count, valves))
+            self.register_buffer("choice_slope", torch.zeros(WRENCH, count))
+            self.register_buffer("choice_offset", torch.zeros(count))
         units = plan.memory // 2
         self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
         self.from_memory = nn.Linear(units, 4 * units) if units else None
@@ -79,10 +92,10 @@ class DeployedNetwork(nn.Module):
         """
         features = torch.clamp((observation - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
         if memory is None:
-            raw = self.layers(features)
+            raw = self._appraised(self.layers(features), observation)
             return self._decide(raw), raw
         memory = self._remember(features, memory)
-        raw = self.layers(memory[:, : self.plan.memory // 2])
+        raw = self._appraised(self.layers(memory[:, : self.plan.memory // 2]), observation)
         return self._decide(raw), raw, memory
 
     def _remember(self, features: torch.Tensor, memory: torch.Tensor) -> torch.Tensor:
@@ -95,8 +108,23 @@ class DeployedNetwork(nn.Module):
         cell = torch.sigmoid(keep) * cell + torch.sigmoid(take) * torch.tanh(new)
         return torch.cat((torch.sigmoid(show) * torch.tanh(cell), cell), dim=1)
 
+    def take_choice(self, choice: WrenchChoice) -> None:
+        """Take over the table that valves are chosen from."""
+        self.choice_commands.copy_(torch.as_tensor(choice.commands))
+        self.choice_slope.copy_(torch.as_tensor(choice.slope))
+        self.choice_offset.copy_(torch.as_tensor(choice.offset))
+
+    def _appraised(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
+        """How much opening each valve is worth, where the last layer asks for a wrench; else what it put out."""
+        if self.plan.decision != "choose":
+            return raw
+        choice = WrenchChoice(self.choice_commands, self.choice_slope, self.choice_offset)
+        valves = len(self.plan.command_scale)
+        dead = 1.0 - observation[:, -valves:] if self.plan.knows_dead else None
+        return choice.margins(torch.clamp(raw, -1.0, 1.0), dead)
+
     def _decide(self, raw: torch.Tensor) -> torch.Tensor:
-        if self.plan.decision == "threshold":
+        if self.plan.on_off:
             return (raw > 0.0).to(torch.float32)  # the more likely state of each
         share = torch.tanh(raw) if self.plan.decision == "squash" else torch.clamp(raw, -1.0, 1.0)
         return share * self.command_scale

@@ -128,6 +128,9 @@ class TrainingSettings:
     curriculum: Curriculum | None = None
     stop_at_success: StopAtSuccess | None = None
     told: bool = False  # whether the network is told pushes and dead valves, of robots with on/off valves
+    wrench: bool = (
+        False  # whether it asks for a wrench, for which on/off valves are then chosen, not for single valves
+    )
 
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""

@@ -41,6 +41,11 @@ class ToldTruth:
         """Begin anew in some worlds."""
         self._push[worlds], self._dead[worlds] = 0.0, False
 
+    @property
+    def dead(self) -> np.ndarray:
+        """Which valves are known to be dead, shape (worlds, valves)."""
+        return self._dead
+
     def learn(self, simulation: BatchSimulation) -> None:
         """Look at a control step that was done: a dead valve is noticed once it was told to open."""
         world = simulation.world

@@ -105,6 +105,7 @@ def train(
         reward_scale=settings.reward_scale,
         strength=settings.strength(0.0),
         told=settings.told,
+        wrench=settings.wrench,
     )
     story = Story()
     if resume:

@@ -7,9 +7,11 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import torch
 from stable_baselines3.common.vec_env import VecEnv
 
 from fulmar_core.controllers.told import told_terms
+from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.learning_step import learning_step
@@ -22,7 +24,8 @@ from training.told_truth import ToldTruth
 class BatchVecEnv(VecEnv):
     """Worlds that learn together; each begins again by itself when its episode is over.
 
-    Actions are on/off for valves that know only these, else shares of full command in [-1, 1]. An episode ends when
+    Actions are on/off for valves that know only these, or the wrench that they should bring up, else shares of full
+    command in [-1, 1]. An episode ends when
     the robot leaves the geofence or touches an obstacle (terminated), or its time is up (truncated: the value of the
     last state still counts). First episodes have random lengths, so that resets spread out over time.
     """
@@ -40,6 +43,7 @@ class BatchVecEnv(VecEnv):
         strength: float = 1.0,
         staggered: bool = True,
         told: bool = False,
+        wrench: bool = False,
     ) -> None:
         """Build the worlds.
 
@@ -54,11 +58,13 @@ class BatchVecEnv(VecEnv):
             strength: How much of the scenario counts, from 0 to 1; may be moved later by `set_strength` [-].
             staggered: First episodes have random lengths.
             told: Observations also tell pushes and dead valves (`fulmar_core.controllers.told`).
+            wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
         """
         self._robot, self._task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
+        self.choice = WrenchChoice.of(robot) if wrench else None
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
@@ -69,8 +75,8 @@ class BatchVecEnv(VecEnv):
         )
         action_space: gymnasium.Space[Any] = (
             gymnasium.spaces.MultiBinary(count)
-            if robot.actuators.binary
-            else gymnasium.spaces.Box(-1.0, 1.0, (count,), np.float32)
+            if robot.actuators.binary and not wrench
+            else gymnasium.spaces.Box(-1.0, 1.0, (WRENCH if wrench else count,), np.float32)
         )
         super().__init__(worlds, observation_space, action_space)
         self._age = np.zeros(worlds, dtype=int)
@@ -86,6 +92,11 @@ class BatchVecEnv(VecEnv):
             training=self._training,
             strength=strength,
         )
+
+    @property
+    def told(self) -> bool:
+        """Whether observations also tell pushes and dead valves."""
+        return self._told is not None
 
     def state(self) -> dict[str, Any]:
         """Everything that a step changes, as values that pickle; for an exact resume."""
@@ -130,7 +141,14 @@ class BatchVecEnv(VecEnv):
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
-        self._actions = np.asarray(actions, dtype=np.float32)
+        actions = np.asarray(actions, dtype=np.float32)
+        self._actions = self._valves(self.choice, actions) if self.choice else actions
+
+    def _valves(self, choice: WrenchChoice, shares: np.ndarray) -> np.ndarray:
+        # By PyTorch, which keeps to the threads it was given; NumPy's would be in the way of another run's.
+        dead = torch.from_numpy(self._told.dead.astype(np.float32)) if self._told else None
+        chosen: np.ndarray = choice.best(torch.from_numpy(shares), dead).numpy()
+        return chosen
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Move one control step; returns observations, rewards, dones and infos."""
