@@ -126,6 +126,9 @@ class Session(BaseCallback):
         progress = self._limits.progress(story.elapsed_s, story.updates)
         self._watcher.advance(progress, story.elapsed_s, self.num_timesteps)
         self._worlds.set_strength(self._settings.strength(progress))
+        if self._settings.refinement:
+            self._worlds.set_effort(self._settings.effort(progress))
+            self.model.ent_coef = self._settings.entropy(progress)  # type: ignore[attr-defined]
         over = progress >= 1.0 or self._asked_to_stop()
         if over or story.elapsed_s >= self._next_check:
             self._check()

@@ -101,6 +101,27 @@ class Curriculum:
 
 
 @dataclass(frozen=True)
+class Refinement:
+    """Economy and precision, later in a run: commands get dearer and exploring is worth less, both linearly."""
+
+    begin: float  # share of the run after which it begins [-]
+    end: float  # same of where it is whole [-]
+    effort: float  # factor on what using the actuators costs, in the end [-]
+    entropy: float  # weight of the entropy in the loss, in the end; less than 0 makes a policy sure of itself
+
+    def __post_init__(self) -> None:
+        """Refuse shares that are none."""
+        if not 0.0 <= self.begin < self.end <= 1.0 or self.effort <= 0.0:
+            raise ValueError(
+                "'begin' must lie in [0, 1), 'end' beyond it in (0, 1], and 'effort' be greater than 0."
+            )
+
+    def share(self, progress: float) -> float:
+        """How much of it holds, where `progress` is the share of the run that is over [-]."""
+        return min(1.0, max(0.0, (progress - self.begin) / (self.end - self.begin)))
+
+
+@dataclass(frozen=True)
 class StopAtSuccess:
     """Ends a run early, once it has learned its task."""
 
@@ -126,6 +147,7 @@ class TrainingSettings:
     checkpoint_every_s: float = 30.0  # wall-clock between checkpoints to resume from [s]
     threads: int = 1  # of PyTorch; a second one gains little and loses much on a shared machine
     curriculum: Curriculum | None = None
+    refinement: Refinement | None = None  # of ppo and recurrent_ppo
     stop_at_success: StopAtSuccess | None = None
     told: bool = False  # whether the network is told pushes and dead valves, of robots with on/off valves
     wrench: bool = (
@@ -139,12 +161,27 @@ class TrainingSettings:
             raise ValueError(
                 f"worlds · steps = {self.worlds * algorithm.steps} must be a multiple of 'minibatch'."
             )
+        if self.refinement and not isinstance(algorithm, OnPolicy):
+            raise ValueError(
+                f"'refinement' is for ppo and recurrent_ppo; {algorithm.kind} weighs entropy by itself."
+            )
         if min(self.worlds, self.threads) < 1 or self.time_limit_s <= 0.0:
             raise ValueError("'worlds' and 'threads' must be at least 1, 'time_limit_s' greater than 0.")
 
     def strength(self, progress: float) -> float:
         """Strength of the scenario when this share of the run is over [-]."""
         return self.curriculum.strength(progress) if self.curriculum else 1.0
+
+    def effort(self, progress: float) -> float:
+        """Factor on what using the actuators costs when this share of the run is over [-]."""
+        refined = self.refinement
+        return 1.0 + (refined.effort - 1.0) * refined.share(progress) if refined else 1.0
+
+    def entropy(self, progress: float) -> float:
+        """Weight of the entropy in the loss of an on-policy learner then."""
+        assert isinstance(self.algorithm, OnPolicy)
+        first, refined = self.algorithm.entropy, self.refinement
+        return first + (refined.entropy - first) * refined.share(progress) if refined else first
 
 
 def load_training_settings(robot: Robot, task: Task, name: str | None = None) -> TrainingSettings:

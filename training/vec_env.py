@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -63,6 +64,7 @@ class BatchVecEnv(VecEnv):
         self._robot, self._task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
+        self._judged = robot  # with what its actuators cost now
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
         self.choice = WrenchChoice.of(robot) if wrench else None
         self.simulation = self._new_simulation(strength)
@@ -114,6 +116,11 @@ class BatchVecEnv(VecEnv):
         """How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-]."""
         self.simulation.strength = strength
 
+    def set_effort(self, factor: float) -> None:
+        """What using the actuators costs from now on, as a multiple of the robot's own costs [-]."""
+        costs = replace(self._robot.costs, effort=factor * self._robot.costs.effort)
+        self._judged = replace(self._robot, costs=costs)
+
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed of the next `reset`."""
         self._seed = self._seed if seed is None else seed
@@ -156,7 +163,7 @@ class BatchVecEnv(VecEnv):
         before, goal, previous = simulation.truth, simulation.goal, simulation.command
         simulation.step(self._actions * self._scale)
         reward, ended_early = learning_step(
-            self._robot,
+            self._judged,
             self._task,
             before=before,
             after=simulation.truth,

@@ -14,8 +14,9 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.checkpoint import load_checkpoint
+from training.fast_ppo import FastPPO
 from training.run_folder import CHECKPOINT_FILE, SETTINGS_FILE, TENSORBOARD_FOLDER, read_run_record
-from training.settings import Curriculum, StopAtSuccess, load_training_settings
+from training.settings import Curriculum, Refinement, StopAtSuccess, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -143,6 +144,17 @@ def test_the_curriculum_reaches_the_worlds(tmp_path, quick_judge, monkeypatch):
     monkeypatch.setattr(BatchVecEnv, "set_strength", lambda self, strength: told.append(strength))
     train(TURTLEBOT, TASK, small("differential_drive"), seed=1, out=tmp_path, updates=4)
     assert told == pytest.approx([0.0, 0.5, 1.0, 1.0, 1.0])
+
+
+def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypatch):
+    dearer, less = [], []
+    monkeypatch.setattr(BatchVecEnv, "set_effort", lambda self, factor: dearer.append(factor))
+    monkeypatch.setattr(FastPPO, "train", lambda self: less.append(self.ent_coef))
+    settings = replace(small("differential_drive"), refinement=Refinement(0.0, 1.0, 5.0, -0.004))
+    before = settings.algorithm.entropy
+    train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=4)
+    assert dearer == pytest.approx([1.0, 2.0, 3.0, 4.0, 5.0])
+    assert less == pytest.approx([before + share * (-0.004 - before) for share in (0.0, 0.25, 0.5, 0.75)])
 
 
 def test_a_run_folder_holds_settings_curves_and_a_checkpoint(tmp_path, quick_judge):

@@ -12,6 +12,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.settings import (
     Curriculum,
+    Refinement,
     StopAtSuccess,
     load_training_settings,
     write_training_settings,
@@ -71,6 +72,30 @@ def test_an_unknown_algorithm_names_the_line(tmp_path):
 @pytest.mark.parametrize(("progress", "strength"), [(0.0, 0.2), (0.25, 0.6), (0.5, 1.0), (0.9, 1.0)])
 def test_a_curriculum_grows_until_the_scenario_is_whole(progress, strength):
     assert Curriculum(0.2, 0.5).strength(progress) == pytest.approx(strength)
+
+
+@pytest.mark.parametrize(
+    ("progress", "effort", "entropy"),
+    [(0.0, 1.0, 0.0), (0.2, 1.0, 0.0), (0.4, 2.0, -0.01), (0.6, 3.0, -0.02), (1.0, 3.0, -0.02)],
+)
+def test_a_refinement_makes_commands_dearer_and_exploring_worth_less(progress, effort, entropy):
+    refined = replace(load_training_settings(PLATFORM, TASK), refinement=Refinement(0.2, 0.6, 3.0, -0.02))
+    assert refined.effort(progress) == pytest.approx(effort)
+    assert refined.entropy(progress) == pytest.approx(entropy)
+
+
+@pytest.mark.parametrize(
+    "values", [(0.6, 0.6, 1.0, 0.0), (-0.1, 0.5, 1.0, 0.0), (0.1, 1.5, 1.0, 0.0), (0.1, 0.5, 0.0, 0.0)]
+)
+def test_a_refinement_of_impossible_shares_is_refused(values):
+    with pytest.raises(ValueError, match="must lie in"):
+        Refinement(*values)
+
+
+def test_a_learner_that_weighs_entropy_by_itself_takes_no_refinement():
+    settings = load_training_settings(load_robot("turtlebot2"), TASK, "sac")
+    with pytest.raises(ValueError, match="sac weighs entropy by itself"):
+        replace(settings, refinement=Refinement(0.2, 0.6, 3.0, 0.0))
 
 
 def test_without_a_curriculum_the_scenario_is_whole_from_the_start():

@@ -154,3 +154,13 @@ def test_stable_baselines_wrappers_find_what_they_ask_for(build):
     env.set_attr("marker", 7)
     assert env.get_attr("marker", indices=[2]) == [7]
     env.close()
+
+
+def test_dearer_commands_cost_their_multiple(build):
+    plain, dear = build("nominal", seed=2), build("nominal", seed=2)
+    dear.set_effort(3.0)
+    for env in (plain, dear):
+        env.reset()
+    full = np.ones((WORLDS, 8), dtype=np.int8)
+    less = plain.step(full)[1] - dear.step(full)[1]
+    np.testing.assert_allclose(less, 2.0 * 0.08 * 8, rtol=1e-4)
