@@ -67,6 +67,7 @@ class FastPPO(PPO):
         cut: list[tuple[int, int, np.ndarray]] = []  # step, world and last observation of truncated episodes
         outputs: list[torch.Tensor] = []
         for step in range(n_rollout_steps):
+            self._look()
             observations = np.asarray(self._last_obs, dtype=np.float32)
             outputs.append(self._actor(torch.from_numpy(observations)))
             with torch.no_grad():
@@ -96,6 +97,9 @@ class FastPPO(PPO):
         callback.on_rollout_end()
         return True
 
+    def _look(self) -> None:
+        """Called before each step of a rollout; a subclass may note what it sees."""
+
     @torch.no_grad()
     def _appraise(
         self, buffer: RolloutBuffer, outputs: torch.Tensor, cut: list[tuple[int, int, np.ndarray]]
@@ -110,9 +114,9 @@ class FastPPO(PPO):
         Returns:
             Values of the observations after the last step, shape (worlds,).
         """
-        values = self._critic(_rows(buffer.observations))
+        values = self._critic(rows(buffer.observations))
         buffer.values[:] = values.view(buffer.values.shape).numpy()
-        log_probs = self._law.log_prob(outputs, _rows(buffer.actions))
+        log_probs = self._law.log_prob(outputs, rows(buffer.actions))
         buffer.log_probs[:] = log_probs.view(buffer.log_probs.shape).numpy()
         if cut:
             steps, worlds, last = zip(*cut, strict=True)
@@ -126,7 +130,7 @@ class FastPPO(PPO):
         self.policy.set_training_mode(True)
         self._update_learning_rate(self.policy.optimizer)
         clip = self.clip_range(self._current_progress_remaining)
-        columns = [_rows(getattr(self.rollout_buffer, name)) for name in _COLUMNS]
+        columns = [rows(getattr(self.rollout_buffer, name)) for name in _COLUMNS]
         widths = [column.shape[1] for column in columns]
         samples = torch.cat(columns, dim=1)
         told: list[torch.Tensor] = []
@@ -199,6 +203,6 @@ class FastPPO(PPO):
         self.logger.record("train/clip_range", clip)
 
 
-def _rows(array: np.ndarray) -> torch.Tensor:
+def rows(array: np.ndarray) -> torch.Tensor:
     """A buffer's array of steps and worlds as a matrix with one row for each sample, without copying."""
     return torch.from_numpy(array).view(array.shape[0] * array.shape[1], -1)

@@ -10,6 +10,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
+from training.apprentice import Apprentice
 from training.fast_ppo import FastPPO
 from training.ppo import KlAdaptiveRate, KlFeedback, build_ppo
 from training.settings import Algorithm, OnPolicy, Ppo, RecurrentPpo, Td3
@@ -18,6 +19,8 @@ from training.settings import Algorithm, OnPolicy, Ppo, RecurrentPpo, Td3
 def learner_class(settings: Algorithm) -> type[BaseAlgorithm]:
     """The class that settings build, which also loads what it has saved."""
     if isinstance(settings, Ppo):
+        if settings.lessons:
+            return Apprentice
         return FastPPO if settings.fast else PPO
     if isinstance(settings, RecurrentPpo):
         return RecurrentPPO

@@ -118,7 +118,9 @@ class DeployedNetwork(nn.Module):
         """How much opening each valve is worth, where the last layer asks for a wrench; else what it put out."""
         if self.plan.decision != "choose":
             return raw
-        choice = WrenchChoice(self.choice_commands, self.choice_slope, self.choice_offset)
+        choice = WrenchChoice(
+            self.choice_commands, self.choice_slope, self.choice_offset, torch.zeros(WRENCH)
+        )
         valves = len(self.plan.command_scale)
         dead = 1.0 - observation[:, -valves:] if self.plan.knows_dead else None
         return choice.margins(torch.clamp(raw, -1.0, 1.0), dead)

@@ -11,6 +11,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
+from training.apprentice import Apprentice
 from training.fast_ppo import FastPPO
 from training.settings import OnPolicy, Ppo, RecurrentPpo
 
@@ -72,11 +73,14 @@ def build_ppo(
     if isinstance(env.action_space, spaces.Box):
         policy["log_std_init"] = settings.log_std
     kind: type[PPO | RecurrentPPO] = PPO
+    more: dict[str, Any] = {}
     if isinstance(settings, RecurrentPpo):
         kind = RecurrentPPO
         policy["lstm_hidden_size"] = settings.memory
     elif settings.fast:
         kind = FastPPO
+        if settings.lessons:
+            kind, more = Apprentice, {"lessons": settings.lessons}
     return kind(
         "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy",
         env,
@@ -93,4 +97,5 @@ def build_ppo(
         tensorboard_log=tensorboard,
         seed=seed,
         device="cpu",
+        **more,
     )

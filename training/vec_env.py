@@ -61,7 +61,7 @@ class BatchVecEnv(VecEnv):
             told: Observations also tell pushes and dead valves (`fulmar_core.controllers.told`).
             wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
         """
-        self._robot, self._task, self._reward_scale = robot, task, reward_scale
+        self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
         self._judged = robot  # with what its actuators cost now
@@ -86,8 +86,8 @@ class BatchVecEnv(VecEnv):
 
     def _new_simulation(self, strength: float) -> BatchSimulation:
         return BatchSimulation(
-            self._robot,
-            self._task,
+            self.robot,
+            self.task,
             self._scenario,
             worlds=self._worlds,
             seed=self._seed,
@@ -118,8 +118,8 @@ class BatchVecEnv(VecEnv):
 
     def set_effort(self, factor: float) -> None:
         """What using the actuators costs from now on, as a multiple of the robot's own costs [-]."""
-        costs = replace(self._robot.costs, effort=factor * self._robot.costs.effort)
-        self._judged = replace(self._robot, costs=costs)
+        costs = replace(self.robot.costs, effort=factor * self.robot.costs.effort)
+        self._judged = replace(self.robot, costs=costs)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed of the next `reset`."""
@@ -164,7 +164,7 @@ class BatchVecEnv(VecEnv):
         simulation.step(self._actions * self._scale)
         reward, ended_early = learning_step(
             self._judged,
-            self._task,
+            self.task,
             before=before,
             after=simulation.truth,
             goal=goal,

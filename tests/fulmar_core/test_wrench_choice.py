@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from fulmar_core.controllers.wrench_choice import WrenchChoice
+from fulmar_core.controllers.wrench_choice import HASTE_COST, REACH, TORQUE_WEIGHT, VALVE_COST, WrenchChoice
 from fulmar_core.robot import load_robot
 
 ROBOT = load_robot("floating_platform")
@@ -17,9 +17,9 @@ DEAD = (RNG.random((100, 8)) < 0.2).astype(np.float32)
 
 
 def wrench(valves):
-    """Shares of the strongest force and torque, shape (rows, 3)."""
+    """In units of the strongest force and of the strongest torque over the root of its weight, shape (rows, 3)."""
     force, torque = ROBOT.actuators.wrench_in_body(np.asarray(valves, dtype=float))
-    return np.column_stack((force[:, :2], torque[:, 2] / 0.31))
+    return np.column_stack((force[:, :2], torque[:, 2] * np.sqrt(TORQUE_WEIGHT) / 0.31))
 
 
 def test_a_full_push_ahead_opens_what_pushes_ahead_alone():
@@ -36,8 +36,11 @@ def test_what_is_smaller_than_any_combination_opens_nothing():
 def test_no_other_combination_comes_nearer_to_what_is_asked_for_its_gas():
     chosen = CHOICE.best(SHARES)
 
+    wanted = REACH * SHARES
+
     def cost(valves):
-        return np.sum((wrench(valves) - SHARES) ** 2, axis=-1) + 0.035 * valves.sum(axis=-1)
+        dearer = 1.0 + HASTE_COST * np.sum(wanted**2, axis=-1)
+        return np.sum((wrench(valves) - wanted) ** 2, axis=-1) + VALVE_COST * dearer * valves.sum(axis=-1)
 
     others = np.stack([cost(np.tile(row, (len(SHARES), 1))) for row in CHOICE.commands])
     np.testing.assert_allclose(

@@ -7,6 +7,7 @@ smoothly, and what is smaller than the least useful combination opens nothing.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +18,14 @@ from fulmar_core.controllers.valve_allocation import ValveAllocation
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
-WRENCH = 3  # force ahead, to the left, and torque, each as a share of the strongest combination's [-]
-VALVE_COST = (
-    0.035  # of an open valve, where missing all of the strongest force costs 1: about what the tuned LQR's is
+WRENCH = 3  # force ahead, to the left, and torque
+REACH = 1.5  # what a share of 1 asks for, in units: beyond one of them only the direction matters [-]
+TORQUE_WEIGHT = (
+    4.4  # of missing all torque, where missing all force weighs 1: about as in the tuned LQR's cost-to-go
+)
+VALVE_COST = 0.045  # of an open valve, where missing all force costs 1; what is not worth a valve opens none
+HASTE_COST = (
+    2.5  # factor on that for each unit² asked for: who asks for much cares little how exactly it comes
 )
 DEAD_COST = 100.0  # of opening a dead valve; more than any wrench is worth
 ORDER_COST = 1e-5  # of each place further down the table, so that no two combinations are equally good
@@ -29,13 +35,15 @@ ORDER_COST = 1e-5  # of each place further down the table, so that no two combin
 class WrenchChoice:
     """Table of all combinations of valves, with what each costs for a wanted wrench and some dead valves.
 
-    For wanted shares s and dead valves d (1 where dead), combination k costs `offset[k] - s @ slope[:, k] + d @
-    dead_cost[:, k]`: (w_k - s)² plus its gas, less what does not depend on k.
+    In units of the strongest force, and of the strongest torque divided by the root of `TORQUE_WEIGHT`, combination k
+    brings up w_k with n_k valves. Where w is wanted, it costs |w_k - w|² + VALVE_COST n_k (1 + HASTE_COST |w|²), told
+    less |w|², which does not depend on k.
     """
 
     commands: Array  # open (1) or closed (0), shape (k, n)
-    slope: Array  # shape (3, k)
-    offset: Array  # shape (k,)
+    slope: Array  # what a share of the wanted wrench makes each cheaper, shape (3, k)
+    offset: Array  # cost where nothing is wanted, shape (k,)
+    unit: Array  # shape (3,) [N, N, N·m]
 
     @classmethod
     def of(cls, robot: Robot) -> WrenchChoice:
@@ -48,12 +56,12 @@ class WrenchChoice:
             raise ValueError(f"'{robot.name}' has no on/off valves, so there is nothing to choose.")
         _, wrench, _ = ValveAllocation(robot.actuators, weight=np.eye(WRENCH), valve_cost=0.0).every
         force, torque = np.max(np.hypot(wrench[:, 0], wrench[:, 1])), np.max(np.abs(wrench[:, 2]))
-        strongest = np.array([force, force, torque])
-        table = ValveAllocation(robot.actuators, weight=np.diag(strongest**-2.0), valve_cost=VALVE_COST)
+        unit = np.array([force, force, torque / math.sqrt(TORQUE_WEIGHT)])
+        table = ValveAllocation(robot.actuators, weight=np.diag(unit**-2.0), valve_cost=VALVE_COST)
         commands, wrench, offset = table.every
         order = ORDER_COST * np.arange(len(commands))
-        slope = 2.0 * (wrench / strongest).T
-        return cls(*(np.asarray(part, dtype=np.float32) for part in (commands, slope, offset + order)))
+        slope = 2.0 * REACH * (wrench / unit).T
+        return cls(*(np.asarray(part, dtype=np.float32) for part in (commands, slope, offset + order, unit)))
 
     def costs(self, shares: Array, dead: Array | None = None) -> Array:
         """Cost of every combination.
@@ -66,8 +74,15 @@ class WrenchChoice:
             Shape (rows, k).
         """
         xp = array_namespace(shares)
-        cost = xp.asarray(self.offset) - shares @ xp.asarray(self.slope)
-        return cost if dead is None else cost + DEAD_COST * (dead @ xp.asarray(self.commands.T))
+        commands = xp.asarray(self.commands)
+        haste = VALVE_COST * HASTE_COST * REACH**2 * xp.sum(shares * shares, axis=-1, keepdims=True)
+        cost = xp.asarray(self.offset) + haste * xp.sum(commands, axis=-1) - shares @ xp.asarray(self.slope)
+        return cost if dead is None else cost + DEAD_COST * (dead @ commands.T)
+
+    def shares_of(self, wrench: np.ndarray) -> np.ndarray:
+        """Shares that ask for a wrench, shape (rows, 3) [N, N, N·m]; one that is out of reach keeps its direction."""
+        shares = wrench / (REACH * self.unit)
+        return np.asarray(shares / np.maximum(1.0, np.linalg.norm(shares, axis=-1, keepdims=True)))
 
     def best(self, shares: Array, dead: Array | None = None) -> Array:
         """The cheapest combination, shape (rows, n); see `costs`."""

@@ -1,0 +1,102 @@
+"""A policy that begins as the apprentice of the LQR."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.vec_env import VecNormalize
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import ConfigError
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from training.apprentice import Apprentice
+from training.checkpoint import load_checkpoint
+from training.fast_ppo import FastPPO
+from training.learners import build_learner, callbacks_of
+from training.run_folder import CHECKPOINT_FILE
+from training.teacher import Teacher
+from training.train import train
+from training.vec_env import BatchVecEnv
+
+ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
+LESSONS = 12
+
+
+@pytest.fixture
+def settings(small_settings):
+    algorithm = replace(small_settings.algorithm, lessons=LESSONS, log_std=-2.0)
+    return replace(small_settings, algorithm=algorithm, scenario="drift_training", told=True, wrench=True)
+
+
+def worlds(count=32, *, told=True, wrench=True):
+    return BatchVecEnv(
+        ROBOT, TASK, load_scenario("drift_training"), worlds=count, seed=3, told=told, wrench=wrench
+    )
+
+
+def learned(settings, updates):
+    env = VecNormalize(worlds(), norm_reward=False)
+    learner = build_learner(settings.algorithm, env, seed=3)
+    learner.learn(32 * 16 * updates, callback=callbacks_of(learner))
+    return learner, env
+
+
+def error(learner, env):
+    """Mean squared difference between what the learner and its teacher would do, in the worlds' present states."""
+    raw = env.get_original_obs()
+    actions, _ = learner.predict(env.normalize_obs(raw), deterministic=True)
+    return float(np.mean((actions - Teacher(env.unwrapped).actions(raw)) ** 2))
+
+
+def test_lessons_bring_a_policy_near_to_what_the_lqr_does(settings):
+    many = replace(settings.algorithm, lessons=120)
+    assert error(*learned(replace(settings, algorithm=many), 120)) < 0.5 * error(*learned(settings, 1))
+
+
+def test_after_its_lessons_it_learns_as_any_other(settings, monkeypatch):
+    calls = []
+    monkeypatch.setattr(FastPPO, "train", lambda self: calls.append(self.lesson))
+    learner, _ = learned(settings, LESSONS + 2)
+    assert isinstance(learner, Apprentice)
+    assert calls == [LESSONS, LESSONS]
+
+
+def test_lessons_leave_the_noise_of_exploration_as_it_was(settings):
+    learner, _ = learned(settings, LESSONS)
+    np.testing.assert_allclose(learner.policy.log_std.detach().numpy(), -2.0)
+
+
+@pytest.mark.parametrize("first", [5, LESSONS + 1], ids=["within the lessons", "after them"])
+def test_a_resumed_apprentice_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_path, settings, first):
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    train(ROBOT, TASK, settings, seed=1, out=whole, updates=LESSONS + 2)
+    train(ROBOT, TASK, settings, seed=1, out=parts, updates=first)
+    torch.manual_seed(99)
+    train(ROBOT, TASK, settings, seed=1, out=parts, updates=LESSONS + 2, resume=True)
+    expected, found = (
+        load_checkpoint(folder / CHECKPOINT_FILE, settings.algorithm, worlds())[0].policy.state_dict()
+        for folder in (whole, parts)
+    )
+    for key, value in expected.items():
+        assert torch.equal(value, found[key]), key
+
+
+def test_the_teacher_takes_pushes_as_they_are_told(settings):
+    env = worlds(4)
+    seen = env.reset()
+    pushed = seen.copy()
+    pushed[:, -11] = 0.3  # N ahead
+    teacher = Teacher(env)
+    assert np.all(teacher.actions(pushed)[:, 0] <= teacher.actions(seen)[:, 0] + 1e-6)
+    assert not np.array_equal(teacher.actions(pushed), teacher.actions(seen))
+
+
+def test_lessons_without_wrenches_are_refused(settings):
+    with pytest.raises(ValueError, match="'wrench: true'"):
+        replace(settings, wrench=False)
+    with pytest.raises(ConfigError, match="Set 'wrench: true'"):
+        Teacher(worlds(4, wrench=False))

@@ -1,0 +1,87 @@
+"""PPO that begins as the apprentice of a classical law.
+
+For its first updates the policy moves towards what the law would do in the situations that the policy itself gets into
+(DAgger without a mixture, Ross, Gordon and Bagnell 2011, arXiv 1011.0686), while the value learns from returns as
+always. What follows is PPO, from a policy that knows its trade already.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch.nn.utils import clip_grad_norm_
+
+from training.fast_ppo import FastPPO, rows
+from training.teacher import Teacher
+from training.vec_env import BatchVecEnv
+
+RATE = (1e-3, 1e-4)  # learning rate of the first and of the last lesson
+PASSES = 1.5  # through the samples, in each lesson
+WEIGHT = 10.0  # of the squared error beside that of the value
+
+
+class Apprentice(FastPPO):
+    """`FastPPO` with a number of lessons before it; its worlds must take wrenches."""
+
+    def __init__(self, *args: Any, lessons: int = 0, **more: Any) -> None:
+        """Build it; see `PPO` for everything but the number of lessons."""
+        self.lessons = lessons
+        self._teacher: Teacher | None = None
+        self._examples: list[np.ndarray] = []
+        super().__init__(*args, **more)
+
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), "_teacher", "_examples"]
+
+    @property
+    def lesson(self) -> int:
+        """How many lessons there have been."""
+        return min(self._n_updates // self.n_epochs, self.lessons)
+
+    def _look(self) -> None:
+        if self.lesson == self.lessons:
+            return
+        normaliser = self.get_vec_normalize_env()
+        assert normaliser is not None
+        if getattr(self, "_teacher", None) is None:
+            worlds = normaliser.unwrapped
+            assert isinstance(worlds, BatchVecEnv)
+            self._teacher, self._examples = Teacher(worlds), []
+        assert self._teacher is not None
+        self._examples.append(self._teacher.actions(np.asarray(normaliser.get_original_obs())))
+
+    @torch.no_grad()
+    def train(self) -> None:
+        """A lesson, or an update of PPO."""
+        if self.lesson == self.lessons:
+            super().train()
+            return
+        self.policy.set_training_mode(True)
+        first, last = RATE
+        rate = first + (last - first) * self.lesson / max(1, self.lessons - 1)
+        for group in self.policy.optimizer.param_groups:
+            group["lr"] = rate
+        samples = rows(self.rollout_buffer.observations), rows(self.rollout_buffer.returns)
+        wanted = torch.from_numpy(np.concatenate(self._examples))
+        self._examples.clear()
+        errors = []
+        for _ in range(round(PASSES * len(wanted) / self.batch_size)):
+            chosen = torch.randint(len(wanted), (self.batch_size,))
+            errors.append(self._follow(samples[0][chosen], wanted[chosen], samples[1][chosen]))
+        self._n_updates += self.n_epochs
+        self.logger.record("train/imitation_error", float(np.mean(errors)))
+
+    def _follow(self, observations: torch.Tensor, wanted: torch.Tensor, returns: torch.Tensor) -> float:
+        """One step of the optimiser; returns the mean squared error of the actions."""
+        count = len(wanted)
+        away = self._actor(observations) - wanted
+        self._actor.backward(away * (2.0 * WEIGHT / count))
+        surprise = self._critic(observations) - returns
+        self._critic.backward(surprise * (2.0 * self.vf_coef / count))
+        self.policy.log_std.grad = torch.zeros_like(self.policy.log_std)
+        clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
+        self.policy.optimizer.step()
+        self._refresh()
+        return float(away.square().mean())
