@@ -136,6 +136,14 @@ def test_a_magnified_term_that_could_not_saturate_is_refused():
         replace(POSE, fine_speed=-0.1)
 
 
+def test_being_close_pays_in_the_drift_task_whatever_the_heading():
+    goal, away, near = goal_at((0.0, 0.0, 0.0)), body(0.5, yaw=2.0), body(0.01, yaw=2.0)
+    task = load_task("drift_go_to_pose")
+    blind = replace(task, reward_weights=replace(task.reward_weights, close=0.0))
+    more = [float(task.reward(at, at, goal) - blind.reward(at, at, goal)) for at in (away, near)]
+    assert more == pytest.approx([task.reward_weights.close * math.exp(-d / 0.05) for d in (0.5, 0.01)])
+
+
 def test_spinning_costs_in_the_position_task():
     goal = goal_at((0.0, 0.0, 0.0))
     loss = POSITION.reward(body(), body(), goal) - POSITION.reward(body(), body(yaw_rate=-2.0), goal)

@@ -42,6 +42,7 @@ class PoseReward:
     turn: float  # times radians come nearer
     fine: float = 0.0  # times exp(-d / 0.03 m - |e| / 0.03 rad): asks for a centimetre and a degree at once
     aligned: float = 0.0  # times exp(-|e| / 0.03 rad), wherever the robot is
+    close: float = 0.0  # times exp(-d / 0.05 m), whatever its heading
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,7 @@ class GoToPose:
             + w.turn * (xp.abs(old.heading) - e)
             + w.fine * xp.exp(-d / 0.03 - e / 0.03)
             + w.aligned * xp.exp(-e / 0.03)
+            + w.close * xp.exp(-d / 0.05)
         )
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
