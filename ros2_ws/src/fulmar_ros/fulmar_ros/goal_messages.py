@@ -21,10 +21,8 @@ TYPES: dict[str, type] = {
     "goal_path": Path,
     "goal_velocity": TwistStamped,
 }
-MOST_WAYPOINTS, MOST_OBSTACLES = (
-    10_000,
-    1_000,
-)  # more than that is a mistake, and would hold up the control loop
+MOST_WAYPOINTS = 10_000  # more than that is a mistake, and would hold up the control loop
+MOST_OBSTACLES = 30  # ways around more would take longer to find than a control step lasts
 FRAME, BODY_FRAME = "odom", "base_link"
 
 
