@@ -69,7 +69,7 @@ def test_who_is_too_near_is_led_away():
     assert 0.3 * np.cos(angle) + 0.05 * np.sin(angle) < 0.0
 
 
-POCKET = [(2.6 * np.cos(a), 2.6 * np.sin(a)) for a in np.linspace(-1.4, 1.4, 8)]
+POCKET = [(2.6 * np.cos(a), 2.6 * np.sin(a)) for a in np.linspace(-1.4, 1.4, 10)]
 
 
 def test_a_pocket_is_left_backwards_although_only_its_far_side_shows():

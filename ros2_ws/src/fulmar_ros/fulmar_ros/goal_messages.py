@@ -112,10 +112,10 @@ def obstacles_message(obstacles: np.ndarray, time_ns: int) -> MarkerArray:
     """Discs as cylinders that viewers draw too.
 
     Args:
-        obstacles: Shape (m, 3): x [m], y [m], radius [m]; those of radius 0 are left out.
+        obstacles: Shape (m, 3 or more): x [m], y [m], radius [m]; those of radius 0 are left out.
         time_ns: When they were given; controllers report it back [ns].
     """
-    there = [disc for disc in np.asarray(obstacles) if disc[2] > 0.0]
+    there = [disc[:3] for disc in np.asarray(obstacles) if disc[2] > 0.0]
     # The first marker clears what a viewer drew before, and carries the stamp where there is no obstacle.
     first = Marker(action=Marker.DELETEALL)
     first.header.frame_id, first.header.stamp = FRAME, stamp_of(time_ns)
