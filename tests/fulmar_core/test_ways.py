@@ -51,7 +51,9 @@ def test_what_stands_behind_the_goal_or_is_not_there_is_not_in_the_way():
 @pytest.mark.parametrize("beside", [0.1, -0.1])
 def test_a_disc_in_the_way_is_passed_along_its_tangent_on_the_shorter_side(beside):
     angle, length = way((4.0, 0.0), (2.0, beside))
-    assert angle == pytest.approx(np.arctan2(beside, 2.0) - np.sign(beside) * np.arcsin(WIDE / np.hypot(2, beside)))
+    assert angle == pytest.approx(
+        np.arctan2(beside, 2.0) - np.sign(beside) * np.arcsin(WIDE / np.hypot(2, beside))
+    )
     half = np.hypot(2.0, beside)
     bend = 2.0 * np.arcsin(WIDE / half) - 2.0 * np.arctan2(abs(beside), 2.0)
     exact = 2.0 * np.sqrt(half**2 - WIDE**2) + WIDE * bend  # two tangents and the arc between them

@@ -52,8 +52,8 @@ class Law(ABC):
         robot.timing.substeps(self.control_hz)  # refuses rates that the physics cannot keep
         self.reset()
 
-    def reset(self) -> None:
-        """Forget what was seen; most laws remember nothing."""
+    def reset(self) -> None:  # noqa: B027 - most laws remember nothing
+        """Forget what was seen."""
 
     def act(self, observation: Array) -> Array:
         """Choose a command; shapes as in `Controller.act`."""

@@ -63,7 +63,9 @@ class Reader:
         """Way to the current target in the body's frame; around obstacles, its beginning, as long as all of it."""
         for what in ("goal", "way"):
             if f"{what}_x_in_body" in self._column:
-                return self.term(observation, f"{what}_x_in_body"), self.term(observation, f"{what}_y_in_body")
+                return self.term(observation, f"{what}_x_in_body"), self.term(
+                    observation, f"{what}_y_in_body"
+                )
         return self._along(observation, "goal")
 
     def next_leg(self, observation: np.ndarray) -> Vector:

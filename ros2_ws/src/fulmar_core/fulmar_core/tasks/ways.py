@@ -67,7 +67,9 @@ def _ways(x: np.ndarray, y: np.ndarray, wide: np.ndarray, target: np.ndarray) ->
     return np.asarray(ways[:, :-1].reshape(n, m, CORNERS))
 
 
-def shortest_way(x: Array, y: Array, surveyed: Array, goal: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+def shortest_way(
+    x: Array, y: Array, surveyed: Array, goal: tuple[Array, Array]
+) -> tuple[Array, Array, Array]:
     """The shortest way from where a robot is.
 
     Args:
@@ -80,28 +82,22 @@ def shortest_way(x: Array, y: Array, surveyed: Array, goal: tuple[Array, Array])
         Unit vector of its first line, shapes (...,), and its length, shape (...,) [m].
     """
     xp = array_namespace(x)
-    wide = surveyed[..., 3]
-    far = xp.sqrt(x * x + y * y)
-    # Inside a disc the way out leads away from its centre, the more the deeper.
-    outside, depth = xp.maximum(far, wide), clip(1.0 - far / wide, 0.0, 1.0)
-    bearing, half = xp.atan2(y, x), xp.asin(wide / outside) + 0.5 * math.pi * depth
-    length = xp.maximum(xp.sqrt(outside * outside - wide * wide), 0.1 * wide)
-    first = xp.atan2(goal[1][..., None] - y, goal[0][..., None] - x)
-    lines = []
-    for angle in (bearing + half, bearing - half):
-        ux, uy = xp.cos(angle), xp.sin(angle)
-        lines.append((ux, uy, length, _along_edge(length * ux - x, length * uy - y, surveyed, first)))
+    ux, uy, lengths = _tangents(x, y, surveyed[..., 3])
+    edge_x, edge_y = lengths * ux - x[..., None], lengths * uy - y[..., None]
+    to_goal = goal[0][..., None] - x, goal[1][..., None] - y
+    total = lengths + _along_edge(edge_x, edge_y, to_goal, surveyed)
     distance = xp.sqrt(goal[0] * goal[0] + goal[1] * goal[1])
     size = clip(distance, 1e-6, None)
-    straight = (goal[0] / size, goal[1] / size, distance, xp.zeros_like(distance))
-    lines.append(tuple(part[..., None] for part in straight))
-    ux, uy, lengths, total = (xp.concat(parts, axis=-1) for parts in zip(*lines, strict=True))
-    total = total + lengths
+    straight = (goal[0] / size, goal[1] / size, distance, distance)
+    ux, uy, lengths, total = (
+        xp.concat((xp.reshape(lines, (*distance.shape, -1)), line[..., None]), axis=-1)
+        for lines, line in zip((ux, uy, lengths, total), straight, strict=True)
+    )
     for i in range(x.shape[-1]):
         to_x, to_y = x[..., i, None], y[..., i, None]
         along = ux * to_x + uy * to_y
         nearest = xp.minimum(along, lengths)
-        off_x, off_y, width = to_x - nearest * ux, to_y - nearest * uy, TOUCHING * wide[..., i, None]
+        off_x, off_y, width = to_x - nearest * ux, to_y - nearest * uy, TOUCHING * surveyed[..., i, 3, None]
         enters = (along > 0.0) & (off_x * off_x + off_y * off_y < width * width)  # who leaves does not enter
         total = total + BLOCKED * xp.astype(enters, total.dtype)
     best = xp.argmin(total, axis=-1)[..., None]
@@ -109,26 +105,44 @@ def shortest_way(x: Array, y: Array, surveyed: Array, goal: tuple[Array, Array])
     return ux, uy, total
 
 
-def _along_edge(x: Array, y: Array, surveyed: Array, first: Array) -> Array:
-    """Length of the way from points at the edges of discs, by the better of the next two corners, shape (..., m) [m].
+def _tangents(x: Array, y: Array, wide: Array) -> tuple[Array, Array, Array]:
+    """Unit vectors along the lines that touch discs on their left and right, and lengths [m], shapes (..., m, 2)."""
+    xp = array_namespace(x)
+    far = clip(xp.sqrt(x * x + y * y), 1e-9, None)
+    length = xp.sqrt(clip(far * far - wide * wide, 0.0, None))
+    # Inside a disc the way out leads away from its centre, the more the deeper.
+    cos = xp.where(far > wide, length / far, far / wide - 1.0)
+    sin = xp.sqrt(1.0 - cos * cos)
+    turn = xp.stack((sin, -sin), axis=-1)
+    cx, cy, cos = (part[..., None] for part in (x / far, y / far, cos))
+    length = xp.maximum(length, 0.1 * wide)
+    return cx * cos - cy * turn, cy * cos + cx * turn, xp.stack((length, length), axis=-1)
+
+
+def _along_edge(x: Array, y: Array, to_goal: tuple[Array, Array], surveyed: Array) -> Array:
+    """Length of the way from points at edges of discs, by the better of the next two corners, shape (..., m, 2) [m].
 
     Args:
-        x: From the discs' centres, shape (..., m) [m].
+        x: From the discs' centres, shape (..., m, 2) [m].
         y: Same.
+        to_goal: From the discs' centres to the goal, shapes (..., m) [m].
         surveyed: The discs, shape (..., m, 4 + `CORNERS`).
-        first: Angle of their first corner, shape (..., m) [rad].
     """
     xp = array_namespace(x)
-    reach, ways = surveyed[..., 3] * _REACH, surveyed[..., 4:]
-    before = xp.floor((xp.atan2(y, x) - first) / _STEP)
-    lengths = []
-    for corner in (before, before + 1.0):
-        angle = first + corner * _STEP
-        dx, dy = reach * xp.cos(angle) - x, reach * xp.sin(angle) - y
-        which = xp.astype(corner % CORNERS, xp.int64)[..., None]
-        lengths.append(xp.sqrt(dx * dx + dy * dy) + xp.take_along_axis(ways, which, axis=-1)[..., 0])
-    return xp.minimum(*lengths)
+    size = clip(xp.sqrt(to_goal[0] * to_goal[0] + to_goal[1] * to_goal[1]), 1e-9, None)
+    cos, sin = (part[..., None] for part in (to_goal[0] / size, to_goal[1] / size))
+    x, y = cos * x + sin * y, cos * y - sin * x  # the first corner lies along x
+    before = xp.floor(xp.atan2(y, x) / _STEP)
+    corners = xp.concat((before, before + 1.0), axis=-1)
+    reach = surveyed[..., 3, None] * _REACH
+    dx = reach * xp.cos(corners * _STEP) - xp.concat((x, x), axis=-1)
+    dy = reach * xp.sin(corners * _STEP) - xp.concat((y, y), axis=-1)
+    ways = xp.take_along_axis(surveyed[..., 4:], xp.astype(corners % CORNERS, xp.int64), axis=-1)
+    by_corner = xp.sqrt(dx * dx + dy * dy) + ways
+    return xp.minimum(by_corner[..., :2], by_corner[..., 2:])
 
 
 _STEP = 2.0 * math.pi / CORNERS  # between two corners [rad]
-_REACH = 1.0 / math.cos(0.5 * _STEP)  # how far out they are, in widths, so that the polygons' sides touch the discs
+_REACH = 1.0 / math.cos(
+    0.5 * _STEP
+)  # how far out they are, in widths, so that the polygons' sides touch the discs
