@@ -15,7 +15,7 @@ def radii_for(obstacles: np.ndarray) -> tuple[float, ...]:
     """Radii to make room for.
 
     Args:
-        obstacles: x [m], y [m] and radius [m], shape (m, 3); radius 0 for none.
+        obstacles: x [m], y [m] and radius [m], shape (m, 3 or more); radius 0 for none.
 
     Returns:
         One radius for each row, that of the largest where there is none [m]; nothing where there is none at all.
@@ -49,7 +49,7 @@ def add_obstacles(spec: mujoco.MjSpec, radii: tuple[float, ...]) -> None:
 
 def place_obstacles(model: mujoco.MjModel, data: mujoco.MjData, obstacles: np.ndarray) -> None:
     """Move cylinders into place; `data` has just been reset, which leaves all of them far away."""
-    for i, (x, y, radius) in enumerate(obstacles):
+    for i, (x, y, radius) in enumerate(obstacles[:, :3]):
         if radius > 0.0:
             data.mocap_pos[model.body(_name(i)).mocapid[0]] = (x, y, 0.0)
 

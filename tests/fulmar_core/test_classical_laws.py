@@ -156,7 +156,6 @@ NUMBERS = [
     (robot, field.name)
     for robot in (ROBOTS["turtlebot2"], BOAT, ROBOTS["leatherback"])
     for field in fields(LAWS[robot.actuators.kind].gains)
-    if field.name != "around"
 ]
 
 

@@ -189,7 +189,7 @@ def sha(robot=ROBOT, task=POSE, weights=WEIGHTS, hz=5.0):
     return Lqr(robot, task, weights, control_hz=hz).metadata()["sha256"]
 
 
-NUMBERS = [field.name for field in fields(LqrWeights) if field.name not in ("around", "observer")]
+NUMBERS = [field.name for field in fields(LqrWeights) if field.name not in ("speed_around", "observer")]
 
 
 @pytest.mark.parametrize("name", NUMBERS)
@@ -233,8 +233,8 @@ def test_a_robot_without_weights_is_told_which_file_to_write():
 
 
 def test_weights_without_a_word_on_obstacles_are_refused_where_some_stand():
-    with pytest.raises(ValueError, match="'around' is missing"):
-        Lqr(ROBOT, load_task("go_to_position_with_obstacles"), replace(WEIGHTS, around=None))
+    with pytest.raises(ValueError, match="'speed_around' is missing"):
+        Lqr(ROBOT, load_task("go_to_position_with_obstacles"), replace(WEIGHTS, speed_around=0.0))
 
 
 @pytest.mark.parametrize("hz", [None, 5.0])

@@ -7,9 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode
 from fulmar_core.goal import goal_at
+from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_ros.goal_messages import obstacles_message, obstacles_of
 from fulmar_ros.mission import Mission
 from tests.states import planar_state
 
@@ -33,6 +37,21 @@ def test_a_mission_lacks_its_goal_first_then_what_stands_about():
     assert told.lacking == "obstacles"
     told.see_obstacles(np.array([[0.5, 0.0, 0.1]]), 2)
     assert told.complete
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_obstacles_and_goal_from_the_wires_are_observed_as_those_of_the_batch(number):
+    told, task = mission("go_to_position_with_obstacles"), load_task("go_to_position_with_obstacles")
+    episode = draw_episode(ROBOT, task, load_scenario("nominal"), seed=3, number=number)
+    discs, problem = obstacles_of(obstacles_message(episode.goal.obstacles, 7))
+    assert problem == ""
+    told.give(goal_at((*episode.goal.current[:2], 0.0)), 1)
+    told.see_obstacles(discs, 7)
+    start = episode.start
+    seen = told.observe(planar_state(start.x, start.y, start.yaw), S, STILL)
+    expected = Observer(ROBOT, task)(start, episode.goal, STILL)
+    assert len(discs) > 1
+    np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
 
 
 def test_the_block_of_each_state_is_waited_for():

@@ -22,9 +22,9 @@ class Goal:
 
     targets: Array  # (..., k, 3), k >= 1; after the last one the first comes again
     done: Array  # (...,) targets already reached, whole numbers
-    obstacles: (
-        Array  # (..., m, 3) x [m], y [m], radius [m] of discs; m may be 0, a radius of 0 is no obstacle
-    )
+    # (..., m, 3 or more) x [m], y [m], radius [m] of discs, and what a task adds to them; m may be 0, a radius of 0 is
+    # no obstacle.
+    obstacles: Array
     block: Array  # (..., 2) place that moves: of the thing to push; with gates, of the robot a step ago [m]
 
     def write(self, index: Any, other: Goal) -> None:

@@ -21,10 +21,8 @@ TYPES: dict[str, type] = {
     "goal_path": Path,
     "goal_velocity": TwistStamped,
 }
-MOST_WAYPOINTS, MOST_OBSTACLES = (
-    10_000,
-    1_000,
-)  # more than that is a mistake, and would hold up the control loop
+MOST_WAYPOINTS = 10_000  # more than that is a mistake, and would hold up the control loop
+MOST_OBSTACLES = 30  # ways around more would take longer to find than a control step lasts
 FRAME, BODY_FRAME = "odom", "base_link"
 
 
@@ -114,10 +112,10 @@ def obstacles_message(obstacles: np.ndarray, time_ns: int) -> MarkerArray:
     """Discs as cylinders that viewers draw too.
 
     Args:
-        obstacles: Shape (m, 3): x [m], y [m], radius [m]; those of radius 0 are left out.
+        obstacles: Shape (m, 3 or more): x [m], y [m], radius [m]; those of radius 0 are left out.
         time_ns: When they were given; controllers report it back [ns].
     """
-    there = [disc for disc in np.asarray(obstacles) if disc[2] > 0.0]
+    there = [disc[:3] for disc in np.asarray(obstacles) if disc[2] > 0.0]
     # The first marker clears what a viewer drew before, and carries the stamp where there is no obstacle.
     first = Marker(action=Marker.DELETEALL)
     first.header.frame_id, first.header.stamp = FRAME, stamp_of(time_ns)

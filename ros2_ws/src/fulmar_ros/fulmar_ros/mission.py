@@ -13,6 +13,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.schedule import Schedule
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_ros.controller_wires import sees_obstacles
 
@@ -30,7 +31,8 @@ class Mission:
             task: What it shall do.
             streamed: Goals come with each odometry, stamped as it is, mostly the same again.
         """
-        self._task, self._observer, self._streamed = task, Observer(robot, task), streamed
+        self._robot, self._task, self._streamed = robot, task, streamed
+        self._observer = Observer(robot, task)
         self._goal: Goal | None = None
         # Velocities may be told ahead of their time; a place counts from when it comes, whoever's clock stamped it.
         self._schedule: Schedule[Goal] | None = Schedule() if task.goal_topic == "goal_velocity" else None
@@ -135,7 +137,10 @@ class Mission:
         assert goal is not None and obstacles is not None and block is not None
         parts = (goal, obstacles, block)
         if any(new is not old for new, old in zip(parts, self._batched_of, strict=True)):
-            self._batched_goal = stack_goals([Goal(goal.targets, np.asarray(goal.done), obstacles, block)])
+            batched = stack_goals([Goal(goal.targets, np.asarray(goal.done), obstacles, block)])
+            if isinstance(self._task, GoToPositionWithObstacles):
+                batched = self._task.surveyed(batched, self._robot)
+            self._batched_goal = batched
             self._batched_of = parts
         return self._batched_goal
 

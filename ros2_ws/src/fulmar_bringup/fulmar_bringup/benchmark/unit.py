@@ -133,7 +133,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         starts=np.stack((sample.start.x, sample.start.y, sample.start.yaw), axis=-1),
         targets=np.asarray(sample.goal.targets),
         goals=kept.goals,
-        obstacles=np.asarray(sample.goal.obstacles),
+        obstacles=np.asarray(sample.goal.obstacles)[..., :3],
         more=extra.arrays(),
     )
     outcome.save(unit.path)

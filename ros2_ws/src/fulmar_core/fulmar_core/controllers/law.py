@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fulmar_core.controllers.around import Around
+from fulmar_core.controllers.around import room_ahead
 from fulmar_core.controllers.guidance import passing_speed
 from fulmar_core.controllers.seen import Reader, Vector
 from fulmar_core.robot import Robot
@@ -19,7 +19,7 @@ from fulmar_core.tasks import Task
 
 
 class Law(ABC):
-    """Each command is a function of the observation; at obstacles also of the side on which they are being passed."""
+    """A controller whose commands follow from a few gains."""
 
     law: ClassVar[str]  # the end of its gains' file name
     title: ClassVar[str]  # for lists
@@ -47,14 +47,13 @@ class Law(ABC):
         self.robot, self.task, self.gains = robot, task, gains
         self.reader = Reader(robot, task)
         self.observation_names = self.reader.names
-        if self.reader.crosses_obstacles and gains.around is None:
-            raise ValueError("'around' is missing, which says how to keep off obstacles.")
+        if self.reader.crosses_obstacles and not gains.speed_around:
+            raise ValueError("'speed_around' is missing, which says how fast to go among obstacles.")
         robot.timing.substeps(self.control_hz)  # refuses rates that the physics cannot keep
         self.reset()
 
-    def reset(self) -> None:
-        """Forget on which side obstacles are being passed."""
-        self._side: np.ndarray | None = None
+    def reset(self) -> None:  # noqa: B027 - most laws remember nothing
+        """Forget what was seen."""
 
     def act(self, observation: Array) -> Array:
         """Choose a command; shapes as in `Controller.act`."""
@@ -63,8 +62,7 @@ class Law(ABC):
     @property
     def share_of_speed(self) -> float:
         """How much of the cruising speed may be used [-]."""
-        around: Around = self.gains.around
-        return around.speed if self.reader.crosses_obstacles else 1.0
+        return float(self.gains.speed_around) if self.reader.crosses_obstacles else 1.0
 
     @property
     def near(self) -> float:
@@ -72,15 +70,11 @@ class Law(ABC):
         passed = 0.7 * getattr(self.task, "reach", 0.0) if self.reader.passes else 0.0
         return max(float(self.gains.near), passed)
 
-    def around(self, goal: Vector, observation: np.ndarray, course: np.ndarray) -> tuple[Vector, np.ndarray]:
-        """Goal and free distance ahead, with respect to obstacles where the task has some; see `Around.aim`."""
+    def room(self, observation: np.ndarray, course: np.ndarray) -> np.ndarray:
+        """What is free in the direction of travel, infinite where nothing stands about; see `room_ahead`."""
         if not self.reader.crosses_obstacles:
-            return goal, np.full_like(goal[0], np.inf)
-        around: Around = self.gains.around
-        if self._side is None or self._side.shape != goal[0].shape:
-            self._side = np.zeros_like(goal[0])
-        goal, room, self._side = around.aim(goal, self.reader.obstacles(observation), course, self._side)
-        return goal, room
+            return np.full_like(course, np.inf)
+        return room_ahead(self.reader.obstacles(observation), course)
 
     def last_speed(self, goal: Vector, observation: np.ndarray, *, cruise: np.ndarray | float) -> np.ndarray:
         """Speed at the current target, shape (...,) [m/s]: that of passing it, or none where the robot shall stay.

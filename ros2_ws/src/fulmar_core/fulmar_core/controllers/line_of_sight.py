@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
@@ -45,13 +44,13 @@ class LineOfSightGains:
     corner: float  # share of the cruising speed at a waypoint where the course turns by a quarter or more [-]
     near: float  # what counts as there [m]
     least_thrust: float  # less is not worth a propeller's way through its dead band [N]
-    around: Around  # how to keep off obstacles
+    speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
         """Refuse gains that do not lead to the goal."""
         positive = (
             self.cruise, self.approach, self.braking, self.surge, self.heading, self.turn_rate, self.yaw,
-            self.slowing, self.near, self.least_thrust,
+            self.slowing, self.near, self.least_thrust, self.speed_around,
         )  # fmt: skip
         if min(positive) <= 0.0 or min(self.astern, self.sideslip, self.corner) < 0.0:
             raise ValueError(
@@ -94,7 +93,8 @@ class LineOfSight(Law):
     def _guided(self, observation: np.ndarray, u: np.ndarray, v: np.ndarray) -> Vector:
         """Wanted speed [m/s] and turn rate [rad/s]."""
         gains, share = self.gains, self.share_of_speed
-        goal, room = self.around(self.reader.goal(observation), observation, end_that_goes_first(u))
+        goal = self.reader.goal(observation)
+        room = self.room(observation, end_that_goes_first(u))
         rho = np.hypot(*goal)
         if self.reader.heads and gains.astern > 0.0:
             way = way_to_turn_least(goal, self.reader.turn(observation), u)

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
 from fulmar_core.controllers.reach import Reach
@@ -56,7 +55,7 @@ class LqrWeights:
     braking: float = 0.0  # share of the deceleration that valves and push allow; 0: no heed [-]
     least_open_s: float = 0.0  # on/off valves are left as they are for so long [s]
     observer: Suspicion | None = None  # how far to trust what; without, observations are believed as they are
-    around: Around | None = None  # how to keep off obstacles; tasks without any need nothing
+    speed_around: float = 0.0  # among obstacles, as a share; tasks without any need none [-]
 
     def __post_init__(self) -> None:
         """Refuse weights without a stabilising solution."""
@@ -217,12 +216,12 @@ class Lqr(Law):
         return np.concatenate(parts, axis=-1)
 
     def _aim(self, observation: np.ndarray, now: Situation) -> Vector:
-        """Where to go: the goal, beyond a waypoint, or around an obstacle, in the body frame [m]."""
+        """Where to go: the goal, beyond a waypoint, or along the way around obstacles, in the body frame [m]."""
         x, y = now.goal
         if self.reader.crosses_obstacles:
             u, v, _ = now.motion
             course = np.where(np.hypot(u, v) > 0.05, np.arctan2(v, u), np.arctan2(y, x))
-            (x, y), room = self.around((x, y), observation, course)
+            room = self.room(observation, course)
             shorter = np.minimum(1.0, room / np.maximum(np.hypot(x, y), 1e-6))
             return x * shorter, y * shorter
         if self.reader.passes:

@@ -40,7 +40,6 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.law import Law
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import wrap_angle
@@ -60,7 +59,6 @@ class DriftWeights:
     input: float  # R's diagonal
     threshold: float  # inputs nearer to 0 are 0
     bias: float  # a normalised input opens its valve above one half and this
-    around: Around | None = None  # nothing stands about where this law goes
 
     def __post_init__(self) -> None:
         """Refuse weights without a solution."""

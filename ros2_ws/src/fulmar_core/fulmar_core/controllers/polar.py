@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
@@ -38,11 +37,12 @@ class PolarGains:
     slowing: float  # speed to a position falls with this power of the cosine of its bearing [-]
     corner: float  # share of top speed at a waypoint where the course turns by a quarter or more [-]
     velocity: float  # share of a velocity error that the command adds [-]
-    around: Around  # how to keep off obstacles
+    speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
         """Refuse gains that do not lead to the goal."""
-        if min(self.distance, self.bearing, self.turn, self.near, self.slowing) <= 0.0 or self.heading >= 0.0:
+        positive = (self.distance, self.bearing, self.turn, self.near, self.slowing, self.speed_around)
+        if min(positive) <= 0.0 or self.heading >= 0.0:
             raise ValueError("all gains must be greater than 0, 'heading' less than 0.")
         if self.bearing + 5.0 / 3.0 * self.heading - 2.0 / np.pi * self.distance <= 0.0:
             raise ValueError("'bearing' + 5/3 'heading' - 2/pi 'distance' must be greater than 0 (§3.6.2).")
@@ -65,7 +65,7 @@ class Polar(Law):
         goal = self.reader.goal(observation)
         if self.reader.heads:
             return self._to_pose(goal, self.reader.turn(observation), u)
-        goal, room = self.around(goal, observation, end_that_goes_first(u))
+        room = self.room(observation, end_that_goes_first(u))
         last = self.last_speed(goal, observation, cruise=self._drive.max_speed)
         return self._to_position(goal, u, room, last)
 

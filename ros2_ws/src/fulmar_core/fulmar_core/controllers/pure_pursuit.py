@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.controllers.around import Around
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
@@ -40,11 +39,13 @@ class PurePursuitGains:
     corner: float  # share of the cruising speed at a waypoint where the course turns by a quarter or more [-]
     near: float  # what counts as there [m]
     velocity: float  # share of an error of the wanted speed that the command adds [-]
-    around: Around  # how to keep off obstacles
+    speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
         """Refuse gains that do not lead to the goal."""
-        positive = (self.look_ahead, self.cruise, self.approach, self.braking, self.sideways, self.near)
+        positive = (
+            self.look_ahead, self.cruise, self.approach, self.braking, self.sideways, self.near, self.speed_around,
+        )  # fmt: skip
         if min(positive) <= 0.0 or self.corner < 0.0 or not 0.0 <= self.velocity < 1.0:
             raise ValueError("gains must be greater than 0; 'corner' not negative, 'velocity' in [0, 1).")
 
@@ -62,7 +63,8 @@ class PurePursuit(Law):
         if self.reader.tracks:
             eu, _, er = self.reader.velocity_error(observation)
             return self._at_velocity(u + eu, r + er, u)
-        goal, room = self.around(self.reader.goal(observation), observation, end_that_goes_first(u))
+        goal = self.reader.goal(observation)
+        room = self.room(observation, end_that_goes_first(u))
         last = self.last_speed(goal, observation, cruise=self.gains.cruise)
         return self._pursuit(goal, u, room, last)
 

@@ -12,6 +12,7 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.obstacles import FAR, SIGHT
 from fulmar_core.tasks.terms import HEADING_TERMS
+from fulmar_core.tasks.ways import TOUCHING
 
 Vector = tuple[np.ndarray, np.ndarray]  # ahead and to the left, shapes (...,) [m]
 
@@ -30,7 +31,9 @@ class Reader:
         self._column = {name: i for i, name in enumerate(self.names)}
         pairs = (HEADING_TERMS, tuple(f"goal_{name}" for name in HEADING_TERMS))
         self._heading = next((pair for pair in pairs if pair[0] in self._column), ())
-        self._radius = task.obstacles.radius if isinstance(task, GoToPositionWithObstacles) else 0.0
+        self._wide = 0.0
+        if isinstance(task, GoToPositionWithObstacles):
+            self._wide = TOUCHING * (task.obstacles.radius + task.obstacles.clearance(robot))
 
     @property
     def heads(self) -> bool:
@@ -57,9 +60,12 @@ class Reader:
         return np.asarray(observation[..., self._column[name]])
 
     def goal(self, observation: np.ndarray) -> Vector:
-        """Way to the current target in the body's frame."""
-        if "goal_x_in_body" in self._column:
-            return self.term(observation, "goal_x_in_body"), self.term(observation, "goal_y_in_body")
+        """Way to the current target in the body's frame; around obstacles, its beginning, as long as all of it."""
+        for what in ("goal", "way"):
+            if f"{what}_x_in_body" in self._column:
+                return self.term(observation, f"{what}_x_in_body"), self.term(
+                    observation, f"{what}_y_in_body"
+                )
         return self._along(observation, "goal")
 
     def next_leg(self, observation: np.ndarray) -> Vector:
@@ -95,13 +101,13 @@ class Reader:
         return np.asarray(observation[..., -len(scale) :] * scale)
 
     def obstacles(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Centres of the obstacles in sight, in the body's frame, and their radius.
+        """Centres of the obstacles in sight, in the body's frame, and how wide they are where ways lead around them.
 
         Args:
             observation: Shape (..., n).
 
         Returns:
-            x and y, shapes (..., k) [m], far away for those that are not there, and the radius of all [m].
+            x and y, shapes (..., k) [m], far away for those that are not there, and the width of all [m].
         """
         x, y = (
             observation[..., [i for name, i in self._column.items() if re.fullmatch(term, name)]]
@@ -109,7 +115,7 @@ class Reader:
         )
         # At the end of sight, or behind it, or not there at all: none of them is in the way yet.
         clear = np.hypot(x, y) > SIGHT - 1e-3
-        return np.where(clear, -FAR, x), np.where(clear, 0.0, y), self._radius
+        return np.where(clear, -FAR, x), np.where(clear, 0.0, y), self._wide
 
     def _along(self, observation: np.ndarray, which: str) -> Vector:
         x, y, distance = (

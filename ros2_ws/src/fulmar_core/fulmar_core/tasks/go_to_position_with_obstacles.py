@@ -6,17 +6,27 @@ import functools
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from array_api_compat import array_namespace
-
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
+from fulmar_core.goal import Goal, offset_to
+from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.go_to_position import GoToPosition, PositionReward
 from fulmar_core.tasks.obstacles import TOUCH, Obstacles, clearance
-from fulmar_core.tasks.terms import Errors, Start, Tolerance, pose_errors
+from fulmar_core.tasks.terms import (
+    MOTION_TERMS,
+    Errors,
+    Start,
+    Tolerance,
+    fine_terms,
+    motion_terms,
+    pose_errors,
+)
+from fulmar_core.tasks.ways import shortest_way
+
+WAY_TERMS = ("way_x_in_body", "way_y_in_body")  # in the direction to take, as long as the way
+FINE_WAY_TERMS = ("fine_way_x_in_body", "fine_way_y_in_body", "way_length")
 
 
 @dataclass(frozen=True)
@@ -39,8 +49,8 @@ class GoToPositionWithObstacles:
 
     @functools.cached_property
     def observation_names(self) -> tuple[str, ...]:
-        """Terms of `GoToPosition`, then those of the obstacles."""
-        return (*GoToPosition.observation_names, *self.obstacles.terms)
+        """Terms of `GoToPosition`, of the way instead of the goal itself, then those of the obstacles."""
+        return (*WAY_TERMS, *MOTION_TERMS, *FINE_WAY_TERMS, *self.obstacles.terms)
 
     @functools.cached_property
     def _plain(self) -> GoToPosition:
@@ -53,11 +63,19 @@ class GoToPositionWithObstacles:
         """Draw starts, goals and obstacles; see `TaskProtocol.draw`."""
         start, goal = self._plain.draw(draws, robot, training=training)
         discs = self.obstacles.draw(draws, robot, start, goal.current)
-        return start, Goal(goal.targets, goal.done, discs, goal.block)
+        return start, self.surveyed(Goal(goal.targets, goal.done, discs, goal.block), robot)
+
+    def surveyed(self, goal: Goal, robot: Robot) -> Goal:
+        """A batch of goals, as NumPy, whose obstacles are just discs, with the ways around them for a robot."""
+        discs = self.obstacles.survey(goal.obstacles, goal.current, robot)
+        return Goal(goal.targets, goal.done, discs, goal.block)
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `TaskProtocol.observe`."""
-        return (*self._plain.observe(state, goal), *self.obstacles.observe(state, goal.obstacles))
+        ux, uy, length = _way(state, goal)
+        x, y = to_body(state.yaw, length * ux, length * uy)
+        fine = fine_terms(x, y, saturation=self.fine_distance)
+        return (x, y, *motion_terms(state), *fine, *self.obstacles.observe(state, goal.obstacles))
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
         """The goal stays."""
@@ -65,7 +83,7 @@ class GoToPositionWithObstacles:
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
-        return self._plain.reward(before, after, goal)
+        return self.reward_weights.of(_way(before, goal)[2], _way(after, goal)[2], after)
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
         """Distance from the goal."""
@@ -81,3 +99,9 @@ class GoToPositionWithObstacles:
         xp = array_namespace(gap)
         touching = xp.astype(gap < TOUCH, gap.dtype)
         return self.collision_cost * touching + self.nearness_cost * xp.exp(-clip(gap, 0.0, 9.0) / 0.15)
+
+
+def _way(state: PlanarState, goal: Goal) -> tuple[Array, Array, Array]:
+    """Unit vector in the world along the way around the obstacles, and its length [m], shapes (...,)."""
+    x, y = (goal.obstacles[..., i] - position[..., None] for i, position in enumerate((state.x, state.y)))
+    return shortest_way(x, y, goal.obstacles, offset_to(state, goal.current))

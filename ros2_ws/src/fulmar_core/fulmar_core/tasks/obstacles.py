@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from array_api_compat import array_namespace
 
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.tasks.ways import survey
 
 CANDIDATES = 8  # places tried for each obstacle; one that fits nowhere is left out
 FAR = 1e3  # where an obstacle is that is not there [m]
@@ -31,6 +31,7 @@ class Obstacles:
     from_goal: float  # least distance of the centre [m]
     from_start: float  # same [m]
     apart: float  # least distance between two centres [m]
+    margin: float  # that ways around keep between outline and edge [m]
     seen: int  # how many of the nearest a controller sees
 
     @property
@@ -70,6 +71,14 @@ class Obstacles:
             placed[:, i, :2] = spots[np.arange(n), pick]
             placed[:, i, 2] = np.where(there, self.radius, 0.0)
         return placed
+
+    def survey(self, discs: np.ndarray, target: np.ndarray, robot: Robot) -> np.ndarray:
+        """Discs with the ways around them for a robot; see `fulmar_core.tasks.ways.survey`."""
+        return survey(discs[..., :3], target[..., :2], self.clearance(robot))
+
+    def clearance(self, robot: Robot) -> float:
+        """What ways keep between the body's centre and an edge, so that the robot may turn anywhere [m]."""
+        return outline_of(robot).extent + self.margin
 
     def observe(self, state: PlanarState, obstacles: Array) -> tuple[Array, ...]:
         """Where the nearest obstacles are, seen from the body.
