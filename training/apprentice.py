@@ -14,7 +14,7 @@ import torch
 from torch.nn.utils import clip_grad_norm_
 
 from training.fast_ppo import FastPPO, rows
-from training.teacher import Teacher
+from training.teacher import Teacher, teacher_of
 from training.vec_env import BatchVecEnv
 
 RATE = (1e-3, 1e-4)  # learning rate of the first and of the last lesson
@@ -23,7 +23,7 @@ WEIGHT = 10.0  # of the squared error beside that of the value
 
 
 class Apprentice(FastPPO):
-    """`FastPPO` with a number of lessons before it; its worlds must take wrenches."""
+    """`FastPPO` with a number of lessons before it, of which `training.teacher` says where there are any."""
 
     def __init__(self, *args: Any, lessons: int = 0, **more: Any) -> None:
         """Build it; see `PPO` for everything but the number of lessons."""
@@ -48,7 +48,7 @@ class Apprentice(FastPPO):
         if getattr(self, "_teacher", None) is None:
             worlds = normaliser.unwrapped
             assert isinstance(worlds, BatchVecEnv)
-            self._teacher, self._examples = Teacher(worlds), []
+            self._teacher, self._examples = teacher_of(worlds), []
         assert self._teacher is not None
         self._examples.append(self._teacher.actions(np.asarray(normaliser.get_original_obs())))
 

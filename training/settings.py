@@ -41,7 +41,7 @@ class Ppo(OnPolicy):
 
     kind: Literal["ppo"] = "ppo"
     fast: bool = True  # our faster computation of it instead of the one of Stable-Baselines3
-    lessons: int = 0  # updates in which it first imitates the LQR, where it asks for a wrench
+    lessons: int = 0  # updates in which it first imitates the classical law of the robot's family
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,8 +159,8 @@ class TrainingSettings:
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""
         algorithm = self.algorithm
-        if isinstance(algorithm, Ppo) and algorithm.lessons and not (self.wrench and algorithm.fast):
-            raise ValueError("'lessons' are for 'wrench: true' and the fast PPO.")
+        if isinstance(algorithm, Ppo) and algorithm.lessons and not algorithm.fast:
+            raise ValueError("'lessons' are for the fast PPO.")
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
             raise ValueError(
                 f"worlds · steps = {self.worlds * algorithm.steps} must be a multiple of 'minibatch'."

@@ -1,4 +1,4 @@
-"""A policy that begins as the apprentice of the LQR."""
+"""A policy that begins as the apprentice of a classical law."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from fulmar_core.controllers.classical import load_classical
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
@@ -18,7 +19,7 @@ from training.checkpoint import load_checkpoint
 from training.fast_ppo import FastPPO
 from training.learners import build_learner, callbacks_of
 from training.run_folder import CHECKPOINT_FILE
-from training.teacher import Teacher
+from training.teacher import teacher_of
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -49,7 +50,7 @@ def error(learner, env):
     """Mean squared difference between what the learner and its teacher would do, in the worlds' present states."""
     raw = env.get_original_obs()
     actions, _ = learner.predict(env.normalize_obs(raw), deterministic=True)
-    return float(np.mean((actions - Teacher(env.unwrapped).actions(raw)) ** 2))
+    return float(np.mean((actions - teacher_of(env.unwrapped).actions(raw)) ** 2))
 
 
 def test_lessons_bring_a_policy_near_to_what_the_lqr_does(settings):
@@ -90,13 +91,33 @@ def test_the_teacher_takes_pushes_as_they_are_told(settings):
     seen = env.reset()
     pushed = seen.copy()
     pushed[:, -11] = 0.3  # N ahead
-    teacher = Teacher(env)
+    teacher = teacher_of(env)
     assert np.all(teacher.actions(pushed)[:, 0] <= teacher.actions(seen)[:, 0] + 1e-6)
     assert not np.array_equal(teacher.actions(pushed), teacher.actions(seen))
 
 
-def test_lessons_without_wrenches_are_refused(settings):
-    with pytest.raises(ValueError, match="'wrench: true'"):
-        replace(settings, wrench=False)
+def test_lessons_for_single_valves_are_refused():
     with pytest.raises(ConfigError, match="Set 'wrench: true'"):
-        Teacher(worlds(4, wrench=False))
+        teacher_of(worlds(4, wrench=False))
+
+
+def test_lessons_are_for_the_learner_that_can_follow_them(settings):
+    with pytest.raises(ValueError, match="'lessons' are for the fast PPO"):
+        replace(settings, algorithm=replace(settings.algorithm, fast=False))
+
+
+@pytest.mark.parametrize("robot", ["kingfisher", "turtlebot2", "leatherback", "modular_freeflyer"])
+def test_where_actions_are_commands_the_teacher_gives_those_of_its_law(robot):
+    the_robot, task = load_robot(robot), load_task("go_to_position")
+    env = BatchVecEnv(the_robot, task, load_scenario("nominal"), worlds=4, seed=3)
+    seen = env.reset()
+    commanded = the_robot.actuators.limited(teacher_of(env).actions(seen) * the_robot.actuators.scale)
+    np.testing.assert_allclose(commanded, law_of(the_robot, task).act(seen.astype(float)), atol=1e-6)
+
+
+def law_of(robot, task):
+    """The law of the robot's family, afresh; an LQR without what it remembers."""
+    law = load_classical(robot, task)
+    return (
+        type(law)(robot, task, replace(law.gains, observer=None)) if hasattr(law.gains, "observer") else law
+    )
