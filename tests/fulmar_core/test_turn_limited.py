@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from fulmar_core.bounds.legs import best_words
 from fulmar_core.bounds.surge import Surge, time_lost
 from fulmar_core.bounds.turn_course import TurnCourse
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import JUDGE_SEED, draw_episodes
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
@@ -173,6 +175,27 @@ def test_no_steering_beats_the_bound(robot, least):
     best = np.max([goals_reached(track, waypoints, radius=RADIUS) for track in tracks], axis=0)
     assert np.all(best <= most)
     assert np.mean(best / most) > least  # the bound is no sky; boats need a better law than this one
+
+
+@pytest.mark.parametrize(("robot", "least"), [("turtlebot2", 0.9), ("kingfisher", 0.8)])
+def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least):
+    """Commands of the first judged episodes, in thousandths, as optimal control with all the dynamics found them."""
+    with np.load(Path(__file__).with_name("time_optimal_drives.npz")) as drives:
+        commands = drives[robot].astype(np.float32) / 1000.0
+    machine, task, scenario = load_robot(robot), load_task("go_through_positions"), load_scenario("nominal")
+    numbers = np.arange(len(commands))
+    sim = BatchSimulation(machine, task, scenario, worlds=len(numbers), seed=JUDGE_SEED)
+    track = []
+    for command in commands.swapaxes(0, 1):
+        sim.step(command)
+        track.append(np.stack((sim.truth.x, sim.truth.y), axis=-1))
+    drawn = draw_episodes(machine, task, scenario, seed=JUDGE_SEED, numbers=numbers)
+    places = drawn.goal.targets[..., :2]
+    goals = goals_reached(np.stack(track, axis=1), places, radius=RADIUS)
+    start = np.stack((drawn.start.x, drawn.start.y), axis=-1)
+    most = bound_of(machine, start, places, RADIUS, task.episode_s, start_yaw=drawn.start.yaw).bound.goals
+    assert np.all(goals <= most)
+    assert np.mean(goals / most) >= least
 
 
 SURGE = Surge(mass=35.0, drag=17.0, ahead=39.0, astern=8.0)
