@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from fulmar_core.actuators.response import Response
 from fulmar_core.bounds import (
     Motions,
     bound_of,
@@ -24,6 +27,7 @@ from fulmar_core.bounds.legs import best_words
 from fulmar_core.bounds.surge import Surge, time_lost
 from fulmar_core.bounds.turn_course import TurnCourse
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import JUDGE_SEED, draw_episodes
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
@@ -77,6 +81,15 @@ def test_a_straight_way_takes_its_length_at_top_speed(distance):
 def test_a_robot_goes_astern_where_that_is_faster_than_turning():
     slow = Motions(1.0, 0.5, ((0.0, 0.2),))
     assert_last_goal_takes(1.8 / 0.5, np.array([[-2.0, 0.0]]), start_yaw=np.array(0.0), motions=slow)
+
+
+def test_wheels_go_to_and_fro_with_the_time_that_their_slew_needs_to_start_and_to_stop():
+    top, slew = 0.45, 0.9
+    there = (2.0 - RADIUS) / top + top / slew  # half of the last term is lost at each end
+    back = (4.0 - 2.0 * RADIUS) / top + 0.5 * top / slew
+    waypoints = np.array([[2.0, 0.0], [-2.0, 0.0]])
+    wheels = motions_of(load_robot("turtlebot2"))
+    assert_last_goal_takes(there + back, waypoints, start_yaw=np.array(0.0), motions=wheels)
 
 
 def test_turning_on_the_spot_takes_its_angle_over_the_turn_rate():
@@ -164,6 +177,27 @@ def test_no_steering_beats_the_bound(robot, least):
     assert np.mean(best / most) > least  # the bound is no sky; boats need a better law than this one
 
 
+@pytest.mark.parametrize(("robot", "least"), [("turtlebot2", 0.9), ("kingfisher", 0.8)])
+def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least):
+    """Commands of the first judged episodes, in thousandths, as optimal control with all the dynamics found them."""
+    with np.load(Path(__file__).with_name("time_optimal_drives.npz")) as drives:
+        commands = drives[robot].astype(np.float32) / 1000.0
+    machine, task, scenario = load_robot(robot), load_task("go_through_positions"), load_scenario("nominal")
+    numbers = np.arange(len(commands))
+    sim = BatchSimulation(machine, task, scenario, worlds=len(numbers), seed=JUDGE_SEED)
+    track = []
+    for command in commands.swapaxes(0, 1):
+        sim.step(command)
+        track.append(np.stack((sim.truth.x, sim.truth.y), axis=-1))
+    drawn = draw_episodes(machine, task, scenario, seed=JUDGE_SEED, numbers=numbers)
+    places = drawn.goal.targets[..., :2]
+    goals = goals_reached(np.stack(track, axis=1), places, radius=RADIUS)
+    start = np.stack((drawn.start.x, drawn.start.y), axis=-1)
+    most = bound_of(machine, start, places, RADIUS, task.episode_s, start_yaw=drawn.start.yaw).bound.goals
+    assert np.all(goals <= most)
+    assert np.mean(goals / most) >= least
+
+
 SURGE = Surge(mass=35.0, drag=17.0, ahead=39.0, astern=8.0)
 
 
@@ -210,6 +244,23 @@ def test_an_episode_alone_has_the_bound_that_it_has_in_a_batch():
     together = bound(waypoints, 25.0, start_yaw=yaw)
     alone = [bound(waypoints[i], 25.0, start_yaw=yaw[i]) for i in range(3)]
     np.testing.assert_allclose(together.progress, [one.progress for one in alone], atol=1e-6)
+
+
+@pytest.mark.parametrize(("robot", "acceleration"), [("turtlebot2", 0.9), ("leatherback", 4.0)])
+def test_wheels_speed_up_and_stop_evenly(robot, acceleration):
+    surge = motions_of(load_robot(robot)).surge
+    way, force = np.array(0.1), surge.force(1.0)
+    for time in (surge.starting, surge.stopping):
+        assert time(way, force) == pytest.approx(math.sqrt(2.0 * 0.1 / acceleration), rel=1e-5)
+    for length in (surge.starting_length, surge.stopping_length):
+        assert length(np.array(0.4), force) == pytest.approx(0.4**2 / (2.0 * acceleration), rel=1e-5)
+    assert surge.turning_point(way, force, surge.force(-1.0)) == pytest.approx(0.05, rel=1e-5)
+
+
+def test_motors_hold_wheels_that_are_asked_for_more():
+    robot = load_robot("turtlebot2")
+    strong = replace(robot, actuators=replace(robot.actuators, response=Response(slew=(90.0, 1.8))))
+    assert motions_of(strong).surge.ahead == pytest.approx(24.0 / 6.5)
 
 
 def test_a_boat_holds_what_drag_and_propellers_balance():

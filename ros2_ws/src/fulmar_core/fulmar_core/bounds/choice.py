@@ -38,8 +38,9 @@ def bound_of(
     """Most waypoints that a robot can visit in a loop, by what limits its family.
 
     Thrusters: time-optimal travel of a point mass with the force in the strongest direction, whichever way it faces.
-    Propellers in water and wheels: travel along the heading at the speeds and turn rates that the robot can hold. Any
-    other: travel at top speed. The body is the nominal one, in a still world.
+    Propellers in water and wheels: travel along the heading at the speeds and turn rates that the robot can hold, with
+    the time that starting and stopping take. Any other: travel at top speed. The body is the nominal one, in a still
+    world.
 
     Args:
         robot: The robot.
@@ -77,7 +78,7 @@ def bound_of(
         )
         fastest = max(rate for _, rate in motions.turns)
         rule = (
-            f"at up to {motions.ahead:.2f} m/s and {fastest:.2f} rad/s, inertia in turns and slew not counted"
+            f"at up to {motions.ahead:.2f} m/s and {fastest:.2f} rad/s, inertia and slew in turns not counted"
         )
         return NamedBound(bound, "turn_limited", rule)
     speed = robot.performance.top_speed

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.actuators.response import Response
 from fulmar_core.bounds.surge import Surge
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.robot import Robot
@@ -16,6 +17,8 @@ from fulmar_core.robot import Robot
 # Where curved edges are cut into corners: of the fastest turn, and astern of the fastest on the spot.
 _SHARES = (0.2, 0.45, 0.7, 0.87, 1.0)
 _SHARES_ASTERN = (0.4, 0.75, 0.95)
+_SHORTER_IN_WATER = 0.95  # as `Motions.shorter`, where speed is lost in turns
+_NO_DRAG = 1e-6  # of 1 kg on wheels [N per (m/s)²]: so little that `Surge` needs no equations without drag
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class Motions:
     astern: float  # top speed straight astern, 0: it cannot [m/s]
     turns: tuple[tuple[float, float], ...]  # speed ahead [m/s] and turn rate > 0 [rad/s] of each corner
     surge: Surge | None = None  # what stopping costs; None: nothing
+    shorter: float = 0.98  # factor on all times: what grids, and turns of one radius each, may cost; measured
 
     def __post_init__(self) -> None:
         """Refuse robots that cannot move or turn."""
@@ -45,7 +49,8 @@ def motions_of(robot: Robot) -> Motions | None:
     """Steady speeds and turn rates of a robot of a family that moves along its heading.
 
     Propellers: surge and yaw drag balance the thrusts; that a turning boat also slides sideways, which costs it speed,
-    is left out. Wheels: the limits of the drive, for cars also the friction of the tyres.
+    is left out. Wheels: the limits of the drive, for cars also the friction of the tyres; they speed up and stop by
+    their slew, or by their motors' force if that is less.
 
     Args:
         robot: The robot.
@@ -57,9 +62,13 @@ def motions_of(robot: Robot) -> Motions | None:
         case Propellers():
             return _in_water(robot, robot.actuators)
         case DifferentialDrive():
-            return _on_two_wheels(robot.actuators)
+            wheels = robot.actuators
+            return _on_two_wheels(
+                wheels, _rolling(wheels.response, 2.0 * wheels.wheel_force / robot.body.mass)
+            )
         case Ackermann():
-            return _on_steered_wheels(robot.actuators)
+            car = robot.actuators
+            return _on_steered_wheels(car, _rolling(car.response, car.wheel_force / robot.body.mass))
         case _:
             return None
 
@@ -91,10 +100,11 @@ def _in_water(robot: Robot, propellers: Propellers) -> Motions | None:
     if not turns:
         return None
     ahead, astern = most * len(arms), -least * len(arms)
-    surge = None
-    if du == 0.0 and astern > 0.0:
-        surge = Surge(robot.body.mass + water.planar_added_mass[0], qu, ahead, astern)
-    return Motions(speed(ahead), max(-speed(-astern), 0.0), tuple(turns), surge)
+    motions = Motions(speed(ahead), max(-speed(-astern), 0.0), tuple(turns))
+    if du != 0.0 or astern <= 0.0:
+        return motions
+    surge = Surge(robot.body.mass + water.planar_added_mass[0], qu, ahead, astern)
+    return replace(motions, surge=surge, shorter=_SHORTER_IN_WATER)
 
 
 def _balance(linear: float, quadratic: float, push: float) -> float:
@@ -120,21 +130,27 @@ def _largest_moment(arms: np.ndarray, least: float, most: float) -> float:
     return float(np.sum(arms * np.asarray(found.x))) if found.success else 0.0
 
 
-def _on_two_wheels(drive: DifferentialDrive) -> Motions:
+def _rolling(response: Response, acceleration: float) -> Surge:
+    """Wheels on a straight; the lag of their servos changes no speed faster."""
+    most = min((acceleration, *response.slew[:1]))
+    return Surge(1.0, _NO_DRAG, most, most)
+
+
+def _on_two_wheels(drive: DifferentialDrive, straight: Surge) -> Motions:
     """Corners of the box of speed and turn rate, cut where a wheel would be too fast."""
     half, rim = 0.5 * drive.track, drive.max_wheel_speed * drive.wheel_radius
     top, turn = min(drive.max_speed, rim), min(drive.max_yaw_rate, rim / half)
     corners = [(min(top, rim - half * turn), turn), (top, min(turn, (rim - top) / half))]
     both = [(sign * v, w) for v, w in corners for sign in (1.0, -1.0)]
     both.append((0.0, turn))
-    return Motions(top, top, tuple(dict.fromkeys((v, w) for v, w in both if w > 0.0)))
+    return Motions(top, top, tuple(dict.fromkeys((v, w) for v, w in both if w > 0.0)), straight)
 
 
-def _on_steered_wheels(car: Ackermann) -> Motions:
+def _on_steered_wheels(car: Ackermann, straight: Surge) -> Motions:
     """The tightest circle, as fast as the tyres hold, and wider ones at higher speeds."""
     tightest, grip = np.tan(car.max_steering) / car.wheelbase, car.friction * GRAVITY
     turns = []
     for speed in np.linspace(min(car.max_speed, np.sqrt(grip / tightest)), car.max_speed, 4):
         rate = float(min(speed * tightest, grip / speed))
         turns += [(float(speed), rate), (-float(speed), rate)]
-    return Motions(car.max_speed, car.max_speed, tuple(dict.fromkeys(turns)))
+    return Motions(car.max_speed, car.max_speed, tuple(dict.fromkeys(turns)), straight)

@@ -1,4 +1,4 @@
-"""Time that a hull loses where it changes from ahead to astern: it must stop and speed up again."""
+"""Time that a robot loses where it starts, stops, or changes from ahead to astern: it must speed up and slow down."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ _FAR = 500.0  # largest exponent
 
 @dataclass(frozen=True)
 class Surge:
-    """A hull on a straight, with drag that grows with the square of its speed: m u' = F - q |u| u."""
+    """A hull on a straight, with drag that grows with the square of its speed: m u' = F - q |u| u.
+
+    With next to no drag it is a robot on wheels, whose speed changes evenly.
+    """
 
     mass: float  # with the water that moves along [kg]
-    drag: float  # q [N per (m/s)²]
+    drag: float  # q, > 0 [N per (m/s)²]
     ahead: float  # largest force ahead [N]
     astern: float  # largest force astern [N]
 

@@ -1,11 +1,11 @@
 """Bound on visits of a robot that moves along its heading and turns no faster than it can.
 
-Relaxed: turn rate and speed may be any that the robot can hold, and change at once, so yaw inertia and slew cost
-nothing. Only where a hull changes from ahead to astern, or stops, it needs the time that stopping and speeding up take
-at full thrust (`surge`). Leg by leg the way is a turn, a straight and a turn, ahead or astern (Dubins 1957, Reeds and
-Shepp 1990, here with several radii and turning on the spot). Where each disc is touched, with which heading, and
-whether ahead, astern or at rest, is found by dynamic programming: on a coarse grid with a table of legs, then on ever
-finer grids around the plan with exact legs.
+Relaxed: turn rate and speed may be any that the robot can hold, and change at once, so yaw inertia and the slew of
+propellers, steering and turn rates cost nothing. Only where a robot starts, stops, or changes from ahead to astern, it
+needs the time that this takes at full thrust or at the slew of its wheels (`surge`). Leg by leg the way is a turn, a
+straight and a turn, ahead or astern (Dubins 1957, Reeds and Shepp 1990, here with several radii and turning on the
+spot). Where each disc is touched, with which heading, and whether ahead, astern or at rest, is found by dynamic
+programming: on a coarse grid with a table of legs, then on ever finer grids around the plan with exact legs.
 """
 
 from __future__ import annotations
@@ -20,9 +20,6 @@ from fulmar_core.bounds.top_speed import top_speed_bound
 from fulmar_core.bounds.turn_course import TurnCourse
 from fulmar_core.bounds.visits import Bound, Route, route_of
 
-# Factors on all times: what grids, and turns of one radius each, may cost; where stops cost time, and where not.
-_SHORTER_WITH_STOPS = 0.95
-_SHORTER = 0.98
 _BATCH = 256  # episodes at once
 
 
@@ -64,7 +61,7 @@ def turn_limited_bound(
     """
     route = route_of(start_xy, waypoints, radius=radius, duration_s=duration_s, loop=loop)
     yaw = None if start_yaw is None else np.broadcast_to(start_yaw, route.shape).reshape(-1).astype(float)
-    budget = duration_s / (_SHORTER_WITH_STOPS if motions.surge else _SHORTER)
+    budget = duration_s / motions.shorter
     first, legs = (np.maximum(leg - 2.0 * radius, 0.0) / motions.ahead for leg in route.legs())
     most = route.goals_after(first, legs, budget)  # nothing exceeds top speed
     longest = np.max(
