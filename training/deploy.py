@@ -49,6 +49,7 @@ def deployed_network(
     assert not isinstance(statistics, dict)
     worlds = normaliser.unwrapped
     choice = worlds.choice if isinstance(worlds, BatchVecEnv) else None
+    mirror = worlds.mirror if isinstance(worlds, BatchVecEnv) else None
     trained = _trained(learner, wrench=choice is not None)
     plan = NetworkPlan(
         inputs=len(statistics.mean),
@@ -61,6 +62,7 @@ def deployed_network(
         memory=2 * trained.lstm.hidden_size if trained.lstm else 0,
         combinations=len(choice.commands) if choice else 0,
         knows_dead=choice is not None and worlds.told,
+        side=mirror.side if mirror else None,
     )
     with torch.random.fork_rng(devices=[]):  # whoever looks at a learner must not change what it draws next
         network = DeployedNetwork(plan)
@@ -73,6 +75,8 @@ def deployed_network(
             twin.load_state_dict(layer.state_dict())
         if choice is not None:
             network.take_choice(choice)
+        if mirror is not None:
+            network.take_mirror(mirror)
         if trained.lstm is not None:
             _copy_memory(trained.lstm, network)
     return network

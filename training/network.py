@@ -18,6 +18,7 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.symmetry import Mirror
 from fulmar_core.tasks import Task
 
 Decision = Literal["threshold", "clamp", "squash", "choose"]
@@ -37,6 +38,7 @@ class NetworkPlan:
     memory: int = 0  # numbers that an LSTM before the hidden layers carries over; 0: there is none
     combinations: int = 0  # of valves, to choose from for a wrench
     knows_dead: bool = False  # its last inputs are 1 for each valve, or 0 where it is dead
+    side: int | None = None  # where this input is negative, it sees and answers the mirror image
 
     @property
     def on_off(self) -> bool:
@@ -54,6 +56,8 @@ class DeployedNetwork(nn.Module):
     choice_slope: torch.Tensor
     choice_offset: torch.Tensor
     choice_gas: torch.Tensor
+    mirror_seen: torch.Tensor
+    mirror_done: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
         """Build an untrained network."""
@@ -68,6 +72,9 @@ class DeployedNetwork(nn.Module):
             self.register_buffer("choice_slope", torch.zeros(WRENCH, count))
             self.register_buffer("choice_offset", torch.zeros(count))
             self.register_buffer("choice_gas", torch.zeros(count))
+        if plan.side is not None:
+            self.register_buffer("mirror_seen", torch.eye(plan.inputs))
+            self.register_buffer("mirror_done", torch.eye(plan.outputs))
         units = plan.memory // 2
         self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
         self.from_memory = nn.Linear(units, 4 * units) if units else None
@@ -92,9 +99,11 @@ class DeployedNetwork(nn.Module):
             Commands in the actuators' units and the raw outputs behind them, both of shape (worlds, m), and the next
             memory if it has any.
         """
-        features = torch.clamp((observation - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
+        seen = self._mirrored(observation, observation, "seen")
+        features = torch.clamp((seen - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
         if memory is None:
-            raw = self._appraised(self.layers(features), observation)
+            raw = self._mirrored(self.layers(features), observation, "done")
+            raw = self._appraised(raw, observation)
             return self._decide(raw), raw
         memory = self._remember(features, memory)
         raw = self._appraised(self.layers(memory[:, : self.plan.memory // 2]), observation)
@@ -109,6 +118,21 @@ class DeployedNetwork(nn.Module):
         take, keep, new, show = gates.split(self.plan.memory // 2, dim=1)
         cell = torch.sigmoid(keep) * cell + torch.sigmoid(take) * torch.tanh(new)
         return torch.cat((torch.sigmoid(show) * torch.tanh(cell), cell), dim=1)
+
+    def _mirrored(
+        self, rows: torch.Tensor, observation: torch.Tensor, kind: Literal["seen", "done"]
+    ) -> torch.Tensor:
+        """Rows of what is seen or done, left for right where the goal is on the right."""
+        if self.plan.side is None:
+            return rows
+        matrix = self.mirror_seen if kind == "seen" else self.mirror_done
+        right = observation[:, self.plan.side : self.plan.side + 1] < 0.0
+        return torch.where(right, rows @ matrix, rows)
+
+    def take_mirror(self, mirror: Mirror) -> None:
+        """Take over what left for right means."""
+        self.mirror_seen.copy_(torch.as_tensor(mirror.seen))
+        self.mirror_done.copy_(torch.as_tensor(mirror.done))
 
     def take_choice(self, choice: WrenchChoice) -> None:
         """Take over the table that valves are chosen from."""

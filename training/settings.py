@@ -154,6 +154,7 @@ class TrainingSettings:
     wrench: bool = (
         False  # whether it asks for a wrench that on/off valves are then chosen for, not for single valves
     )
+    mirror: bool = False  # goals on the right are shown, and answered, as on the left
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
 
     def __post_init__(self) -> None:
@@ -161,6 +162,8 @@ class TrainingSettings:
         algorithm = self.algorithm
         if isinstance(algorithm, Ppo) and algorithm.lessons and not algorithm.fast:
             raise ValueError("'lessons' are for the fast PPO.")
+        if self.mirror and isinstance(algorithm, RecurrentPpo):
+            raise ValueError("'mirror' is for networks without memory: what they remember has a side, too.")
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
             raise ValueError(
                 f"worlds · steps = {self.worlds * algorithm.steps} must be a multiple of 'minibatch'."

@@ -107,6 +107,7 @@ def train(
         told=settings.told,
         wrench=settings.wrench,
         gas=settings.gas,
+        mirror=settings.mirror,
     )
     story = Story()
     if resume:

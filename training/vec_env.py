@@ -18,6 +18,7 @@ from fulmar_core.episode import episode_steps
 from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.symmetry import Mirror
 from fulmar_core.tasks import Task
 from training.told_truth import ToldTruth
 
@@ -46,6 +47,7 @@ class BatchVecEnv(VecEnv):
         told: bool = False,
         wrench: bool = False,
         gas: float = 1.0,
+        mirror: bool = False,
     ) -> None:
         """Build the worlds.
 
@@ -62,6 +64,7 @@ class BatchVecEnv(VecEnv):
             told: Observations also tell pushes and dead valves (`fulmar_core.controllers.told`).
             wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
             gas: What a valve costs in that choice, as a multiple.
+            mirror: Goals on the right are shown, and answered, as on the left (`fulmar_core.symmetry`).
         """
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
@@ -69,6 +72,8 @@ class BatchVecEnv(VecEnv):
         self._judged = robot  # with what its actuators cost now
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
         self.choice = WrenchChoice.of(robot, gas) if wrench else None
+        self.mirror = Mirror.of(robot, task) if mirror else None
+        self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
@@ -105,12 +110,13 @@ class BatchVecEnv(VecEnv):
     def state(self) -> dict[str, Any]:
         """Everything that a step changes, as values that pickle; for an exact resume."""
         state = {"simulation": self.simulation.snapshot(), "age": self._age.copy()}
+        state["mirrored"] = self._mirrored.copy()
         return state | ({"told": self._told.state()} if self._told else {})
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what `state` returned."""
         self.simulation.restore(state["simulation"])
-        self._age = state["age"].copy()
+        self._age, self._mirrored = state["age"].copy(), state["mirrored"].copy()
         if self._told:
             self._told.set_state(state["told"])
 
@@ -146,11 +152,23 @@ class BatchVecEnv(VecEnv):
             self._told.forget(worlds)
 
     def _completed(self, observations: np.ndarray) -> np.ndarray:
-        return np.hstack((observations, self._told.told(self.simulation))) if self._told else observations
+        if self._told:
+            observations = np.hstack((observations, self._told.told(self.simulation)))
+        return self._shown(observations, np.arange(self.num_envs))
+
+    def _shown(self, observations: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """Goals on the right as on the left, where that was asked for; which they were is remembered."""
+        if self.mirror is None:
+            return observations
+        right = observations[:, self.mirror.side] < 0.0
+        self._mirrored[worlds] = right
+        return np.where(right[:, None], observations @ self.mirror.seen, observations)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
         actions = np.asarray(actions, dtype=np.float32)
+        if self.mirror is not None:
+            actions = np.where(self._mirrored[:, None], actions @ self.mirror.done, actions)
         self._actions = self._valves(self.choice, actions) if self.choice else actions
 
     def _valves(self, choice: WrenchChoice, shares: np.ndarray) -> np.ndarray:
@@ -198,7 +216,7 @@ class BatchVecEnv(VecEnv):
         observations = np.asarray(self.simulation.observe(worlds))
         if self._told:
             observations = np.hstack((observations, self._told.told(self.simulation)[worlds]))
-        return observations
+        return self._shown(observations, worlds)
 
     def close(self) -> None:
         """Nothing to release."""
