@@ -155,6 +155,7 @@ class TrainingSettings:
         False  # whether it asks for a wrench that on/off valves are then chosen for, not for single valves
     )
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
+    turn_first: float = 0.0  # how much more than its share a large torque asks for in that choice
 
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""

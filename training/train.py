@@ -107,6 +107,7 @@ def train(
         told=settings.told,
         wrench=settings.wrench,
         gas=settings.gas,
+        turn_first=settings.turn_first,
     )
     story = Story()
     if resume:
