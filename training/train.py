@@ -108,6 +108,7 @@ def train(
         wrench=settings.wrench,
         gas=settings.gas,
         mirror=settings.mirror,
+        turn_first=settings.turn_first,
     )
     story = Story()
     if resume:
