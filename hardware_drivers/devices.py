@@ -31,7 +31,7 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
     if isinstance(settings, GpioValves):
         from hardware_drivers.thruster_driver import ThrusterDriver
 
-        return ThrusterDriver(robot, settings)
+        return ThrusterDriver(robot, settings, patience_s=patience_s)
     if isinstance(settings, Kobuki):
         from hardware_drivers.kobuki_driver import KobukiDriver
 

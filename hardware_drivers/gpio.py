@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 import os
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +15,7 @@ from gpiod.line import Direction, Value
 from fulmar_core.errors import DeviceError
 
 CONSUMER = "fulmar"
+RETRY_S = 0.1
 FILE_CHIP = "file://"  # an address that begins so names a file with one byte a line: the level at the pin
 
 
@@ -32,13 +34,16 @@ class LineRequest(Protocol):
 RequestLines = Callable[..., LineRequest]
 
 
-def output_lines(address: str, lines: Sequence[str], *, active_low: bool) -> LineRequest:
+def output_lines(
+    address: str, lines: Sequence[str], *, active_low: bool, patience_s: float = 0.0
+) -> LineRequest:
     """Take lines as outputs, all inactive from the first moment on.
 
     Args:
         address: A chip, such as /dev/gpiochip0; or `file://` and a path, see `FILE_CHIP`.
         lines: Names or numbers of the lines.
         active_low: Whether a line is active when its pin is low.
+        patience_s: Wait so long for a chip that is not there yet [s].
 
     Returns:
         The lines.
@@ -50,13 +55,17 @@ def output_lines(address: str, lines: Sequence[str], *, active_low: bool) -> Lin
         direction=Direction.OUTPUT, active_low=active_low, output_value=Value.INACTIVE
     )
     request: RequestLines = request_of_file if address.startswith(FILE_CHIP) else gpiod.request_lines
-    try:
-        return request(address, consumer=CONSUMER, config={tuple(line_of(line) for line in lines): settings})
-    except (OSError, ValueError) as error:
-        raise DeviceError(
-            f"{address}: lines {', '.join(lines)} cannot be taken ({error}). "
-            "`gpioinfo` shows the names and numbers of all lines, and who has them."
-        ) from error
+    until = time.monotonic() + patience_s
+    while True:
+        try:
+            return request(address, consumer=CONSUMER, config={tuple(map(line_of, lines)): settings})
+        except (OSError, ValueError) as error:
+            if not isinstance(error, FileNotFoundError) or time.monotonic() > until:
+                raise DeviceError(
+                    f"{address}: lines {', '.join(lines)} cannot be taken ({error}). "
+                    "`gpioinfo` shows the names and numbers of all lines, and who has them."
+                ) from error
+        time.sleep(RETRY_S)
 
 
 def line_of(text: str) -> int | str:

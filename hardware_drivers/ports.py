@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import threading
 import time
@@ -14,7 +15,6 @@ import serial
 from fulmar_core.errors import ConfigError, DeviceError
 
 READ_S = 0.05  # how soon the reading thread hears that it shall end
-WRITE_S = 0.05  # a write that takes longer is a device that does not listen
 RETRY_S = 0.1
 CHUNK = 4096
 
@@ -40,7 +40,7 @@ class SerialPort:
 
     def __init__(self, path: str, baud: int) -> None:
         """Open it; raises OSError."""
-        self._port = serial.Serial(path, baud, timeout=READ_S, write_timeout=WRITE_S, exclusive=True)
+        self._port = serial.Serial(path, baud, timeout=READ_S, exclusive=True)
 
     def read(self) -> bytes:
         """See `Port`."""
@@ -48,7 +48,9 @@ class SerialPort:
 
     def write(self, data: bytes) -> None:
         """See `Port`."""
-        self._port.write(data)
+        # Not pyserial's own: it waits, or counts a late thread as a late device. The descriptor never blocks.
+        if os.write(self._port.fileno(), data) < len(data):
+            raise OSError("it does not take any more bytes")
 
     def close(self) -> None:
         """See `Port`."""

@@ -26,7 +26,7 @@ class ThrusterDriver:
     the floor would only waste its air.
     """
 
-    def __init__(self, robot: Robot, settings: GpioValves) -> None:
+    def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
         """Take the lines, everything closed.
 
         Raises:
@@ -38,7 +38,7 @@ class ThrusterDriver:
         self._bearing = line_of(settings.bearing.line)
         every = (*settings.lines, settings.bearing.line)
         self._lines: LineRequest | None = output_lines(
-            settings.port, every, active_low=settings.active_low
+            settings.port, every, active_low=settings.active_low, patience_s=patience_s
         )
         self._timing = ValveTiming(len(self._valves), settings.min_on_s)
         self._lock = threading.Lock()
