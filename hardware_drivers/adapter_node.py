@@ -35,7 +35,9 @@ NO_STAMP = 0  # they answer no observation of ours
 class AdapterSettings:
     """ROS parameters of an adapter node."""
 
-    hardware: str = ""  # a file of configs/hardware with the driver `valve_topic`, `velocity_topic` or `thrust_topic`
+    hardware: str = (
+        ""  # a file of configs/hardware with the driver `valve_topic`, `velocity_topic` or `thrust_topic`
+    )
     topic: str = ""  # hear this instead of the file's topic
 
 
@@ -70,9 +72,7 @@ class AdapterNode(Node):
         heard, take = self._ear(driver)
         self.create_subscription(heard, settings.topic or driver.topic, take, NEWEST)
 
-    def _ear(
-        self, driver: ValveTopic | VelocityTopic | ThrustTopic
-    ) -> tuple[type, Callable[[Any], None]]:
+    def _ear(self, driver: ValveTopic | VelocityTopic | ThrustTopic) -> tuple[type, Callable[[Any], None]]:
         if isinstance(driver, ValveTopic):
             return Int16MultiArray, self._valves
         if isinstance(driver, ThrustTopic):

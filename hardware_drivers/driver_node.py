@@ -35,7 +35,9 @@ class DriverSettings(PlantSettings):
         """Refuse what a real device cannot do."""
         super().__post_init__()
         if self.lockstep or self.rate != 1.0:
-            raise ValueError("a real device neither waits nor hurries: lockstep and rate have no meaning here.")
+            raise ValueError(
+                "a real device neither waits nor hurries: lockstep and rate have no meaning here."
+            )
         if not self.hardware:
             raise ValueError("'hardware' names no file: give a name of configs/hardware, or a path.")
 
@@ -90,9 +92,7 @@ class DriverNode(PlantNode):
         if hardware.robot != robot.name:
             raise ConfigError(f"{settings.hardware} is of '{hardware.robot}', the robot is '{robot.name}'.")
         by_topic = self._by_topic(robot, hardware)
-        return by_topic or make_device(
-            robot, hardware, port=settings.port, patience_s=settings.connect_s
-        )
+        return by_topic or make_device(robot, hardware, port=settings.port, patience_s=settings.connect_s)
 
     def _by_topic(self, robot: Robot, hardware: Hardware) -> Device | None:
         driver = hardware.driver

@@ -1,6 +1,6 @@
 """Sentences of the Kingfisher's front seat, the host's side.
 
-Clearpath's boats of this family (Kingfisher, Heron, M200) take `$PYDIR,left,right` in percent and report navigation
+Clearpath's boats of this family (Kingfisher, Heron, M200) take `$PYDIR,left,right` in percent and report where they are
 (`$CPNVG`), velocities (`$CPNVR`) and the inertial unit (`$CPIMU`). No specification is public; the fields are those that
 the open iM200 application of MOOS-IvP reads, and its recording of a real boat is a test of ours.
 """
@@ -140,6 +140,6 @@ def _time(fields: list[str], own: int) -> float:
     hours, rest = divmod(value, 10000.0)
     minutes, seconds = divmod(rest, 100.0)
     time_s = 3600.0 * hours + 60.0 * minutes + seconds
-    if not 0.0 <= value or minutes >= 60.0 or not time_s < DAY_S + 2.0:
+    if not value >= 0.0 or minutes >= 60.0 or not time_s < DAY_S + 2.0:
         raise ValueError(text)
     return time_s

@@ -1,7 +1,7 @@
 """Kobuki's serial protocol, the host's side: commands as bytes, bytes as reports.
 
-A packet is AA 55, the length of the payload, the payload, and the exclusive or of all bytes after the two first. A payload
-is a row of parts: identifier, length, data, little endian. Source: Kobuki's protocol specification
+A packet is AA 55, the length of the payload, the payload, and the exclusive or of all bytes after the two first. A
+payload is a row of parts: identifier, length, data, little endian. Source: Kobuki's protocol specification
 (docs.ros.org, kobuki_driver, appendix) and kobuki-base/kobuki_core.
 """
 
@@ -18,7 +18,7 @@ INERTIAL = struct.Struct("<hhxxx")
 SHORTEST, LONGEST = 3, 250  # of a payload [bytes]
 
 WHEEL_RADIUS = 0.035  # [m]
-COUNT = 0.002436916871363930 # angle of a wheel between two counts [rad]
+COUNT = 0.002436916871363930  # angle of a wheel between two counts [rad]
 TRACK = 0.23  # [m]
 WRAP_MS = 1 << 16  # its clock counts milliseconds in 16 bits
 
@@ -72,8 +72,8 @@ def checksum(body: bytes) -> int:
 def base_control(speed: float, turn_rate: float) -> bytes:
     """The packet that makes the base drive.
 
-    The base takes the speed of the outer wheel in mm/s and the radius of the arc in mm: 0 stands for a straight line, 1 for
-    turning on the spot.
+    The base takes the speed of the outer wheel in mm/s and the radius of the arc in mm: 0 stands for a straight line,
+    1 for turning on the spot.
 
     Args:
         speed: Ahead [m/s].

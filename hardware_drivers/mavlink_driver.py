@@ -117,7 +117,9 @@ class MavlinkDriver:
             kind = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
             self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
         manual = 0  # of ArduPilot's rover and boat modes
-        self._command(mavlink.MAV_CMD_DO_SET_MODE, float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(manual))
+        self._command(
+            mavlink.MAV_CMD_DO_SET_MODE, float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(manual)
+        )
         self._drive(0.0, 0.0)
         self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 

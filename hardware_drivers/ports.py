@@ -119,7 +119,9 @@ def _maker(address: str, baud: int) -> Callable[[], Port]:
         return lambda: SerialPort(address, baud)
     host, _, number = address.removeprefix("tcp://").rpartition(":")
     if not host or not number.isdecimal() or not 0 < int(number) < 65536:
-        raise ConfigError(f"port = '{address}' must be a serial port such as /dev/ttyUSB0, or tcp://host:port.")
+        raise ConfigError(
+            f"port = '{address}' must be a serial port such as /dev/ttyUSB0, or tcp://host:port."
+        )
     return lambda: TcpPort(host, int(number))
 
 
@@ -143,7 +145,11 @@ class Reader:
         while not self._over.is_set():
             try:
                 data = self._port.read()
-            except (OSError, TypeError, AttributeError) as error:  # pyserial's own ways to say that it was closed
+            except (
+                OSError,
+                TypeError,
+                AttributeError,
+            ) as error:  # pyserial's own ways to say that it was closed
                 if not self._over.is_set():
                     self._on_end(f"the connection is gone ({error})")
                 return

@@ -19,7 +19,9 @@ class Bearing:
     line: str  # name of its GPIO line, or its number
     on_at_start: bool = True  # when the driver starts; else the service `air_bearing/enable` does it
     linger_s: float = 1.0  # it carries the platform so long after the last valve has closed for good [s]
-    idle_off_s: float = 0.0  # it is switched off after so long without an open valve, to save air; 0: never [s]
+    idle_off_s: float = (
+        0.0  # it is switched off after so long without an open valve, to save air; 0: never [s]
+    )
 
     def __post_init__(self) -> None:
         """Refuse times without meaning."""
@@ -153,9 +155,7 @@ class MavlinkBoat:
             raise ValueError("trim_us ± span_us must lie within 800 and 2200 µs.")
 
 
-Driver = (
-    GpioValves | ValveTopic | Kobuki | VelocityTopic | KingfisherNmea | MavlinkBoat | ThrustTopic
-)
+Driver = GpioValves | ValveTopic | Kobuki | VelocityTopic | KingfisherNmea | MavlinkBoat | ThrustTopic
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
 MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device knows where it is
 FITS = {
@@ -220,7 +220,9 @@ def hardware_of(robot: str) -> list[str]:
         ConfigError: A mistake in one of the files.
     """
     mine = [name for name in config_names("hardware") if load_hardware(name).robot == robot]
-    return sorted(mine, key=lambda name: (isinstance(load_hardware(name).driver, TOPIC_DRIVERS), name != robot, name))
+    return sorted(
+        mine, key=lambda name: (isinstance(load_hardware(name).driver, TOPIC_DRIVERS), name != robot, name)
+    )
 
 
 def _count_problem(driver: Driver, actuators: Actuators) -> str:

@@ -21,9 +21,9 @@ STATES = {False: Value.INACTIVE, True: Value.ACTIVE}
 class ThrusterDriver:
     """Opens and closes valves by GPIO; knows nothing of where the platform is.
 
-    The bearing is a line like the others, but no command of thrust reaches it: it is switched by its service, by the start
-    and the end of the driver, and by a long idle time. While it is off, the valves stay closed: a platform that stands on
-    the floor would only waste its air.
+    The bearing is a line like the others, but no command of thrust reaches it: it is switched by its service, by the
+    start and the end of the driver, and by a long idle time. While it is off, the valves stay closed: a platform that
+    stands on the floor would only waste its air.
     """
 
     def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
@@ -107,7 +107,9 @@ class ThrusterDriver:
         """Bring every valve into its state; call with the lock held."""
         if self._lines is not None:
             wired = valves[self._order] > 0.5
-            self._lines.set_values({line: STATES[bool(on)] for line, on in zip(self._valves, wired, strict=True)})
+            self._lines.set_values(
+                {line: STATES[bool(on)] for line, on in zip(self._valves, wired, strict=True)}
+            )
 
     def _switch(self, on: bool) -> None:
         """Switch the bearing; call with the lock held."""

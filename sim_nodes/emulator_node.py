@@ -152,7 +152,9 @@ def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettin
 
         return ArdupilotEmulator(_number(settings.link, "udp"))
     link: Link = (
-        TcpLink(_number(settings.link, "tcp")) if settings.link.startswith("tcp:") else PtyLink(Path(settings.link))
+        TcpLink(_number(settings.link, "tcp"))
+        if settings.link.startswith("tcp:")
+        else PtyLink(Path(settings.link))
     )
     if settings.device == "kingfisher":
         return KingfisherEmulator(link)

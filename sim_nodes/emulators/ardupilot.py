@@ -62,7 +62,9 @@ class ArdupilotEmulator:
             self._beaten_s = now_s
             armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self._armed else 0
             mode = armed | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-            mav.heartbeat_send(mavlink.MAV_TYPE_SURFACE_BOAT, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mode, self._mode, 4)
+            mav.heartbeat_send(
+                mavlink.MAV_TYPE_SURFACE_BOAT, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mode, self._mode, 4
+            )
             mav.sys_status_send(0, 0, 0, 100, 15800, -1, 80, 0, 0, 0, 0, 0, 0)
         self._send_what_is_due(sample, now_s, round(1e3 * (now_s - self._began_s)))
 

@@ -28,7 +28,9 @@ def episode_at(robot: Robot, x: float, y: float, heading: float) -> Episode:
 class Bench:
     """Steps device and physics in real time, in a thread of its own."""
 
-    def __init__(self, robot: str, make: Callable[[MockBackend], EmulatedDevice], *, start=(0.0, 0.0, 0.0)) -> None:
+    def __init__(
+        self, robot: str, make: Callable[[MockBackend], EmulatedDevice], *, start=(0.0, 0.0, 0.0)
+    ) -> None:
         self.robot = load_robot(robot)
         self.backend = MockBackend(self.robot)
         self.sample = self.backend.reset(episode_at(self.robot, *start), seed=1)

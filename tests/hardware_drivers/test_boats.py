@@ -76,7 +76,9 @@ def drive(driver, command, seconds):
 
 
 def test_the_propellers_turn_as_commanded_each_on_its_side(bench, driver):
-    until(lambda: driver.step(np.array([0.8, -0.4])) and bench.command == pytest.approx([0.8, -0.4], abs=0.003))
+    until(
+        lambda: driver.step(np.array([0.8, -0.4])) and bench.command == pytest.approx([0.8, -0.4], abs=0.003)
+    )
 
 
 def test_odometry_follows_the_boat_in_ros_frames(bench, driver):
@@ -125,7 +127,9 @@ def test_an_autopilot_without_its_host_holds_by_its_own_failsafe(bench, driver):
 def test_nobody_at_the_other_end_is_refused_with_a_hint(unused_udp_port):
     robot = load_robot("kingfisher")
     with pytest.raises(DeviceError, match="no heartbeat"):
-        MavlinkDriver(robot, MavlinkBoat("mavlink_boat", f"udpin:127.0.0.1:{unused_udp_port}", THRUST), patience_s=0.2)
+        MavlinkDriver(
+            robot, MavlinkBoat("mavlink_boat", f"udpin:127.0.0.1:{unused_udp_port}", THRUST), patience_s=0.2
+        )
 
 
 def test_an_address_that_is_none_is_refused():
@@ -162,3 +166,25 @@ def test_north_east_down_becomes_east_north_up():
 @pytest.mark.parametrize("spoilt", [{"x": float("nan")}, {"vy": float("inf")}, {"time_boot_ms": 5000}])
 def test_an_estimate_that_is_not_finite_or_not_of_one_time_is_none(spoilt):
     assert state_of(Said(**spoilt), Said(), np.zeros(3)) is None
+
+
+@pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
+def test_noise_beside_the_autopilot_changes_nothing(bench, driver):
+    """Random datagrams, and cut and spoilt ones of the autopilot's own, from another sender."""
+    import socket
+
+    rng = np.random.default_rng(1)
+    host, _, number = bench.device.address.removeprefix("udpin:").partition(":")
+    packet = bytes(
+        bench.device._link.mav.attitude_encode(1, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0).pack(bench.device._link.mav)
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+        for _ in range(300):
+            spoilt = bytearray(packet[: rng.integers(1, len(packet))])
+            spoilt[rng.integers(len(spoilt))] ^= int(rng.integers(1, 256))
+            for data in (rng.bytes(int(rng.integers(1, 280))), bytes(spoilt)):
+                noise.sendto(data, (host, int(number)))
+    sample = drive(driver, (0.0, 0.0), 0.5)
+    place = sample.odometry.position_in_world[:2]
+    assert place == pytest.approx(START[:2], abs=0.05)
+    assert not bench.command.any()

@@ -35,9 +35,7 @@ class RollingWheels:
 @pytest.fixture
 def bench(tmp_path):
     link = PtyLink(tmp_path / "serial")
-    bench = Bench(
-        "turtlebot2", lambda backend: KobukiEmulator(link, RollingWheels(backend)), start=START
-    )
+    bench = Bench("turtlebot2", lambda backend: KobukiEmulator(link, RollingWheels(backend)), start=START)
     yield bench
     bench.stop()
 
@@ -113,13 +111,13 @@ def test_a_base_that_falls_silent_is_an_error_not_old_odometry(bench, driver):
 
 def test_a_port_where_nobody_speaks_is_refused_with_a_hint(tmp_path):
     link = PtyLink(tmp_path / "serial")
-    with pytest.raises(DeviceError, match="said nothing that can be read.*Is it switched on"):
+    with pytest.raises(DeviceError, match=r"said nothing that can be read.*Is it switched on"):
         KobukiDriver(_robot(), Kobuki("kobuki", link.address), patience_s=0.3)
     link.close()
 
 
 def test_a_port_that_does_not_exist_is_refused_with_a_hint(tmp_path):
-    with pytest.raises(DeviceError, match="cannot be opened.*Is the device connected"):
+    with pytest.raises(DeviceError, match=r"cannot be opened.*Is the device connected"):
         KobukiDriver(_robot(), Kobuki("kobuki", str(tmp_path / "none")), patience_s=0.0)
 
 

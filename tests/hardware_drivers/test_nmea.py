@@ -84,7 +84,10 @@ def test_a_spoilt_character_never_makes_another_fix(place, change):
         assert not isinstance(read(fields), Fix)
 
 
-@given(st.lists(st.text(max_size=12), min_size=1, max_size=15), st.sampled_from(["CPNVG", "CPNVR", "CPIMU", "CPRBS"]))
+@given(
+    st.lists(st.text(max_size=12), min_size=1, max_size=15),
+    st.sampled_from(["CPNVG", "CPNVR", "CPIMU", "CPRBS"]),
+)
 def test_any_fields_are_survived_and_what_is_read_is_finite(fields, name):
     message = read([name, *fields])
     if isinstance(message, Fix):

@@ -87,7 +87,7 @@ def test_closing_closes_everything_once_and_for_all(rig):
 
 
 def test_a_bearing_that_nobody_needs_is_switched_off(rig, monkeypatch):
-    bank, settings = rig
+    _bank, settings = rig
     now = [0]
     monkeypatch.setattr("hardware_drivers.thruster_driver.time.monotonic_ns", lambda: now[0])
     driver = started(replace(settings, bearing=replace(settings.bearing, idle_off_s=60.0)))

@@ -170,7 +170,9 @@ def test_the_bearing_has_a_service_and_a_state_of_its_own(rig: Rig) -> None:
         ("kingfisher", "go_to_position", "kingfisher_ardupilot"),
     ],
 )
-def test_a_run_reaches_its_goal_through_the_protocol(robot, task, hardware, ros_domain: RosDomain, tmp_path) -> None:
+def test_a_run_reaches_its_goal_through_the_protocol(
+    robot, task, hardware, ros_domain: RosDomain, tmp_path
+) -> None:
     """Driver, protocol, controller and recorder as on the robot; judged by where the emulated robot really is."""
     asked = ("run", robot, "--task", task, "--backend", "hardware", "--hardware", hardware, "--emulate")
     more = ("--seed", "2", "--record", "bag", "--json")
@@ -225,8 +227,10 @@ def test_our_commands_reach_a_base_that_takes_plain_twists(neighbour, heard) -> 
     node, spin = running(DriverNode, "turtlebot2", "robot:=turtlebot2", "hardware:=turtlebot2_kobuki_node")
     with spin:
         until(
-            lambda: neighbour.drive.publish(neighbour.twist(0.3, -0.4))
-            or (bool(messages) and messages[-1].linear.x > 0.0)
+            lambda: (
+                neighbour.drive.publish(neighbour.twist(0.3, -0.4))
+                or (bool(messages) and messages[-1].linear.x > 0.0)
+            )
         )
         assert (messages[-1].linear.x, messages[-1].angular.z) == (0.3, -0.4)
         until(lambda: messages[-1].linear.x == 0.0)
@@ -253,7 +257,7 @@ def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> N
     ],
 )
 def test_the_lab_s_controllers_command_our_valves_through_the_adapter(neighbour, data, commanded) -> None:
-    node, spin = running(AdapterNode, "floating_platform", "hardware:=zero_g_lab_valve_node")
+    _node, spin = running(AdapterNode, "floating_platform", "hardware:=zero_g_lab_valve_node")
     publisher = neighbour.node.create_publisher(Int16MultiArray, "/spacer_floating_platform/valves/input", 1)
     good = Int16MultiArray(data=[1] + [0] * 8)
     with spin:
@@ -268,9 +272,11 @@ def test_the_lab_s_controllers_command_our_valves_through_the_adapter(neighbour,
 
 
 @pytest.mark.parametrize("neighbour", ["kingfisher"], indirect=True)
-@pytest.mark.parametrize(("data", "taken"), [([0.5, -0.25], True), ([0.5], False), ([float("nan"), 0.0], False)])
+@pytest.mark.parametrize(
+    ("data", "taken"), [([0.5, -0.25], True), ([0.5], False), ([float("nan"), 0.0], False)]
+)
 def test_roboran_s_boats_command_ours_through_the_adapter(neighbour, data, taken) -> None:
-    node, spin = running(AdapterNode, "kingfisher", "hardware:=kingfisher_action")
+    _node, spin = running(AdapterNode, "kingfisher", "hardware:=kingfisher_action")
     publisher = neighbour.node.create_publisher(Float32MultiArray, "/action", 1)
     with spin:
         until(lambda: publisher.publish(Float32MultiArray(data=[0.0, 0.0])) or bool(neighbour.commands))

@@ -99,7 +99,9 @@ def _run(request: RunRequest) -> tuple[str, int]:
         group.start(recorder_spec(plan, **_recording(request)))
         port = ""
         if plan.emulated:
-            emulation = emulation_of(load_hardware(plan.hardware), Path(folders.enter_context(_wires_folder())))
+            emulation = emulation_of(
+                load_hardware(plan.hardware), Path(folders.enter_context(_wires_folder()))
+            )
             group.start(emulator_spec(plan, emulation))
             port = emulation.port
         group.start(plant_spec(plan, subscribers=_listeners(plan), port=port))

@@ -152,7 +152,9 @@ def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: b
             raise ConfigError(f"--hardware and --emulate go with --backend hardware, not with {backend}.")
         return ""
     if hurried:
-        raise ConfigError("a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate.")
+        raise ConfigError(
+            "a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate."
+        )
     path = default_hardware(robot, asked)
     if emulate:
         check_emulation(load_hardware(path))

@@ -42,7 +42,13 @@ class PlantWires:
     """Publishers, the command subscription, and the times between them."""
 
     def __init__(
-        self, node: LifecycleNode, robot: Robot, guard: ActuatorGuard, *, simulated: bool, odometry: bool = True
+        self,
+        node: LifecycleNode,
+        robot: Robot,
+        guard: ActuatorGuard,
+        *,
+        simulated: bool,
+        odometry: bool = True,
     ) -> None:
         """Create every endpoint.
 

@@ -1,7 +1,7 @@
 """Closed loops through emulated devices: driver, protocol, controller, recorder and safety, in real time.
 
-Each episode is the very command that a person types, `fulmar run --backend hardware --emulate`, in a ROS domain of its own. A
-real protocol has no faster clock, so that many systems run beside each other instead.
+Each episode is the very command that a person types, `fulmar run --backend hardware --emulate`, in a ROS domain of its
+own. A real protocol has no faster clock, so that many systems run beside each other instead.
 """
 
 from __future__ import annotations

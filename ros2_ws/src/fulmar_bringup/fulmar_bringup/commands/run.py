@@ -128,7 +128,9 @@ def run(
         hardware=hardware,
         emulate=emulate,
     )
-    require(*modules_of(controller, backend, emulated=emulate))  # the nodes would fail for want of them one by one
+    require(
+        *modules_of(controller, backend, emulated=emulate)
+    )  # the nodes would fail for want of them one by one
     outcome = conduct(request)
     if as_json:
         print_json(outcome.summary)
