@@ -122,12 +122,13 @@ class KobukiDriver:
         begin, stamp_ns = self._begin, self._time.stamp_ns(core.time_ms, now_ns)
         if begin is not None:
             self._odometry.begin(*begin)
-            self._begin = None
         rate = math.radians(inertia.rate)
         gyro = math.radians(inertia.angle)
         state = self._odometry.see(core.left, core.right, gyro, rate, stamp_ns / 1e9)
         imu = ImuSample(ABSENT, np.array([0.0, 0.0, rate]))
         self._feedback.put(Report(state, imu, stamp_ns))
+        if begin is not None:
+            self._begin = None  # only now: who waits for it shall find the new place
 
 
 def _touched(core: CoreSensors) -> str:

@@ -40,7 +40,7 @@ class MavlinkDriver:
     """
 
     def __init__(self, robot: Robot, settings: MavlinkBoat, *, patience_s: float) -> None:
-        """Open the link, wait for the autopilot, ask for what is needed, and arm.
+        """Open the link, wait for the autopilot, and ask for what is needed.
 
         Raises:
             DeviceError: Nobody answers.
@@ -78,9 +78,11 @@ class MavlinkDriver:
             raise
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Take the place of the episode for where the boat is; see `Backend.reset`."""
+        """Take the place of the episode for where the boat is, and arm; see `Backend.reset`."""
         here = self._feedback.newest.odometry.position_in_world - self._shift
         self._shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
+        self._drive(0.0, 0.0)
+        self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         return self.step(self.robot.actuators.safe_command)
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
@@ -120,8 +122,6 @@ class MavlinkDriver:
         self._command(
             mavlink.MAV_CMD_DO_SET_MODE, float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(manual)
         )
-        self._drive(0.0, 0.0)
-        self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def _command(self, number: int, first: float, second: float = 0.0) -> None:
         link = self._link
