@@ -1,8 +1,8 @@
 """Sentences of the Kingfisher's front seat, the host's side.
 
-Clearpath's boats of this family (Kingfisher, Heron, M200) take `$PYDIR,left,right` in percent, and report where they are
-(`$CPNVG`), velocities (`$CPNVR`) and the inertial unit (`$CPIMU`). No specification is public; the fields are those that
-the open iM200 application of MOOS-IvP reads, and its recording of a real boat is a test of ours.
+Clearpath's boats of this family (Kingfisher, Heron, M200) take `$PYDIR,left,right` in percent, and report place and
+attitude (`$CPNVG`), velocities (`$CPNVR`) and the inertial unit (`$CPIMU`). No specification is public; the fields are
+those that the open iM200 application of MOOS-IvP reads, and its recording of a real boat is a test of ours.
 """
 
 from __future__ import annotations

@@ -156,6 +156,12 @@ class MavlinkBoat:
 
 
 Driver = GpioValves | ValveTopic | Kobuki | VelocityTopic | KingfisherNmea | MavlinkBoat | ThrustTopic
+NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
+    GpioValves: ("gpiod",),
+    Kobuki: ("serial",),
+    KingfisherNmea: ("serial",),
+    MavlinkBoat: ("pymavlink",),
+}
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
 MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device knows where it is
 FITS = {
@@ -172,6 +178,11 @@ class Hardware:
     title: str
     robot: str
     driver: Driver
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Modules that its driver imports, which not every machine has."""
+        return NEEDS.get(type(self.driver), ())
 
     @property
     def measures_odometry(self) -> bool:

@@ -115,10 +115,12 @@ def load_system(name: str) -> System:
     return system
 
 
-def modules_of(controller: str, backend: str, *, emulated: bool = False) -> tuple[str, ...]:
-    """Modules of extras that the nodes of a controller and a backend import."""
+def modules_of(
+    controller: str, backend: str, *, hardware: str = "", emulated: bool = False
+) -> tuple[str, ...]:
+    """Modules of extras that the nodes of a controller, a backend and a hardware file import."""
     simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
-    driven = ("serial", "gpiod", "pymavlink") if backend == "hardware" else ()
+    driven = load_hardware(hardware).needs if hardware else ()
     return (*CONTROLLERS[controller].needs, *simulated, *driven)
 
 

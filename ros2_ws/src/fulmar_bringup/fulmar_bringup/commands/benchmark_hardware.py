@@ -9,7 +9,7 @@ from rich.table import Table
 
 from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
-from fulmar_bringup.progress import step_bar
+from fulmar_bringup.progress import work_bar
 from fulmar_core.exit_codes import FAILED
 
 
@@ -39,9 +39,11 @@ def hardware(
     from fulmar_bringup.system import modules_of
 
     cases = cases_of([name.strip() for name in robots.split(",")] if robots else None)
-    require(*modules_of("policy", "hardware", emulated=True))
-    with step_bar("driving", len(cases) * episodes) as progress:
-        found = measure(cases, episodes=episodes, jobs=jobs, progress=progress)
+    for case in cases:
+        require(*modules_of("policy", "hardware", hardware=case.hardware, emulated=True))
+    total = len(cases) * episodes
+    with work_bar("driving") as moved:
+        found = measure(cases, episodes=episodes, jobs=jobs, progress=lambda done: moved(done, total))
     if as_json:
         print_json({"cases": found, "jobs": jobs, "passed": all(case["passed"] for case in found)})
     else:

@@ -129,7 +129,7 @@ def run(
         emulate=emulate,
     )
     require(
-        *modules_of(controller, backend, emulated=emulate)
+        *modules_of(controller, backend, hardware=request.plan.hardware, emulated=emulate)
     )  # the nodes would fail for want of them one by one
     outcome = conduct(request)
     if as_json:
