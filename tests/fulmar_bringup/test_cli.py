@@ -288,7 +288,7 @@ def test_the_list_is_one_json_object(fulmar):
     code, out, err = fulmar("list", "--json")
     assert (code, err) == (0, "")
     found = json.loads(out)
-    assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals"]
+    assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals", "hardware"]
     assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical"]
     tasks = json.loads(fulmar("list", "tasks", "--json")[1])["tasks"]
     assert {"go_to_pose", "go_to_position", "go_through_positions", "track_velocities"} <= set(tasks)
