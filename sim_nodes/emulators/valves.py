@@ -24,7 +24,9 @@ class ValveBank:
         """
         self._path, self._order, self._open_level = path, np.array(order), int(not active_low)
         self._count = len(robot.actuators.names)
-        path.write_bytes(bytes([1 - self._open_level]) * (self._count + 1))
+        half_made = path.with_suffix(".new")
+        half_made.write_bytes(bytes([1 - self._open_level]) * (self._count + 1))
+        half_made.rename(path)  # a driver that waits for it finds all of its pins
         self._file = path.open("rb", buffering=0)
         self.address = f"file://{path}"
 
