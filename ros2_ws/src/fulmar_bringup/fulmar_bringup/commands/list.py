@@ -17,7 +17,9 @@ FAMILIES = ("robots", "tasks", "controllers", "systems", "policies", "goals", "h
 def list_names(
     family: Annotated[
         str | None,
-        typer.Argument(metavar="[robots|tasks|controllers|systems|policies|goals|hardware]", help="All by default."),
+        typer.Argument(
+            metavar="[robots|tasks|controllers|systems|policies|goals|hardware]", help="All by default."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
