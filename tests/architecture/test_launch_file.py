@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-ARGUMENTS = {"system", "robot", "task", "controller", "backend", "policy", "goals"}
+ARGUMENTS = {"system", "robot", "task", "controller", "backend", "hardware", "policy", "goals"}
 
 
 class Built:

@@ -78,7 +78,19 @@ RUN = ["run", "floating_platform"]
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         ([*RUN, "--controller", "pid"], "unknown controller 'pid'. Known: classical, lqr, lqr_drift, mpc, policy."),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
-        ([*RUN, "--backend", "hardware"], "there is no hardware driver for 'floating_platform'"),
+        (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
+        ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
+        ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device neither waits nor hurries"),
+        ([*RUN, "--emulate"], "--hardware and --emulate go with --backend hardware, not with mujoco."),
+        (
+            [*RUN, "--backend", "hardware", "--hardware", "zero_g_lap"],
+            "unknown hardware 'zero_g_lap'. Did you mean 'zero_g_lab'?",
+        ),
+        ([*RUN, "--backend", "hardware", "--hardware", "turtlebot2"], "is the hardware of 'turtlebot2'"),
+        (
+            [*RUN, "--backend", "hardware", "--hardware", "zero_g_lab_valve_node", "--emulate"],
+            "there is no emulator for driver 'valve_topic'",
+        ),
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),
         ([*RUN, "--goal", "1,2"], "--goal = '1,2' must be three finite numbers"),
         ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),
@@ -276,7 +288,7 @@ def test_the_list_is_one_json_object(fulmar):
     code, out, err = fulmar("list", "--json")
     assert (code, err) == (0, "")
     found = json.loads(out)
-    assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals"]
+    assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals", "hardware"]
     assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical"]
     tasks = json.loads(fulmar("list", "tasks", "--json")[1])["tasks"]
     assert {"go_to_pose", "go_to_position", "go_through_positions", "track_velocities"} <= set(tasks)

@@ -82,8 +82,17 @@ def test_an_unknown_name_gets_the_nearest_one(choice, words):
 
 
 def test_hardware_without_a_driver_is_refused():
-    with pytest.raises(ConfigError, match="there is no hardware driver for 'floating_platform'"):
-        list_nodes(backend="hardware")
+    with pytest.raises(ConfigError, match="there is no hardware driver for 'jetbot'"):
+        list_nodes(robot="jetbot", controller="classical", backend="hardware")
+
+
+def test_on_hardware_the_driver_stands_where_the_simulator_stood():
+    nodes = by_name(list_nodes(backend="hardware"))
+    assert list(nodes) == list(by_name(list_nodes()))
+    assert nodes["plant"].module == "hardware_drivers.driver_node"
+    assert nodes["plant"].parameters["hardware"].endswith("zero_g_lab.yaml")
+    other = by_name(list_nodes(backend="hardware", hardware="zero_g_lab_valve_node"))
+    assert other["plant"].parameters["hardware"].endswith("zero_g_lab_valve_node.yaml")
 
 
 def test_the_plant_starts_by_itself_unless_somebody_supervises_it():

@@ -98,7 +98,7 @@ def test_an_unknown_name_gets_the_nearest_one(plan, change, words):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"backend": "hardware"}, "there is no hardware driver for 'floating_platform'"),
+        ({"backend": "hardware"}, "a real robot goes nowhere by chance"),
         ({"goal": (NAN, 0.0, 0.0)}, "goal = (nan, 0.0, 0.0) must be finite"),
         ({"start": (0.0, 0.0, NAN)}, "start = (0.0, 0.0, nan) must be finite"),
         ({"duration_s": NAN}, "duration = nan must be finite"),
@@ -163,3 +163,15 @@ def test_commands_rarer_than_the_watchdog_allows_are_refused_in_real_time_alone(
 @pytest.mark.parametrize(("control_hz", "rate"), [(2.5, 1.0), (5.0, 0.1), (1.0, 3.0)])
 def test_commands_that_the_watchdog_allows_are_planned(plan, control_hz, rate):
     assert plan(control_hz=control_hz, rate=rate).plan.rate == rate
+
+
+def test_a_real_robot_begins_where_it_stands(plan):
+    request = plan(backend="hardware", goal=(2.0, 1.0, 90.0))
+    assert request.plan.start == (0.0, 0.0, 0.0)
+    assert request.plan.hardware.endswith("configs/hardware/zero_g_lab.yaml")
+    assert Path(request.plan.hardware).is_absolute()
+    assert not request.plan.emulated
+
+
+def test_an_emulated_one_begins_where_the_seed_says(plan):
+    assert plan(backend="hardware", emulate=True).plan.start == plan().plan.start

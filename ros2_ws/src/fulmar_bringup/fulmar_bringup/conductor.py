@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -14,8 +16,16 @@ import numpy as np
 
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
+from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.goal_plan import is_endless, shown_path
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec, run_goals_spec
+from fulmar_bringup.node_table import (
+    RunPlan,
+    controller_spec,
+    emulator_spec,
+    plant_spec,
+    recorder_spec,
+    run_goals_spec,
+)
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
@@ -26,8 +36,10 @@ from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, super
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.paths import config_path
+from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
+from hardware_drivers.settings import load_hardware
 
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
@@ -82,9 +94,17 @@ def _run(request: RunRequest) -> tuple[str, int]:
     plan = replace(request.plan, supervised=True)
     group = ProcessGroup()
     failure, plant, ends = "", Report(), list[Ended]()
+    folders = contextlib.ExitStack()
     try:
         group.start(recorder_spec(plan, **_recording(request)))
-        group.start(plant_spec(plan, subscribers=3 if plan.goals else 2))  # controller, recorder, goals
+        port = ""
+        if plan.emulated:
+            emulation = emulation_of(
+                load_hardware(plan.hardware), Path(folders.enter_context(_wires_folder()))
+            )
+            group.start(emulator_spec(plan, emulation))
+            port = emulation.port
+        group.start(plant_spec(plan, subscribers=_listeners(plan), port=port))
         group.start(controller_spec(plan, subscribers=2))  # plant and recorder
         if plan.goals:
             group.start(run_goals_spec(plan))
@@ -98,7 +118,20 @@ def _run(request: RunRequest) -> tuple[str, int]:
         failure = str(stop) or "stopped by the user"
     finally:
         ends += group.stop_all()
+        folders.close()
     return _with_ends(failure, ends), int(plant.values.get("steps", 0))
+
+
+def _wires_folder() -> tempfile.TemporaryDirectory[str]:
+    """A folder for the wires of an emulator that are files."""
+    return tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
+
+
+def _listeners(plan: RunPlan) -> int:
+    """Subscriptions that a plant waits for: of its odometry, or of its actuators' state where it measures nothing."""
+    if plan.hardware and not load_hardware(plan.hardware).measures_odometry:
+        return 1  # the recorder
+    return 3 if plan.goals else 2  # controller, recorder, goals
 
 
 def _with_ends(failure: str, ends: list[Ended]) -> str:
@@ -127,7 +160,8 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
         if plan.goals:
             overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
         else:
-            overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=starting)
+            now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
+            overseer.give_goal(request.mission, time_ns=now_ns, alive=starting)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)
@@ -146,9 +180,7 @@ def _wait_for_end(
 
     def running() -> None:
         _raise_if_ended(group)
-        moved(
-            max(0.0, float(overseer.plant.values.get("sim_time_s", 0.0) or 0.0) - SIMULATION_START_NS / 1e9)
-        )
+        moved(_passed_s(plan, overseer.plant))
         if overseer.plant.level == "error":
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":
@@ -163,6 +195,13 @@ def _wait_for_end(
 
     overseer.wait_until(finished, running)
     running()
+
+
+def _passed_s(plan: RunPlan, plant: Report) -> float:
+    """How much of a run is over [s]."""
+    if plan.hardware:
+        return float(plant.values.get("ticks") or 0.0) * load_robot(plan.robot).timing.physics_dt
+    return max(0.0, float(plant.values.get("sim_time_s") or 0.0) - SIMULATION_START_NS / 1e9)
 
 
 def _silence_limits_s(plan: RunPlan) -> tuple[float, float]:
@@ -204,6 +243,7 @@ def _recording(request: RunRequest) -> dict[str, str]:
     }
     files = {
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
+        **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
         "robot.yaml": config_path("robots", plan.robot),
         "task.yaml": config_path("tasks", plan.task),
         "scenario.yaml": config_path("scenarios", plan.scenario),

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
-from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, load_system
+from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, default_hardware, load_system
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
-Parameter = bool | int | float | str | list[float]
+Parameter = bool | int | float | str | list[float] | list[int]
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class RunPlan:
     rate: float = 1.0  # simulated seconds a wall-clock second
     goals: str = ""  # goal file that a node of its own tells; empty: somebody else gives the goal
     supervised: bool = False  # somebody else activates the plant when all are ready
+    hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
+    emulated: bool = False  # an emulator stands in for the device
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
@@ -72,12 +75,13 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
     )
 
 
-def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
-    """The node that simulates.
+def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSpec:
+    """The node that simulates, or that drives a device.
 
     Args:
         plan: What to run.
         subscribers: Subscriptions of the odometry to wait for before the first step.
+        port: Where the device is, in the place of what the hardware file says.
     """
     parameters: dict[str, Parameter] = {
         "robot": plan.robot,
@@ -93,7 +97,36 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "wait_for_subscribers": subscribers,
         "autostart": not plan.supervised,
     }
+    if plan.backend == "hardware":
+        parameters["hardware"] = plan.hardware
+        if port:
+            parameters["port"] = port
+        return NodeSpec(
+            "plant",
+            "hardware_drivers",
+            "driver_node",
+            "hardware_drivers.driver_node",
+            f"/{plan.robot}",
+            parameters,
+        )
     return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", f"/{plan.robot}", parameters)
+
+
+def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
+    """The node that stands in for a device."""
+    parameters: dict[str, Parameter] = {
+        "robot": plan.robot,
+        "task": plan.task,
+        "scenario": plan.scenario,
+        "seed": plan.seed,
+        "start": list(plan.start),
+        "device": emulation.device,
+        "link": emulation.link,
+        **emulation.more,
+    }
+    return NodeSpec(
+        "emulator", "sim_nodes", "emulator_node", "sim_nodes.emulator_node", f"/{plan.robot}", parameters
+    )
 
 
 def recorder_spec(
@@ -150,6 +183,7 @@ def list_nodes(
     backend: str | None = None,
     policy: str | None = None,
     goals: str | None = None,
+    hardware: str | None = None,
 ) -> tuple[NodeSpec, ...]:
     """Nodes of a system, each of its choices replaced by what is given.
 
@@ -161,6 +195,7 @@ def list_nodes(
         backend: Another backend.
         policy: Folder of a bundle; the shipped one by default.
         goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it somebody else gives goals.
+        hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
 
     Returns:
         Recorder, plant, controller and, with `goals`, the node that tells them.
@@ -175,6 +210,8 @@ def list_nodes(
     hz = base.control_hz if as_written else default_control_hz(*chosen)
     load_robot(chosen[0]).timing.substeps(hz)
     plan = RunPlan(*chosen, control_hz=hz, policy=policy or "")
+    if plan.backend == "hardware":
+        plan = replace(plan, hardware=default_hardware(plan.robot, hardware))
     nodes = recorder_spec(plan), plant_spec(plan), controller_spec(plan)
     if not goals:
         return nodes

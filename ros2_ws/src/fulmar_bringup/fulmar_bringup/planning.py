@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fulmar_bringup.emulation import check_emulation
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.system import check_names, default_control_hz
+from fulmar_bringup.system import check_names, default_control_hz, default_hardware
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError
@@ -22,6 +23,7 @@ from fulmar_core.policy_bundle import check_fit, read_passport
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
+from hardware_drivers.settings import load_hardware
 from policy_server.shipped import shipped_policy
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
@@ -57,6 +59,8 @@ def plan_run(
     record: Path,
     command: str,
     goals: str | None = None,
+    hardware: str | None = None,
+    emulate: bool = False,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -78,6 +82,8 @@ def plan_run(
         record: Folder of the bag; must not exist.
         command: Command line.
         goals: Goal file, a name or a path that ends in `.yaml`; its goals come one after another.
+        hardware: Hardware file, a name or a path that ends in `.yaml`; the robot's own by default.
+        emulate: Whether an emulator stands in for the device.
 
     Returns:
         The request.
@@ -87,6 +93,7 @@ def plan_run(
         BundleError: The policy is damaged or made for something else.
     """
     check_names(robot, task, controller, backend)
+    hardware = _checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)
     _check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
     the_robot, the_task = load_robot(robot), load_task(task)
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
@@ -99,6 +106,10 @@ def plan_run(
         )
     episode = draw_episode(the_robot, the_task, load_scenario(scenario), seed=seed, number=0)
     mission, drawn_start = episode.goal, _pose_of_state(episode.start)
+    if hardware and not emulate:
+        start = start or (0.0, 0.0, 0.0)  # where a robot stands is where its odometry begins
+        if goal is None and goals is None:
+            raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None:
         if goal is not None:
             raise ConfigError("--goals brings its own goals; it takes no --goal.")
@@ -123,9 +134,31 @@ def plan_run(
         lockstep=lockstep,
         rate=rate,
         goals=str(goal_path(goals)) if goals else "",
+        hardware=hardware,
+        emulated=emulate,
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
+
+
+def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: bool, hurried: bool) -> str:
+    """Path of the hardware file, empty for simulators.
+
+    Raises:
+        ConfigError: The options do not go together, or the file is wrong.
+    """
+    if backend != "hardware":
+        if asked is not None or emulate:
+            raise ConfigError(f"--hardware and --emulate go with --backend hardware, not with {backend}.")
+        return ""
+    if hurried:
+        raise ConfigError(
+            "a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate."
+        )
+    path = default_hardware(robot, asked)
+    if emulate:
+        check_emulation(load_hardware(path))
+    return path
 
 
 def default_task(robot: str) -> str:

@@ -13,6 +13,7 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
+from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
 
 
 def _load_policy(robot: Robot, task: Task, control_hz: float, policy: str) -> Controller:
@@ -84,7 +85,6 @@ CONTROLLERS = {
 }
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")
-DRIVERS: dict[str, str] = {}  # robot and module in hardware_drivers
 
 
 @dataclass(frozen=True)
@@ -115,9 +115,13 @@ def load_system(name: str) -> System:
     return system
 
 
-def modules_of(controller: str, backend: str) -> tuple[str, ...]:
-    """Modules of extras that the nodes of a controller and a backend import."""
-    return (*CONTROLLERS[controller].needs, *(("mujoco",) if backend == "mujoco" else ()))
+def modules_of(
+    controller: str, backend: str, *, hardware: str = "", emulated: bool = False
+) -> tuple[str, ...]:
+    """Modules of extras that the nodes of a controller, a backend and a hardware file import."""
+    simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
+    driven = load_hardware(hardware).needs if hardware else ()
+    return (*CONTROLLERS[controller].needs, *simulated, *driven)
 
 
 def system_of(controller: str, backend: str) -> System | None:
@@ -138,11 +142,32 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
     CONTROLLERS[controller].check(the_robot, the_task)
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
-    if backend == "hardware" and robot not in DRIVERS:
-        known = ", ".join(sorted(DRIVERS)) or "no robot"
+    if backend == "hardware":
+        default_hardware(robot)
+
+
+def default_hardware(robot: str, asked: str | None = None) -> str:
+    """The hardware file to use, as a path.
+
+    Args:
+        robot: The robot.
+        asked: A name of `configs/hardware`, or a path that ends in `.yaml`; by default the robot's own file.
+
+    Raises:
+        ConfigError: There is none, it has a mistake, or it is of another robot.
+    """
+    if asked is not None:
+        found = load_hardware(asked).robot
+        if found != robot:
+            raise ConfigError(f"{asked} is the hardware of '{found}', and the robot is '{robot}'.")
+        return str(hardware_path(asked).absolute())
+    mine = hardware_of(robot)
+    if not mine:
+        known = ", ".join(sorted({load_hardware(name).robot for name in config_names("hardware")}))
         raise ConfigError(
             f"there is no hardware driver for '{robot}' (there is one for: {known}). Use --backend mujoco or mock."
         )
+    return str(hardware_path(mine[0]).absolute())
 
 
 def default_control_hz(robot: str, task: str, controller: str, backend: str) -> float:

@@ -17,6 +17,7 @@ ARGUMENTS = {
     "task": "a file of configs/tasks, without .yaml",
     "controller": "policy, or a classical controller such as lqr",
     "backend": "mujoco, mock or hardware",
+    "hardware": "a file of configs/hardware, without .yaml, or a path to one",
     "policy": "folder of a policy bundle",
     "goals": "a file of configs/goals, without .yaml, that a node of its own tells",
 }

@@ -12,7 +12,7 @@ from typing import Literal
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 
-Source = Literal["plant", "controller", "operator", "every node"]
+Source = Literal["plant", "controller", "operator", "motion capture", "every node"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
 # Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
@@ -182,6 +182,30 @@ BLOCK = Wire(
     "with each odometry, where there is a block",
     "place of the thing to push, stamped as the odometry",
 )
+AIR_BEARING = Wire(
+    "air_bearing/state",
+    "std_msgs/msg/Bool",
+    "plant",
+    "latched",
+    "on change and at 1 Hz, where there is an air bearing",
+    "whether air flows through the bearing; the service `air_bearing/enable` switches it",
+)
+MOCAP = Wire(
+    "mocap/pose",
+    "geometry_msgs/msg/PoseStamped",
+    "motion capture",
+    "best_effort",
+    "camera rate",
+    "pose seen from outside, Z up, stamped at capture",
+)
+DEVICE_STATE = Wire(
+    "emulator/actuators",
+    "sensor_msgs/msg/JointState",
+    "plant",
+    "stream",
+    "every physics step of an emulated device",
+    "what an emulated device does by itself, whoever is dead; `effort` by actuator name",
+)
 VELOCITY_COMMAND = Wire(
     "cmd_vel",
     "geometry_msgs/msg/TwistStamped",
@@ -211,6 +235,9 @@ WIRES: tuple[Wire, ...] = (
     GOAL_VELOCITY,
     OBSTACLES,
     BLOCK,
+    AIR_BEARING,
+    MOCAP,
+    DEVICE_STATE,
 )
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

@@ -6,6 +6,7 @@ everything else a control step does.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -103,7 +104,7 @@ def measurement_of(message: Odometry) -> Measurement:
 
 
 class ImuWriter:
-    """Inertial readings per REP-145, without an orientation."""
+    """Inertial readings per REP-145, without an orientation; a specific force of NaN is one that nobody measures."""
 
     def __init__(self, robot: Robot) -> None:
         """Fill in what never changes."""
@@ -119,7 +120,10 @@ class ImuWriter:
         message = self._message
         message.header.stamp = stamp_of(time_ns)
         a, w = message.linear_acceleration, message.angular_velocity
-        a.x, a.y, a.z = sample.specific_force.tolist()
+        a.x, a.y, a.z = force = sample.specific_force.tolist()
+        if math.isnan(force[0]):
+            a.x = a.y = a.z = 0.0
+            message.linear_acceleration_covariance[0] = UNKNOWN
         w.x, w.y, w.z = sample.angular_velocity.tolist()
         return message
 

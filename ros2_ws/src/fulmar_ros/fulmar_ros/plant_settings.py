@@ -44,6 +44,11 @@ class PlantSettings:
         if self.seed < 0:
             raise ValueError(f"seed = {self.seed} must not be negative.")
 
+    @property
+    def measures_odometry(self) -> bool:
+        """Whether this plant publishes where it is, rather than somebody else."""
+        return True
+
     def control_rate(self, robot: Robot) -> float:
         """Command rate [Hz]."""
         return self.control_hz or robot.timing.control_hz

@@ -41,7 +41,15 @@ REMEMBERED = 256  # odometry messages whose answer may still come
 class PlantWires:
     """Publishers, the command subscription, and the times between them."""
 
-    def __init__(self, node: LifecycleNode, robot: Robot, guard: ActuatorGuard, *, simulated: bool) -> None:
+    def __init__(
+        self,
+        node: LifecycleNode,
+        robot: Robot,
+        guard: ActuatorGuard,
+        *,
+        simulated: bool,
+        odometry: bool = True,
+    ) -> None:
         """Create every endpoint.
 
         Args:
@@ -49,6 +57,7 @@ class PlantWires:
             robot: The robot.
             guard: Takes the commands; only touched under `self.lock`.
             simulated: Whether truth and clock are published.
+            odometry: Whether the backend measures where it is; if not, somebody else publishes that.
         """
         self.lock = threading.Condition()
         self.latency_ms = Spread()
@@ -56,7 +65,10 @@ class PlantWires:
         self._sent_ns: OrderedDict[int, int] = OrderedDict()
         self._answered: int | None = None
         self._clock_ns = 0
-        self._odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+        self._captured_ns = 0
+        self._odometry = (
+            node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY)) if odometry else None
+        )
         self._imu = node.create_publisher(Imu, IMU.name, publisher_qos(IMU))
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
         self._truth = node.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH)) if simulated else None
@@ -84,23 +96,28 @@ class PlantWires:
                 node.destroy_publisher(publisher)
 
     def subscribers(self) -> int:
-        """Matched subscriptions of the odometry."""
-        return int(self._odometry.get_subscription_count())
+        """Matched subscriptions of the odometry, or of the actuators' state where somebody else measures."""
+        return int((self._odometry or self._state).get_subscription_count())
 
     def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
         """Publish what the backend reports; the odometry first, since somebody waits for it.
 
         Args:
             sample: From the backend.
-            time_ns: Time of measurement [ns].
+            time_ns: Time of measurement, where the sample names none [ns].
             resend: Only the odometry, once more.
         """
+        if sample.stamp_ns is not None:
+            if sample.stamp_ns <= self._captured_ns:
+                return  # a device that has nothing new
+            time_ns = self._captured_ns = sample.stamp_ns
         self._sent_ns.setdefault(time_ns, time.monotonic_ns())  # of a resent one, the first sending counts
         while len(self._sent_ns) > REMEMBERED:
             self._sent_ns.popitem(last=False)
         if sample.block is not None:
             self._publish_block(sample.block, time_ns)
-        self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
+        if self._odometry is not None and sample.odometry is not None:
+            self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
         if resend:
             return
         if sample.imu is not None and self._imu.get_subscription_count():

@@ -5,16 +5,18 @@ from __future__ import annotations
 import typer
 
 from fulmar_bringup.commands.benchmark_drift import drift
+from fulmar_bringup.commands.benchmark_hardware import hardware
 from fulmar_bringup.commands.benchmark_roboran import roboran
 from fulmar_bringup.commands.benchmark_throughput import throughput
 from fulmar_bringup.commands.benchmark_training import training
 
 benchmark = typer.Typer(
-    help="Measure policies, simulators and training beside published figures.",
+    help="Measure policies, simulators, drivers and training, beside published figures where there are some.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 benchmark.command()(drift)
+benchmark.command()(hardware)
 benchmark.command()(roboran)
 benchmark.command()(throughput)
 benchmark.command()(training)

@@ -34,6 +34,17 @@ def run(
     ] = None,
     controller: ControllerOption = "policy",
     backend: Annotated[str, typer.Option(metavar="B", help="mujoco, mock or hardware.")] = "mujoco",
+    hardware: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="With --backend hardware: a name from configs/hardware, or a .yaml file; the robot's own by default.",
+        ),
+    ] = None,
+    emulate: Annotated[
+        bool,
+        typer.Option("--emulate", help="With --backend hardware: an emulator speaks for the device."),
+    ] = False,
     policy: PolicyOption = None,
     goal: Annotated[
         str | None,
@@ -86,6 +97,8 @@ def run(
     fulmar run turtlebot2 --task go_through_positions --controller classical
 
     fulmar run floating_platform --controller classical --goals circle
+
+    fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
@@ -112,8 +125,12 @@ def run(
         record=record or default_record(robot, controller),
         command="fulmar " + " ".join(sys.argv[1:]),
         goals=goals,
+        hardware=hardware,
+        emulate=emulate,
     )
-    require(*modules_of(controller, backend))  # the nodes would fail for want of them one by one
+    require(
+        *modules_of(controller, backend, hardware=request.plan.hardware, emulated=emulate)
+    )  # the nodes would fail for want of them one by one
     outcome = conduct(request)
     if as_json:
         print_json(outcome.summary)

@@ -1,0 +1,75 @@
+"""`fulmar benchmark hardware`: closed loops through the protocols of real devices."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.console import output, print_json
+from fulmar_bringup.progress import work_bar
+from fulmar_core.exit_codes import FAILED
+
+
+def hardware(
+    robots: Annotated[
+        str | None,
+        typer.Option("--robot", metavar="R,...", help="Names with commas between; all by default."),
+    ] = None,
+    episodes: Annotated[int, typer.Option(metavar="N", min=1, help="Episodes of each device.")] = 40,
+    jobs: Annotated[
+        int,
+        typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each."),
+    ] = 4,
+    as_json: JsonOption = False,
+) -> None:
+    """Drive emulated devices to their goals, through driver and wire protocol, in real time, with the shipped policies.
+
+    Each episode is `fulmar run --backend hardware --emulate` with a seed of its own. Success is that of `fulmar run`,
+    judged by where the emulated robot really is. The exit code is 1 where a device reaches its goal too rarely.
+
+    Try:
+
+    fulmar benchmark hardware --robot turtlebot2 --episodes 8
+    """
+    from fulmar_bringup.benchmark.hardware import cases_of, measure
+    from fulmar_bringup.extras import require
+    from fulmar_bringup.system import modules_of
+
+    cases = cases_of([name.strip() for name in robots.split(",")] if robots else None)
+    for case in cases:
+        require(*modules_of("policy", "hardware", hardware=case.hardware, emulated=True))
+    total = len(cases) * episodes
+    with work_bar("driving") as moved:
+        found = measure(cases, episodes=episodes, jobs=jobs, progress=lambda done: moved(done, total))
+    if as_json:
+        print_json({"cases": found, "jobs": jobs, "passed": all(case["passed"] for case in found)})
+    else:
+        _print(found)
+    if not all(case["passed"] for case in found):
+        raise typer.Exit(FAILED)
+
+
+def _print(found: list[dict[str, Any]]) -> None:
+    table = Table(title="goals reached through emulated devices")
+    for column in ("hardware", "driver", "task"):
+        table.add_column(column)
+    for column in ("reached", "share", "required", "watchdog trips"):
+        table.add_column(column, justify="right")
+    for case in found:
+        table.add_row(
+            case["hardware"],
+            case["driver"],
+            case["task"],
+            f"{case['succeeded']}/{case['episodes']}",
+            f"{case['share']:.3f}",
+            f"{case['required']:.2f}",
+            str(case["watchdog_trips"]),
+        )
+    output.print(table)
+    for case in found:
+        for missed in case["missed"]:
+            why = missed["failure"] or f"{missed['final_position_error_m']:.2f} m off"
+            output.print(f"  {case['hardware']}, seed {missed['seed']}: {why}", markup=False)
