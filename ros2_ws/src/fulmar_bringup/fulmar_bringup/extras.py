@@ -22,6 +22,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "sim": ("mujoco",),
     "policy": ("onnxruntime",),
     "bags": ("mcap", "rosbags", "mcap_ros2", "zstandard"),
+    "hardware": ("filterpy",),
     "view": ("matplotlib",),
     "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
     "cluster": ("ray",),
