@@ -53,6 +53,14 @@ IMU = Wire(
     "every plant tick",
     "specific force (+g at rest) and turn rate; no orientation",
 )
+MOCAP = Wire(
+    "mocap/pose",
+    "geometry_msgs/msg/PoseStamped",
+    "plant",
+    "best_effort",
+    "every capture, where an estimator runs",
+    "pose as motion capture reports it, Z up, stamped at capture or a constant time after",
+)
 TRUTH = Wire(
     "ground_truth/odom",
     "nav_msgs/msg/Odometry",
@@ -182,6 +190,30 @@ BLOCK = Wire(
     "with each odometry, where there is a block",
     "place of the thing to push, stamped as the odometry",
 )
+ESTOP = Wire(
+    "estop",
+    "std_msgs/msg/Bool",
+    "operator",
+    "latched",
+    "10 Hz, where there is one",
+    "true: nothing may move; so does its silence, once it was heard or where it is required",
+)
+TELEOP = Wire(
+    "teleop/command",
+    "sensor_msgs/msg/JointState",
+    "operator",
+    "stream",
+    "20 Hz while a person has the robot",
+    "a person's command, `effort` by actuator name; goes before the controller's until it is given back",
+)
+SWAP = Wire(
+    "controller/swap",
+    "std_msgs/msg/String",
+    "operator",
+    "stream",
+    "on demand",
+    "folder of the policy bundle to go on with; `controller/status` tells what came of it",
+)
 VELOCITY_COMMAND = Wire(
     "cmd_vel",
     "geometry_msgs/msg/TwistStamped",
@@ -194,6 +226,7 @@ VELOCITY_COMMAND = Wire(
 WIRES: tuple[Wire, ...] = (
     ODOMETRY,
     IMU,
+    MOCAP,
     TRUTH,
     ACTUATORS_STATE,
     ACTUATORS_HEALTH,
@@ -211,6 +244,9 @@ WIRES: tuple[Wire, ...] = (
     GOAL_VELOCITY,
     OBSTACLES,
     BLOCK,
+    ESTOP,
+    TELEOP,
+    SWAP,
 )
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}
