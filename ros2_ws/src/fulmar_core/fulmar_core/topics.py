@@ -15,6 +15,9 @@ from fulmar_core.robot import Robot
 Source = Literal["plant", "controller", "operator", "every node"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
+# Services, all of std_srvs/Trigger.
+ESTOP_TRIGGER, ESTOP_RESET, GIVE_BACK = "estop/trigger", "estop/reset", "teleop/give_back"
+
 # Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
 SIMULATION_START_NS = 1_000_000_000
 
@@ -206,6 +209,14 @@ TELEOP = Wire(
     "20 Hz while a person has the robot",
     "a person's command, `effort` by actuator name; goes before the controller's until it is given back",
 )
+JOY = Wire(
+    "joy",
+    "sensor_msgs/msg/Joy",
+    "operator",
+    "stream",
+    "10 Hz and more, where there is a gamepad",
+    "axes and buttons of a gamepad, for teleoperation",
+)
 SWAP = Wire(
     "controller/swap",
     "std_msgs/msg/String",
@@ -246,6 +257,7 @@ WIRES: tuple[Wire, ...] = (
     BLOCK,
     ESTOP,
     TELEOP,
+    JOY,
     SWAP,
 )
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
@@ -73,6 +73,24 @@ class OdometryWriter:
         velocity = _turned((x, y, z, -w), state.velocity_in_world.tolist())
         twist.linear.x, twist.linear.y, twist.linear.z = velocity
         twist.angular.x, twist.angular.y, twist.angular.z = state.angular_velocity_in_body.tolist()
+        return message
+
+
+class PoseWriter:
+    """States as poses of a motion capture."""
+
+    def __init__(self) -> None:
+        """Fill in what never changes."""
+        self._message = PoseStamped()
+        self._message.header.frame_id = "odom"
+
+    def write(self, state: RigidBodyState, time_ns: int) -> PoseStamped:
+        """Fill the message; it is overwritten by the next call."""
+        message = self._message
+        message.header.stamp = stamp_of(time_ns)
+        p, q = message.pose.position, message.pose.orientation
+        p.x, p.y, p.z = state.position_in_world.tolist()
+        q.x, q.y, q.z, q.w = state.quat_xyzw.tolist()
         return message
 
 

@@ -35,9 +35,10 @@ def estimator(
 ) -> None:
     """Compare the state estimator with the mean of 30 poses that RoboRAN deploys, on the same data.
 
-    A robot is driven about in the core's dynamics at 200 Hz; its poses, at 200 Hz and at 25 Hz, and its inertial readings
-    have the noise of the robot's YAML. Every figure is about what a controller is told at the very instant, against the
-    truth at that instant. Exit code 1 if the estimator's velocity error is more than half the mean's, or 20 ms late.
+    A robot is driven about in the core's dynamics at 200 Hz; its poses, at 200 Hz and at 25 Hz, and its inertial
+    readings have the noise of the robot's YAML. Every figure is about what a controller is told at the very instant,
+    against the truth at that instant. Exit code 1 if the estimator's velocity error is more than half the mean's, or
+    20 ms late.
 
     Try:
 
@@ -49,8 +50,8 @@ def estimator(
     from fulmar_core.robot import load_robot
 
     require("filterpy", *(["matplotlib"] if picture else []))
-    from fulmar_bringup.benchmark.estimator.comparison import MEAN, RATES_HZ, as_json as rows_of
-    from fulmar_bringup.benchmark.estimator.comparison import compare, verdict
+    from fulmar_bringup.benchmark.estimator.comparison import MEAN, RATES_HZ, compare, verdict
+    from fulmar_bringup.benchmark.estimator.comparison import as_json as rows_of
     from fulmar_bringup.benchmark.estimator.drive import drives as drive_about
     from fulmar_core.estimation.settings import load_estimator
 
@@ -87,7 +88,8 @@ def estimator(
 
 def _print(figures: dict[str, Any], mean: str) -> None:
     table = Table(
-        title=f"{figures['robot']} · {figures['drives']} drives of {figures['seconds']:g} s · poses {figures['latency_ms']:g} ms late"
+        title=f"{figures['robot']} · {figures['drives']} drives of {figures['seconds']:g} s · "
+        f"poses {figures['latency_ms']:g} ms late"
     )
     table.add_column("poses")
     table.add_column("method")

@@ -113,8 +113,8 @@ class ActuatorGuard:
     def output(self, now_ns: int) -> np.ndarray:
         """What to apply at this time of the steady clock [ns].
 
-        After a silence and under the e-stop the safe command; wheels slow down to it as fast as they may, so that they do
-        not lock.
+        After a silence and under the e-stop the safe command; wheels slow down to it as fast as they may, so that they
+        do not lock.
         """
         since_ns = self._ended_ns(now_ns)
         if since_ns is None:
@@ -182,7 +182,9 @@ class ActuatorGuard:
         most = seconds * np.asarray(slew) * (1.0 + 1e-9)
         # Who keeps to the limit already gets the very command, to the last bit.
         within = np.abs(wanted - self.command) <= most
-        near: np.ndarray = np.where(within, wanted, self.command + np.clip(wanted - self.command, -most, most))
+        near: np.ndarray = np.where(
+            within, wanted, self.command + np.clip(wanted - self.command, -most, most)
+        )
         return near
 
     def _stamp_problem(self, stamp_ns: int) -> str | None:

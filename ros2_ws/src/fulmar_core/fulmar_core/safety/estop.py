@@ -40,6 +40,11 @@ class EstopWatch:
             self._released = True
             self.was_released = True
 
+    @property
+    def heard(self) -> bool:
+        """Whether there is, or was, one."""
+        return self._heard_ns is not None
+
     def reason(self, now_ns: int) -> str:
         """Why nothing may move at this time of the same clock; empty if it may [ns]."""
         if self._heard_ns is None:

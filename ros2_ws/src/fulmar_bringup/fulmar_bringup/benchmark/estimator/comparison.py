@@ -67,7 +67,9 @@ def tell_by_filter(
             heard |= not estimator.see_pose(np.array([x, y, 0.0]), from_yaw(np.asarray(yaw)), now_ns)
         estimate = estimator.estimate() if heard else None
         if estimate is not None:
-            newest = np.array([*estimate.state.velocity_in_world[:2], estimate.state.angular_velocity_in_body[2]])
+            newest = np.array(
+                [*estimate.state.velocity_in_world[:2], estimate.state.angular_velocity_in_body[2]]
+            )
         told[tick] = newest
     return told
 

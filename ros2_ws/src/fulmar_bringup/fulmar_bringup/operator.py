@@ -1,0 +1,105 @@
+"""A person's side of a system that runs already: asks its services, from a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator
+
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from fulmar_bringup.processes import child_environment
+from fulmar_core.errors import RunFailed
+from fulmar_core.safety.estop import REPUBLISH_HZ
+from fulmar_core.topics import ESTOP
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import spinning
+
+FIND_S, ANSWER_S, SAY_S = 3.0, 2.0, 1.0
+LOOK_S = 0.05
+
+
+class Operator:
+    """Finds robots by what they offer, and asks."""
+
+    def __init__(self, node: Node) -> None:
+        """Ask through a node that spins already."""
+        self._node = node
+
+    def robots_with(self, service: str, robot: str | None, *, wait_s: float = FIND_S) -> list[str]:
+        """Namespaces that offer a service, as soon as one does; only that of one robot, if it is named."""
+        return self._found(
+            lambda: [
+                name.removesuffix(f"/{service}")
+                for name, _ in self._node.get_service_names_and_types()
+                if name.endswith(f"/{service}")
+            ],
+            robot,
+            wait_s,
+        )
+
+    def plants(self, robot: str | None) -> list[str]:
+        """Namespaces in which a plant runs."""
+        return self._found(
+            lambda: [space for name, space in self._node.get_node_names_and_namespaces() if name == "plant"],
+            robot,
+            FIND_S,
+        )
+
+    def ask(self, service: str) -> tuple[bool, str]:
+        """Call a Trigger service by its full name.
+
+        Returns:
+            Whether it was done, and what was said.
+
+        Raises:
+            RunFailed: No answer comes.
+        """
+        client = self._node.create_client(Trigger, service)
+        if not client.wait_for_service(ANSWER_S):
+            raise RunFailed(f"nobody answers on {service}.")
+        future = client.call_async(Trigger.Request())
+        until = time.monotonic() + ANSWER_S
+        while not future.done():
+            if time.monotonic() > until:
+                raise RunFailed(f"{service} did not answer within {ANSWER_S:g} s.")
+            time.sleep(0.005)
+        return future.result().success, future.result().message
+
+    def say_stop(self, space: str) -> None:
+        """Say on the wire itself that the e-stop is pressed, for those who have no e-stop node."""
+        publisher = self._node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
+        until = time.monotonic() + SAY_S
+        while time.monotonic() < until:
+            publisher.publish(Bool(data=True))
+            time.sleep(1.0 / REPUBLISH_HZ)
+
+    def _found(self, look: object, robot: str | None, wait_s: float) -> list[str]:
+        until = time.monotonic() + wait_s
+        while True:
+            found = sorted(set(look()))  # type: ignore[operator]
+            if robot is not None:
+                found = [space for space in found if space == f"/{robot}"]
+            if found or time.monotonic() > until:
+                return found
+            time.sleep(LOOK_S)
+
+
+@contextlib.contextmanager
+def operator() -> Iterator[Operator]:
+    """An operator whose node spins until the context ends."""
+    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    os.environ[key] = child_environment()[key]
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    errors: list[Exception] = []
+    node = rclpy.create_node(f"operator_{os.getpid()}")
+    try:
+        with spinning(node, errors.append):
+            yield Operator(node)
+    finally:
+        rclpy.try_shutdown()
