@@ -22,6 +22,7 @@ from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
 from fulmar_bringup.commands.run import run
+from fulmar_bringup.commands.swap import swap
 from fulmar_bringup.commands.teleop import teleop
 from fulmar_bringup.commands.train import train
 from fulmar_bringup.console import console
@@ -44,6 +45,7 @@ app.command()(run)
 app.command()(goals)
 app.command()(teleop)
 app.command()(estop)
+app.command()(swap)
 app.command()(train)
 app.command()(policies)
 app.command()(export)

@@ -15,7 +15,14 @@ import numpy as np
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.goal_plan import is_endless, shown_path
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec, run_goals_spec
+from fulmar_bringup.node_table import (
+    RunPlan,
+    controller_spec,
+    guard_specs,
+    plant_spec,
+    recorder_spec,
+    run_goals_spec,
+)
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
@@ -84,7 +91,11 @@ def _run(request: RunRequest) -> tuple[str, int]:
     failure, plant, ends = "", Report(), list[Ended]()
     try:
         group.start(recorder_spec(plan, **_recording(request)))
-        group.start(plant_spec(plan, subscribers=3 if plan.goals else 2))  # controller, recorder, goals
+        # Of odom: controller, recorder, goals. An estimator stands before them, and alone hears the plant's poses.
+        listeners = 2 if plan.guards.estimator else 3 if plan.goals else 2
+        group.start(plant_spec(plan, subscribers=listeners))
+        for spec in guard_specs(plan):
+            group.start(spec)
         group.start(controller_spec(plan, subscribers=2))  # plant and recorder
         if plan.goals:
             group.start(run_goals_spec(plan))

@@ -5,23 +5,25 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_bringup.processes import child_environment
 from fulmar_core.errors import RunFailed
 from fulmar_core.safety.estop import REPUBLISH_HZ
-from fulmar_core.topics import ESTOP
-from fulmar_ros.qos import publisher_qos
+from fulmar_core.topics import ESTOP, STATUS, SWAP
+from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
 FIND_S, ANSWER_S, SAY_S = 3.0, 2.0, 1.0
-LOOK_S = 0.05
+LOOK_S, SETTLE_S = 0.05, 0.3
 
 
 class Operator:
@@ -79,10 +81,44 @@ class Operator:
             publisher.publish(Bool(data=True))
             time.sleep(1.0 / REPUBLISH_HZ)
 
-    def _found(self, look: object, robot: str | None, wait_s: float) -> list[str]:
+    def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
+        """Ask a controller to go on with another policy.
+
+        Args:
+            robot: Whose controller.
+            folder: The bundle, on the robot's own disk.
+            find_s: How long to look for the controller [s].
+
+        Returns:
+            What the controller says of itself from then on; `swap` tells what came of it.
+
+        Raises:
+            RunFailed: There is no controller.
+        """
+        status: dict[str, str] = {}
+
+        def hear(message: DiagnosticArray) -> None:
+            values = {pair.key: pair.value for pair in message.status[0].values} if message.status else {}
+            if folder in values.get("swap", "") or values.get("swap", "").startswith("refused"):
+                status.update(values)
+
+        publisher = self._node.create_publisher(String, f"/{robot}/{SWAP.name}", publisher_qos(SWAP))
+        until = time.monotonic() + find_s
+        while not publisher.get_subscription_count():
+            if time.monotonic() > until:
+                raise RunFailed(f"no controller of '{robot}' is heard in this ROS domain.")
+            time.sleep(LOOK_S)
+        time.sleep(SETTLE_S)  # a match is seen here a moment before the other side is ready
+        publisher.publish(String(data=folder))
+        publisher.wait_for_all_acked(Duration(seconds=ANSWER_S))
+        qos = subscriber_qos(STATUS, reliable=True)
+        self._node.create_subscription(DiagnosticArray, f"/{robot}/{STATUS.name}", hear, qos)
+        return status
+
+    def _found(self, look: Callable[[], list[str]], robot: str | None, wait_s: float) -> list[str]:
         until = time.monotonic() + wait_s
         while True:
-            found = sorted(set(look()))  # type: ignore[operator]
+            found = sorted(set(look()))
             if robot is not None:
                 found = [space for space in found if space == f"/{robot}"]
             if found or time.monotonic() > until:

@@ -11,10 +11,11 @@ import numpy as np
 
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.system import check_names, default_control_hz
+from fulmar_bringup.system import CONTROLLERS, Guards, check_names, default_control_hz, default_guards
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
@@ -57,6 +58,7 @@ def plan_run(
     record: Path,
     command: str,
     goals: str | None = None,
+    guards: Guards | None = None,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -78,6 +80,7 @@ def plan_run(
         record: Folder of the bag; must not exist.
         command: Command line.
         goals: Goal file, a name or a path that ends in `.yaml`; its goals come one after another.
+        guards: What watches over the run; those of the system file by default.
 
     Returns:
         The request.
@@ -92,7 +95,9 @@ def plan_run(
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
     if not lockstep:
         check_beat(hz, rate)
-    policy = chosen_policy(controller, policy, the_robot, the_task, hz)
+    guards = guards or default_guards(controller, backend)
+    _check_guards(guards, the_robot, the_task, lockstep=lockstep)
+    policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=guards.fallback)
     if record.exists():
         raise ConfigError(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
@@ -123,9 +128,27 @@ def plan_run(
         lockstep=lockstep,
         rate=rate,
         goals=str(goal_path(goals)) if goals else "",
+        guards=guards,
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
+
+
+def _check_guards(guards: Guards, robot: Robot, task: Task, *, lockstep: bool) -> None:
+    """Refuse guards that could not do what they are for.
+
+    Raises:
+        ConfigError: A fallback that has nothing for the pair, no such estimator, or an estimator in lock step.
+    """
+    if guards.fallback:
+        CONTROLLERS[guards.fallback].check(robot, task)
+    if guards.estimator:
+        load_estimator(guards.estimator)
+        if lockstep:
+            raise ConfigError(
+                "an estimator needs every measurement in between, and lock step has one a command. "
+                "Leave --lockstep out; --rate makes a run faster."
+            )
 
 
 def default_task(robot: str) -> str:
@@ -220,16 +243,29 @@ def check_beat(control_hz: float, rate: float) -> None:
 
 
 def chosen_policy(
-    controller: str, policy: Path | None, robot: Robot, task: Task, control_hz: float
+    controller: str,
+    policy: Path | None,
+    robot: Robot,
+    task: Task,
+    control_hz: float,
+    *,
+    fallback: str | None = None,
 ) -> Path | None:
     """The bundle that a controller will run, checked; None for one that runs none.
+
+    With a fallback a bundle that is refused stops nothing: the node refuses it too, and says why.
 
     Raises:
         ConfigError: A bundle was given to a controller that runs none.
         BundleError: None is shipped, or the bundle is damaged or made for something else.
     """
     if controller == "policy":
-        return checked_policy(policy, robot, task, control_hz)
+        try:
+            return checked_policy(policy, robot, task, control_hz)
+        except BundleError:
+            if fallback is None or policy is None:
+                raise
+            return policy
     if policy is not None:
         raise ConfigError(
             f"controller '{controller}' runs no policy bundle. Leave --policy out, or use --controller policy."

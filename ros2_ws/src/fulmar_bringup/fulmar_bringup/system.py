@@ -9,9 +9,10 @@ from pathlib import Path
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.safety.area import NO_AREA, check_area
 from fulmar_core.tasks import Task, load_task
 
 
@@ -82,9 +83,35 @@ CONTROLLERS = {
         f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
     ),
 }
+FALLBACKS = tuple(name for name in CONTROLLERS if name != "policy")
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")
 DRIVERS: dict[str, str] = {}  # robot and module in hardware_drivers
+
+
+@dataclass(frozen=True)
+class Guards:
+    """What watches over a system, and what feeds it, beside what every system has."""
+
+    estimator: str | None = (
+        None  # file of configs/estimators: odometry comes from poses and inertial readings
+    )
+    estop: bool = False  # an e-stop node runs, and nothing moves without it
+    fallback: str | None = None  # classical controller that takes over from a policy that is refused
+    trusted_keys: str | None = None  # file or folder of public keys: only bundles that one of them has signed
+    max_run_time_s: float = 0.0  # 0: none [s]
+    area: tuple[float, float, float, float] = NO_AREA  # x_min, x_max, y_min, y_max [m]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if self.fallback is not None and self.fallback not in FALLBACKS:
+            raise ValueError(
+                f"'fallback' = '{self.fallback}' is not known.{did_you_mean(self.fallback, FALLBACKS)}"
+            )
+        if self.max_run_time_s < 0.0:
+            raise ValueError(f"'max_run_time_s' = {self.max_run_time_s:g} must not be negative.")
+        if self.area != NO_AREA:
+            check_area(self.area)
 
 
 @dataclass(frozen=True)
@@ -97,6 +124,7 @@ class System:
     controller: str
     backend: str
     control_hz: float  # [Hz]
+    guards: Guards = Guards()
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at."""
@@ -151,3 +179,9 @@ def default_control_hz(robot: str, task: str, controller: str, backend: str) -> 
     if system is not None and (system.robot, system.task) == (robot, task):
         return system.control_hz
     return load_robot(robot).timing.control_hz
+
+
+def default_guards(controller: str, backend: str) -> Guards:
+    """Guards of the matching system file; none where there is no such file."""
+    system = system_of(controller, backend)
+    return system.guards if system is not None else Guards()

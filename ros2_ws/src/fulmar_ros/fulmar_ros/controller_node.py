@@ -245,7 +245,10 @@ class ControllerNode(LifecycleNode):
             return self._arbitrate()
 
     def _arbitrate(self) -> Decision:
-        """The decision for now; call with the lock held. An e-stop takes the goal away: after it, nothing moves by itself."""
+        """The decision for now; call with the lock held.
+
+        An e-stop takes the goal away: after it, nothing moves by itself.
+        """
         now = time.monotonic_ns()
         stopped = self._estop.reason(now)
         if stopped and self._estop.heard:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,6 +21,9 @@ from fulmar_bringup.commands.arguments import (
 )
 from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from fulmar_bringup.system import Guards
 
 
 def run(
@@ -70,6 +74,25 @@ def run(
     record: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the bag; runs/<time>... by default.")
     ] = None,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Take odometry from poses and inertial readings: a name from configs/estimators.",
+        ),
+    ] = None,
+    estop: Annotated[
+        bool,
+        typer.Option("--estop", help="Run an e-stop node; nothing moves without it. See `fulmar estop`."),
+    ] = False,
+    fallback: Annotated[
+        str | None,
+        typer.Option(metavar="C", help="Classical controller that takes over when the policy is refused."),
+    ] = None,
+    trusted_keys: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE|DIR", help="Public keys: run no bundle that none of them has signed."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
@@ -112,7 +135,9 @@ def run(
         record=record or default_record(robot, controller),
         command="fulmar " + " ".join(sys.argv[1:]),
         goals=goals,
+        guards=chosen_guards(controller, backend, estimator, estop, fallback, trusted_keys),
     )
+    require("filterpy" if request.plan.guards.estimator else "numpy")
     require(*modules_of(controller, backend))  # the nodes would fail for want of them one by one
     outcome = conduct(request)
     if as_json:
@@ -122,6 +147,36 @@ def run(
     if outcome.failure:
         console.print(f"run failed: {outcome.failure}", markup=False)
     raise typer.Exit(outcome.exit_code)
+
+
+def chosen_guards(
+    controller: str,
+    backend: str,
+    estimator: str | None,
+    estop: bool,
+    fallback: str | None,
+    trusted_keys: Path | None,
+) -> Guards:
+    """The guards of the system file, each replaced by what was asked for.
+
+    Raises:
+        ConfigError: If a name is unknown.
+    """
+    from fulmar_bringup.system import FALLBACKS, default_guards
+    from fulmar_core.errors import UnknownNameError
+
+    if fallback is not None and fallback not in FALLBACKS:
+        raise UnknownNameError("fallback", fallback, FALLBACKS)
+    asked = {
+        "estimator": estimator,
+        "estop": estop or None,
+        "fallback": fallback,
+        "trusted_keys": str(trusted_keys) if trusted_keys else None,
+    }
+    return replace(
+        default_guards(controller, backend),
+        **{key: value for key, value in asked.items() if value is not None},
+    )
 
 
 def default_record(robot: str, controller: str) -> Path:
