@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from fulmar_bringup.planning import plan_run
+from fulmar_bringup.system import Guards
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from policy_server.shipped import shipped_policy
 
@@ -163,3 +164,21 @@ def test_commands_rarer_than_the_watchdog_allows_are_refused_in_real_time_alone(
 @pytest.mark.parametrize(("control_hz", "rate"), [(2.5, 1.0), (5.0, 0.1), (1.0, 3.0)])
 def test_commands_that_the_watchdog_allows_are_planned(plan, control_hz, rate):
     assert plan(control_hz=control_hz, rate=rate).plan.rate == rate
+
+
+def test_an_estimator_in_lock_step_is_refused(plan):
+    with pytest.raises(ConfigError, match="Leave --lockstep out"):
+        plan(guards=Guards(estimator="mocap_imu"), lockstep=True)
+
+
+def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan):
+    other = shipped_policy("floating_platform", "go_to_position")
+    with pytest.raises(BundleError):
+        plan(controller="policy", policy=other, control_hz=5.0)
+    request = plan(controller="policy", policy=other, control_hz=5.0, guards=Guards(fallback="lqr"))
+    assert request.plan.policy == str(other)
+
+
+def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
+    with pytest.raises(ConfigError, match="robots with thrusters"):
+        plan(robot="turtlebot2", controller="classical", guards=Guards(fallback="lqr"))

@@ -156,7 +156,9 @@ def test_a_bias_of_the_accelerometer_is_found():
     track = Track()
     for tick in range(1, 4000):
         t = 0.005 * tick
-        track.estimator.see_imu(ImuSample(REST + [0.05, 0.0, 0.0], np.zeros(3)), BEGIN + round(1e9 * t))
+        track.estimator.see_imu(
+            ImuSample(REST + np.array([0.05, 0.0, 0.0]), np.zeros(3)), BEGIN + round(1e9 * t)
+        )
         if tick % 8 == 0:
             track.estimator.see_pose(np.zeros(3), from_yaw(np.asarray(0.0)), BEGIN + round(1e9 * t))
     assert abs(track.velocity()[0]) < 0.003

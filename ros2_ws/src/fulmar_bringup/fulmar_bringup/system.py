@@ -182,6 +182,6 @@ def default_control_hz(robot: str, task: str, controller: str, backend: str) -> 
 
 
 def default_guards(controller: str, backend: str) -> Guards:
-    """Guards of the matching system file; none where there is no such file."""
+    """Guards of the matching system file; where there is none, an e-stop on hardware and nothing in simulation."""
     system = system_of(controller, backend)
-    return system.guards if system is not None else Guards()
+    return system.guards if system is not None else Guards(estop=backend == "hardware")
