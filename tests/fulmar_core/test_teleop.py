@@ -100,7 +100,7 @@ def test_a_senseless_gamepad_counts_as_let_go(axes, buttons):
 
 
 @given(st.lists(st.floats(width=32), max_size=70), st.lists(st.integers(-5, 5), max_size=70))
-@hypothesis_settings(max_examples=100)
+@hypothesis_settings(max_examples=100, deadline=None)
 def test_whatever_a_gamepad_says_wishes_stay_within_bounds(axes, buttons):
     pad = Gamepad(JoyLayout())
     pad.see(axes, buttons, 0)

@@ -83,7 +83,7 @@ def test_one_quiet_source_does_not_hide_another_that_is_not():
     st.lists(st.tuples(st.booleans(), st.integers(1, 400)), min_size=1, max_size=40),
     st.integers(0, 2000),
 )
-@hypothesis_settings(max_examples=100)
+@hypothesis_settings(max_examples=100, deadline=None)
 def test_nothing_moves_within_the_timeout_after_a_press_whatever_else_is_said(messages, later_ms):
     watch, now, last_press = EstopWatch(required=False), 0, None
     for pressed, gap_ms in messages:

@@ -8,9 +8,13 @@ from __future__ import annotations
 import base64
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fulmar_core.errors import BundleError, ConfigError
 from fulmar_core.policy_bundle import PASSPORT, SIGNATURE, read_passport
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 DOMAIN = b"fulmar policy bundle 1\n"  # a signature for something else is none for a bundle
 MOST_BYTES = 100_000  # of a key file, of a signature
@@ -108,7 +112,7 @@ def _signature(folder: Path) -> bytes:
         raise BundleError(f"{path}: cannot be read: {error}. Sign the bundle again.") from error
 
 
-def _public_keys(trusted: Path) -> dict[str, object]:
+def _public_keys(trusted: Path) -> dict[str, Ed25519PublicKey]:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
     from cryptography.hazmat.primitives.serialization import load_pem_public_key
 

@@ -99,7 +99,12 @@ class PlantNode(LifecycleNode):
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
         self.wires = PlantWires(
-            self, self.robot, self.guard, simulated=self._simulated, mocap=self._motion_capture()
+            self,
+            self.robot,
+            self.guard,
+            simulated=self._simulated,
+            mocap=self._motion_capture(),
+            by_hand=not self.settings.lockstep,  # where the plant waits for the controller's answers
         )
         self._make_loops(self._backend)
         self.health.open(self)

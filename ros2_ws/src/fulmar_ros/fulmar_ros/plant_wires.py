@@ -56,6 +56,7 @@ class PlantWires:
         *,
         simulated: bool,
         mocap: MotionCapture | None = None,
+        by_hand: bool = True,
     ) -> None:
         """Create every endpoint.
 
@@ -65,6 +66,7 @@ class PlantWires:
             guard: Takes the commands; only touched under `self.lock`.
             simulated: Whether truth and clock are published.
             mocap: Publish its poses in the place of the odometry.
+            by_hand: Whether a person may take the actuators.
         """
         self._mocap = mocap
         self.lock = threading.Condition()
@@ -97,12 +99,10 @@ class PlantWires:
             if wire is VELOCITY_COMMAND
             else node.create_subscription(JointState, wire.name, self._on_command, qos)
         )
-        self._operator = [
-            node.create_subscription(Bool, ESTOP.name, self._on_estop, subscriber_qos(ESTOP)),
-            node.create_subscription(
-                JointState, TELEOP.name, self._on_teleop, subscriber_qos(TELEOP, reliable=True)
-            ),
-        ]
+        self._operator = [node.create_subscription(Bool, ESTOP.name, self._on_estop, subscriber_qos(ESTOP))]
+        if by_hand:
+            qos = subscriber_qos(TELEOP, reliable=True)
+            self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, qos))
         self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
 
     def destroy(self, node: LifecycleNode) -> None:
