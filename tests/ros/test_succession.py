@@ -207,4 +207,4 @@ def test_where_signatures_are_asked_for_only_a_signed_policy_takes_over(
     swapper.ask(second, "refused")
     assert "not signed" in values(neighbour)["swap"]
     sign_bundle(second, tmp_path / "private.pem")
-    swapper.ask(second, "ready")  # nobody acts, so that nobody takes a turn
+    swapper.ask(second, "done")

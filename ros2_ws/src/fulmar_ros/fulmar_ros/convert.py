@@ -21,11 +21,13 @@ from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
 
 NS = 1_000_000_000
+LATEST_NS = 2**31 * NS  # seconds of a message have 32 bits
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
 
 
 def stamp_of(time_ns: int) -> Time:
-    """ROS time of nanoseconds since the epoch."""
+    """ROS time of nanoseconds since the epoch; the nearest that a message can hold, since senders may err."""
+    time_ns = min(max(time_ns, -LATEST_NS), LATEST_NS - 1)
     return Time(sec=time_ns // NS, nanosec=time_ns % NS)
 
 
