@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from sensor_msgs.msg import Joy
@@ -14,6 +17,8 @@ from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import spinning
 from fulmar_ros.teleop_node import TeleopNode
+from tests.conftest import RosDomain
+from tests.ros.cli import FULMAR, fulmar
 from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
 
 AHEAD = [0.0, 1.0, 0.0, 0.0]
@@ -98,3 +103,44 @@ def test_a_gamepad_that_dies_closes_the_valves(pad: Pad) -> None:
 def test_a_senseless_gamepad_moves_nothing(pad: Pad, axes: list[float]) -> None:
     for _ in range(20):
         assert not pad.drives(held=True, axes=axes)
+
+
+def test_keys_drive_and_are_the_dead_man_switch(
+    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """`fulmar teleop` on a terminal of its own: a key opens valves, no key closes them, x ends it."""
+    master, slave = os.openpty()
+    process = subprocess.Popen(
+        [*FULMAR, "teleop", "floating_platform"],
+        env=ros_domain.env,
+        cwd=tmp_path,
+        stdin=slave,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+
+        def key(letter: str) -> bool:
+            os.write(master, letter.encode())
+            time.sleep(0.05)
+            return bool(neighbour.applied[-1].any())
+
+        until(lambda: key("w"), 20.0)
+        assert (neighbour.applied[-1] != open_valves(neighbour.robot)).any()
+        os.write(master, b" ")
+        until(lambda: not neighbour.applied[-1].any())
+        until(lambda: key("d"))
+        until(lambda: not neighbour.applied[-1].any())  # nobody presses anything
+        os.write(master, b"x")
+        assert process.wait(5.0) == 0
+    finally:
+        process.kill()
+        process.wait()
+        os.close(master)
+        os.close(slave)
+
+
+def test_without_a_terminal_the_keyboard_is_refused_in_words(ros_domain: RosDomain, tmp_path: Path) -> None:
+    done = fulmar("teleop", "floating_platform", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "no terminal" in done.stderr
