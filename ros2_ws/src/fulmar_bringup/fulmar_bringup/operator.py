@@ -45,12 +45,12 @@ class Operator:
             wait_s,
         )
 
-    def plants(self, robot: str | None) -> list[str]:
-        """Namespaces in which a plant runs."""
+    def plants(self, robot: str | None, *, wait_s: float = FIND_S) -> list[str]:
+        """Namespaces in which a plant runs; arguments as of `robots_with`."""
         return self._found(
             lambda: [space for name, space in self._node.get_node_names_and_namespaces() if name == "plant"],
             robot,
-            FIND_S,
+            wait_s,
         )
 
     def ask(self, service: str) -> tuple[bool, str]:
@@ -73,13 +73,23 @@ class Operator:
             time.sleep(0.005)
         return future.result().success, future.result().message
 
-    def say_stop(self, space: str) -> None:
-        """Say on the wire itself that the e-stop is pressed, for those who have no e-stop node."""
+    def say_stop(self, space: str) -> bool:
+        """Say on the wire itself that the e-stop is pressed, for those who have no e-stop node.
+
+        Returns:
+            Whether somebody hears it.
+        """
         publisher = self._node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
+        until = time.monotonic() + FIND_S
+        while not publisher.get_subscription_count() and time.monotonic() < until:
+            publisher.publish(Bool(data=True))
+            time.sleep(LOOK_S)
+        heard = bool(publisher.get_subscription_count())
         until = time.monotonic() + SAY_S
         while time.monotonic() < until:
             publisher.publish(Bool(data=True))
             time.sleep(1.0 / REPUBLISH_HZ)
+        return heard
 
     def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
         """Ask a controller to go on with another policy.
@@ -99,7 +109,7 @@ class Operator:
 
         def hear(message: DiagnosticArray) -> None:
             values = {pair.key: pair.value for pair in message.status[0].values} if message.status else {}
-            if folder in values.get("swap", "") or values.get("swap", "").startswith("refused"):
+            if folder in values.get("swap", ""):
                 status.update(values)
 
         publisher = self._node.create_publisher(String, f"/{robot}/{SWAP.name}", publisher_qos(SWAP))
@@ -111,6 +121,7 @@ class Operator:
         time.sleep(SETTLE_S)  # a match is seen here a moment before the other side is ready
         publisher.publish(String(data=folder))
         publisher.wait_for_all_acked(Duration(seconds=ANSWER_S))
+        time.sleep(SETTLE_S)  # what it says from now on is about this request
         qos = subscriber_qos(STATUS, reliable=True)
         self._node.create_subscription(DiagnosticArray, f"/{robot}/{STATUS.name}", hear, qos)
         return status
@@ -121,8 +132,10 @@ class Operator:
             found = sorted(set(look()))
             if robot is not None:
                 found = [space for space in found if space == f"/{robot}"]
-            if found or time.monotonic() > until:
+            if time.monotonic() > until or (found and robot is not None):
                 return found
+            if found:  # who is found first is rarely alone: the others get a moment
+                until = min(until, time.monotonic() + SETTLE_S)
             time.sleep(LOOK_S)
 
 

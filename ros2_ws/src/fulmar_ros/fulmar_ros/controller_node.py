@@ -266,17 +266,17 @@ class ControllerNode(LifecycleNode):
         """Load another policy beside the one that runs; the one that runs is not disturbed."""
         folder = message.data
         if not self._learned:
-            self._refuse_swap("this controller runs no policy")
+            self._refuse_swap(folder, "this controller runs no policy")
         elif not folder or len(folder) > LONGEST_PATH:
-            self._refuse_swap(f"a folder has 1 to {LONGEST_PATH} characters, found {len(folder)}")
+            self._refuse_swap(folder, f"a folder has 1 to {LONGEST_PATH} characters, found {len(folder)}")
         elif self._loader is not None and self._loader.is_alive():
-            self._refuse_swap("another policy is being loaded")
+            self._refuse_swap(folder, "another policy is being loaded")
         else:
+            self._swap = f"loading {folder}"
             self._loader = threading.Thread(target=self._load, args=(folder,), name="loader", daemon=True)
             self._loader.start()
 
     def _load(self, folder: str) -> None:
-        self._swap = f"loading {folder}"
         try:
             settings = dataclasses.replace(self.settings, policy=folder)
             controller = self._make_controller(self.robot, self.task, settings)
@@ -284,15 +284,14 @@ class ControllerNode(LifecycleNode):
                 raise ConfigError("it sees something else than the controller that runs")
             candidate = ready(controller, self.robot)
         except Exception as error:  # noqa: BLE001 - whatever is wrong with it, the one that runs goes on
-            self._refuse_swap(
-                str(error) if isinstance(error, FulmarError) else f"{type(error).__name__}: {error}"
-            )
+            known = isinstance(error, FulmarError)
+            self._refuse_swap(folder, str(error) if known else f"{type(error).__name__}: {error}")
             return
         self._swap = f"ready {folder}"
         self._succession.propose(candidate)
 
-    def _refuse_swap(self, reason: str) -> None:
-        self._swap = f"refused: {reason}"
+    def _refuse_swap(self, folder: str, reason: str) -> None:
+        self._swap = f"refused {folder[:LONGEST_PATH]}: {reason}"
         self.get_logger().warning(f"policy not changed: {reason}")
 
     def _take_turns(self) -> None:

@@ -32,7 +32,7 @@ def estop(
 
     fulmar estop floating_platform --reset
     """
-    from fulmar_bringup.operator import operator
+    from fulmar_bringup.operator import FIND_S, operator
     from fulmar_core.topics import ESTOP_RESET, ESTOP_TRIGGER
 
     service = ESTOP_RESET if reset else ESTOP_TRIGGER
@@ -43,11 +43,12 @@ def estop(
             done, words = person.ask(f"{space}/{service}")
             answers.append({"robot": space.strip("/"), "done": done, "said": words})
         if not reset:  # the wire itself stops those that run without a node for it
-            for space in person.plants(robot):
+            for space in person.plants(robot, wait_s=0.5 if spaces else FIND_S):
                 if space not in spaces:
-                    person.say_stop(space)
+                    heard = person.say_stop(space)
                     words = "stopped, without an e-stop node: it stays so until one says otherwise"
-                    answers.append({"robot": space.strip("/"), "done": True, "said": words})
+                    words = words if heard else "nobody hears it: cut the power"
+                    answers.append({"robot": space.strip("/"), "done": heard, "said": words})
     if not answers:
         whom = f"'{robot}'" if robot else "any robot"
         raise RunFailed(
