@@ -60,7 +60,7 @@ class Sources:
 
     @property
     def said(self) -> tuple[str, dict[str, str]]:
-        return self.neighbour.said["estimator"]
+        return self.neighbour.said.get("estimator", ("", {"last_refusal": ""}))
 
 
 @pytest.fixture
