@@ -42,9 +42,9 @@ class DriverSettings(PlantSettings):
             raise ValueError("'hardware' names no file: give a name of configs/hardware, or a path.")
 
     @property
-    def measures_odometry(self) -> bool:
-        """Whether the device knows where it is."""
-        return load_hardware(self.hardware).measures_odometry
+    def publishes_odometry(self) -> bool:
+        """Whether the device knows where it is, and nobody else is asked for it."""
+        return super().publishes_odometry and load_hardware(self.hardware).measures_odometry
 
 
 class DriverNode(PlantNode):
@@ -85,6 +85,9 @@ class DriverNode(PlantNode):
         if self._air is not None:
             self._air.destroy(self)
             self._air = None
+
+    def _motion_capture(self) -> None:
+        """The room has its own; a device stands in for none."""
 
     def _make_device(self, robot: Robot, settings: PlantSettings) -> Backend:
         assert isinstance(settings, DriverSettings)

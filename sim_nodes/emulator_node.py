@@ -19,10 +19,11 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DEVICE_STATE, MOCAP, ODOMETRY, TRUTH
-from fulmar_ros.convert import OdometryWriter, VectorWriter, stamp_of
+from fulmar_core.topics import DEVICE_STATE, MOCAP, TRUTH
+from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
 from fulmar_ros.deadline import PLANT_PRIORITY, Deadlines, take_priority
 from fulmar_ros.first_episode import first_episode
+from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.qos import publisher_qos
@@ -46,7 +47,6 @@ class EmulatorSettings(PlantSettings):
     link: str = ""  # path of the pseudo-terminal or the chip to make, tcp:<port>, or udp:<port>
     order: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # which thruster each valve line opens
     active_low: bool = True
-    odometry: bool = False  # publish `odom` beside `mocap/pose`, as motion capture with a filter would
 
     def __post_init__(self) -> None:
         """Refuse devices that do not exist."""
@@ -80,13 +80,9 @@ class EmulatorNode(Node):
         self._truth = self.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH))
         self._state = self.create_publisher(JointState, DEVICE_STATE.name, publisher_qos(DEVICE_STATE))
         self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
-        self._odometry = (
-            self.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
-            if self.settings.odometry
-            else None
-        )
+        self._room = MotionCapture(rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
         self._write_truth = OdometryWriter(None, frame="map")
-        self._write_odometry = OdometryWriter(robot.sensors.odometry)
+        self._write_pose = PoseWriter()
         self._write_state = VectorWriter(robot.actuators.names)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._guarded, name="emulator", daemon=True)
@@ -126,17 +122,9 @@ class EmulatorNode(Node):
     def _publish(self, sample: Sample, stamp_ns: int) -> None:
         if sample.truth is not None:
             self._truth.publish(self._write_truth.write(sample.truth, stamp_ns))
-        if sample.odometry is None:
-            return
-        if self._odometry is not None:
-            self._odometry.publish(self._write_odometry.write(sample.odometry, stamp_ns))
-        if self._mocap.get_subscription_count():
-            message = PoseStamped()
-            message.header.frame_id, message.header.stamp = "odom", stamp_of(stamp_ns)
-            place, turn = message.pose.position, message.pose.orientation
-            place.x, place.y, place.z = sample.odometry.position_in_world.tolist()
-            turn.x, turn.y, turn.z, turn.w = sample.odometry.quat_xyzw.tolist()
-            self._mocap.publish(message)
+        if sample.odometry is not None:
+            for sent_ns, state in self._room.see(sample.odometry, stamp_ns):
+                self._mocap.publish(self._write_pose.write(state, sent_ns))
 
 
 def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettings) -> EmulatedDevice:

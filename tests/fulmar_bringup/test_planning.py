@@ -175,3 +175,21 @@ def test_a_real_robot_begins_where_it_stands(plan):
 
 def test_an_emulated_one_begins_where_the_seed_says(plan):
     assert plan(backend="hardware", emulate=True).plan.start == plan().plan.start
+
+
+def test_an_estimator_in_lock_step_is_refused(plan):
+    with pytest.raises(ConfigError, match="Leave --lockstep out"):
+        plan(guards=dict(estimator="mocap_imu"), lockstep=True)
+
+
+def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan):
+    other = shipped_policy("floating_platform", "go_to_position")
+    with pytest.raises(BundleError):
+        plan(controller="policy", policy=other, control_hz=5.0)
+    request = plan(controller="policy", policy=other, control_hz=5.0, guards=dict(fallback="lqr"))
+    assert request.plan.policy == str(other)
+
+
+def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
+    with pytest.raises(ConfigError, match="robots with thrusters"):
+        plan(robot="turtlebot2", controller="classical", guards=dict(fallback="lqr"))

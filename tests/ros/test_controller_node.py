@@ -14,10 +14,12 @@ from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.topics import (
+    ESTOP,
     GOAL_POSE,
     IMU,
     ODOMETRY,
     STATUS,
+    SWAP,
     TRUTH,
 )
 from fulmar_ros.controller_node import ControllerNode
@@ -91,7 +93,7 @@ def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
 ) -> None:
     """What a deployed controller may know."""
     heard = {subscription.topic_name for subscription in controller.subscriptions}
-    assert heard == {f"{NAMESPACE}/{ODOMETRY.name}", f"{NAMESPACE}/{GOAL_POSE.name}"}
+    assert heard == {f"{NAMESPACE}/{wire.name}" for wire in (ODOMETRY, GOAL_POSE, ESTOP, SWAP)}
     assert f"{NAMESPACE}/{TRUTH.name}" not in heard
     assert {STATUS.name, IMU.name}.isdisjoint(heard)
 

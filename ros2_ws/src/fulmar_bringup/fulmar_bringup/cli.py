@@ -13,6 +13,7 @@ from fulmar_bringup.commands.benchmark import benchmark
 from fulmar_bringup.commands.bundle import bundle
 from fulmar_bringup.commands.demo import demo
 from fulmar_bringup.commands.doctor import doctor
+from fulmar_bringup.commands.estop import estop
 from fulmar_bringup.commands.evaluate import EPILOG as MEANINGS
 from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
@@ -21,6 +22,8 @@ from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
 from fulmar_bringup.commands.run import run
+from fulmar_bringup.commands.swap import swap
+from fulmar_bringup.commands.teleop import teleop
 from fulmar_bringup.commands.train import train
 from fulmar_bringup.console import console
 from fulmar_bringup.extras import advice_for
@@ -40,6 +43,9 @@ app = typer.Typer(
 app.command("list")(list_names)
 app.command()(run)
 app.command()(goals)
+app.command()(teleop)
+app.command()(estop)
+app.command()(swap)
 app.command()(train)
 app.command()(policies)
 app.command()(export)

@@ -22,6 +22,7 @@ from fulmar_bringup.node_table import (
     RunPlan,
     controller_spec,
     emulator_spec,
+    guard_specs,
     plant_spec,
     recorder_spec,
     run_goals_spec,
@@ -105,6 +106,8 @@ def _run(request: RunRequest) -> tuple[str, int]:
             group.start(emulator_spec(plan, emulation))
             port = emulation.port
         group.start(plant_spec(plan, subscribers=_listeners(plan), port=port))
+        for spec in guard_specs(plan):
+            group.start(spec)
         group.start(controller_spec(plan, subscribers=2))  # plant and recorder
         if plan.goals:
             group.start(run_goals_spec(plan))
@@ -128,9 +131,11 @@ def _wires_folder() -> tempfile.TemporaryDirectory[str]:
 
 
 def _listeners(plan: RunPlan) -> int:
-    """Subscriptions that a plant waits for: of its odometry, or of its actuators' state where it measures nothing."""
-    if plan.hardware and not load_hardware(plan.hardware).measures_odometry:
+    """Subscriptions that a plant waits for: of odometry, of poses in its place, or of what its actuators do."""
+    if plan.hardware and (plan.guards.estimator or not load_hardware(plan.hardware).measures_odometry):
         return 1  # the recorder
+    if plan.guards.estimator:
+        return 2  # of the poses: estimator, recorder
     return 3 if plan.goals else 2  # controller, recorder, goals
 
 

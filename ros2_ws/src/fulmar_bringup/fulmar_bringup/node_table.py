@@ -6,11 +6,23 @@ Both `fulmar run` and `launch/system.launch.py` start exactly what this lists.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
-from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, default_hardware, load_system
+from fulmar_bringup.system import (
+    CONTROLLERS,
+    NONE,
+    Guards,
+    check_names,
+    default_control_hz,
+    default_guards,
+    default_hardware,
+    load_system,
+)
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
 
 Parameter = bool | int | float | str | list[float] | list[int]
@@ -46,6 +58,7 @@ class RunPlan:
     lockstep: bool = False
     rate: float = 1.0  # simulated seconds a wall-clock second
     goals: str = ""  # goal file that a node of its own tells; empty: somebody else gives the goal
+    guards: Guards = NONE
     supervised: bool = False  # somebody else activates the plant when all are ready
     hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
     emulated: bool = False  # an emulator stands in for the device
@@ -68,8 +81,20 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "goals_streamed": bool(plan.goals),
         "wait_for_subscribers": subscribers,
     }
-    if plan.controller == "policy" and plan.policy:
-        parameters["policy"] = plan.policy
+    guards = plan.guards
+    if plan.controller == "policy":
+        texts = {
+            "policy": plan.policy,
+            "fallback": guards.fallback or "",
+            "trusted_keys": str(Path(guards.trusted_keys).absolute()) if guards.trusted_keys else "",
+        }
+        parameters |= {key: text for key, text in texts.items() if text}
+    if guards.max_run_time_s:
+        parameters["max_run_time_s"] = guards.max_run_time_s
+    if guards.area != NO_AREA:
+        parameters["area"] = list(guards.area)
+    if guards.estop:
+        parameters["estop"] = True
     return NodeSpec(
         "controller", "policy_server", executable, f"policy_server.{executable}", f"/{plan.robot}", parameters
     )
@@ -97,6 +122,10 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSp
         "wait_for_subscribers": subscribers,
         "autostart": not plan.supervised,
     }
+    if plan.guards.estop:
+        parameters["estop"] = True
+    if plan.guards.estimator:
+        parameters["estimated"] = True
     if plan.backend == "hardware":
         parameters["hardware"] = plan.hardware
         if port:
@@ -109,6 +138,8 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSp
             f"/{plan.robot}",
             parameters,
         )
+    if plan.guards.estimator:
+        parameters["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
     return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", f"/{plan.robot}", parameters)
 
 
@@ -124,6 +155,8 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
         "link": emulation.link,
         **emulation.more,
     }
+    if plan.guards.estimator:
+        parameters["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
     return NodeSpec(
         "emulator", "sim_nodes", "emulator_node", "sim_nodes.emulator_node", f"/{plan.robot}", parameters
     )
@@ -174,6 +207,22 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
     return replace(spec, parameters=spec.parameters | more)
 
 
+def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
+    """The nodes that a plan's guards ask for."""
+    space, parameters = f"/{plan.robot}", {"robot": plan.robot}
+    nodes = []
+    if plan.guards.estop:
+        nodes.append(
+            NodeSpec("estop", "fulmar_ros", "estop_node", "fulmar_ros.estop_node", space, dict(parameters))
+        )
+    if plan.guards.estimator:
+        chosen: dict[str, Parameter] = {**parameters, "estimator": plan.guards.estimator}
+        nodes.append(
+            NodeSpec("estimator", "fulmar_ros", "estimator_node", "fulmar_ros.estimator_node", space, chosen)
+        )
+    return tuple(nodes)
+
+
 def list_nodes(
     *,
     system: str | None = None,
@@ -209,12 +258,16 @@ def list_nodes(
     as_written = chosen == (base.robot, base.task, base.controller, base.backend)
     hz = base.control_hz if as_written else default_control_hz(*chosen)
     load_robot(chosen[0]).timing.substeps(hz)
-    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "")
+    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "", guards=base.guards)
     if plan.backend == "hardware":
-        plan = replace(plan, hardware=default_hardware(plan.robot, hardware))
-    nodes = recorder_spec(plan), plant_spec(plan), controller_spec(plan)
+        path = default_hardware(plan.robot, hardware)
+        guards = (
+            base.guards if base.backend == "hardware" else default_guards(plan.controller, "hardware", path)
+        )
+        plan = replace(plan, hardware=path, guards=guards)
+    nodes = recorder_spec(plan), plant_spec(plan), *guard_specs(plan)
     if not goals:
-        return nodes
+        return *nodes, controller_spec(plan)
     checked_goals(goals, load_robot(plan.robot), load_task(plan.task))
     plan = replace(plan, goals=str(goal_path(goals)))
-    return *nodes[:2], controller_spec(plan), run_goals_spec(plan)
+    return *nodes, controller_spec(plan), run_goals_spec(plan)

@@ -4,18 +4,30 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from fulmar_bringup.emulation import check_emulation
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.system import check_names, default_control_hz, default_hardware
+from fulmar_bringup.system import (
+    CONTROLLERS,
+    FALLBACKS,
+    Guards,
+    check_names,
+    default_control_hz,
+    default_guards,
+    default_hardware,
+)
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
@@ -61,6 +73,7 @@ def plan_run(
     goals: str | None = None,
     hardware: str | None = None,
     emulate: bool = False,
+    guards: Mapping[str, Any] = MappingProxyType({}),
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -84,6 +97,7 @@ def plan_run(
         goals: Goal file, a name or a path that ends in `.yaml`; its goals come one after another.
         hardware: Hardware file, a name or a path that ends in `.yaml`; the robot's own by default.
         emulate: Whether an emulator stands in for the device.
+        guards: What replaces the guards of the system file, by name.
 
     Returns:
         The request.
@@ -99,7 +113,10 @@ def plan_run(
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
     if not lockstep:
         check_beat(hz, rate)
-    policy = chosen_policy(controller, policy, the_robot, the_task, hz)
+    watched = _checked_guards(
+        default_guards(controller, backend, hardware), guards, the_robot, the_task, lockstep=lockstep
+    )
+    policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=watched.fallback)
     if record.exists():
         raise ConfigError(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
@@ -136,6 +153,7 @@ def plan_run(
         goals=str(goal_path(goals)) if goals else "",
         hardware=hardware,
         emulated=emulate,
+        guards=watched,
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
@@ -159,6 +177,30 @@ def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: b
     if emulate:
         check_emulation(load_hardware(path))
     return path
+
+
+def _checked_guards(
+    usual: Guards, asked: Mapping[str, Any], robot: Robot, task: Task, *, lockstep: bool
+) -> Guards:
+    """The usual guards with what was asked for, if they can do what they are for.
+
+    Raises:
+        ConfigError: A fallback that has nothing for the pair, no such estimator, or an estimator in lock step.
+    """
+    fallback = asked.get("fallback")
+    if fallback is not None and fallback not in FALLBACKS:
+        raise UnknownNameError("fallback", fallback, FALLBACKS)
+    guards = replace(usual, **asked)
+    if guards.fallback:
+        CONTROLLERS[guards.fallback].check(robot, task)
+    if guards.estimator:
+        load_estimator(guards.estimator)
+        if lockstep:
+            raise ConfigError(
+                "an estimator needs every measurement in between, and lock step has one a command. "
+                "Leave --lockstep out; --rate makes a run faster."
+            )
+    return guards
 
 
 def default_task(robot: str) -> str:
@@ -253,16 +295,29 @@ def check_beat(control_hz: float, rate: float) -> None:
 
 
 def chosen_policy(
-    controller: str, policy: Path | None, robot: Robot, task: Task, control_hz: float
+    controller: str,
+    policy: Path | None,
+    robot: Robot,
+    task: Task,
+    control_hz: float,
+    *,
+    fallback: str | None = None,
 ) -> Path | None:
     """The bundle that a controller will run, checked; None for one that runs none.
+
+    With a fallback a bundle that is refused stops nothing: the node refuses it too, and says why.
 
     Raises:
         ConfigError: A bundle was given to a controller that runs none.
         BundleError: None is shipped, or the bundle is damaged or made for something else.
     """
     if controller == "policy":
-        return checked_policy(policy, robot, task, control_hz)
+        try:
+            return checked_policy(policy, robot, task, control_hz)
+        except BundleError:
+            if fallback is None or policy is None:
+                raise
+            return policy
     if policy is not None:
         raise ConfigError(
             f"controller '{controller}' runs no policy bundle. Leave --policy out, or use --controller policy."

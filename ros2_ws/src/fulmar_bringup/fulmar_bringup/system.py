@@ -9,9 +9,10 @@ from pathlib import Path
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.safety.area import NO_AREA, check_area
 from fulmar_core.tasks import Task, load_task
 from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
 
@@ -83,8 +84,38 @@ CONTROLLERS = {
         f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
     ),
 }
+FALLBACKS = tuple(name for name in CONTROLLERS if name != "policy")
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")
+
+
+@dataclass(frozen=True)
+class Guards:
+    """What watches over a system, and what feeds it, beside what every system has."""
+
+    estimator: str | None = (
+        None  # file of configs/estimators: odometry comes from poses and inertial readings
+    )
+    estop: bool = False  # an e-stop node runs, and nothing moves without it
+    fallback: str | None = None  # classical controller that takes over from a policy that is refused
+    trusted_keys: str | None = None  # file or folder of public keys: only bundles that one of them has signed
+    max_run_time_s: float = 0.0  # 0: none [s]
+    area: tuple[float, float, float, float] = NO_AREA  # x_min, x_max, y_min, y_max [m]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if self.fallback is not None and self.fallback not in FALLBACKS:
+            raise ValueError(
+                f"'fallback' = '{self.fallback}' is not known.{did_you_mean(self.fallback, FALLBACKS)}"
+            )
+        if self.max_run_time_s < 0.0:
+            raise ValueError(f"'max_run_time_s' = {self.max_run_time_s:g} must not be negative.")
+        if self.area != NO_AREA:
+            check_area(self.area)
+
+
+NONE = Guards()
+DEFAULT_ESTIMATOR = "mocap_imu"
 
 
 @dataclass(frozen=True)
@@ -97,6 +128,7 @@ class System:
     controller: str
     backend: str
     control_hz: float  # [Hz]
+    guards: Guards = NONE
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at."""
@@ -116,12 +148,13 @@ def load_system(name: str) -> System:
 
 
 def modules_of(
-    controller: str, backend: str, *, hardware: str = "", emulated: bool = False
+    controller: str, backend: str, *, guards: Guards = NONE, hardware: str = "", emulated: bool = False
 ) -> tuple[str, ...]:
-    """Modules of extras that the nodes of a controller, a backend and a hardware file import."""
+    """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
     simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
     driven = load_hardware(hardware).needs if hardware else ()
-    return (*CONTROLLERS[controller].needs, *simulated, *driven)
+    estimated = ("filterpy",) if guards.estimator else ()
+    return (*CONTROLLERS[controller].needs, *simulated, *driven, *estimated)
 
 
 def system_of(controller: str, backend: str) -> System | None:
@@ -176,3 +209,23 @@ def default_control_hz(robot: str, task: str, controller: str, backend: str) -> 
     if system is not None and (system.robot, system.task) == (robot, task):
         return system.control_hz
     return load_robot(robot).timing.control_hz
+
+
+def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:
+    """Guards of the matching system file; where there is none, nothing in simulation, and on hardware an e-stop.
+
+    Where a device does not know where it is, motion capture and an estimator do.
+
+    Args:
+        controller: Name of the controller.
+        backend: Name of the backend.
+        hardware: Hardware file, where the backend is hardware.
+    """
+    system = system_of(controller, backend)
+    if system is not None:
+        return system.guards
+    if backend != "hardware":
+        return NONE
+    return Guards(
+        estop=True, estimator=None if load_hardware(hardware).measures_odometry else DEFAULT_ESTIMATOR
+    )

@@ -12,8 +12,11 @@ from typing import Literal
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 
-Source = Literal["plant", "controller", "operator", "motion capture", "every node"]
+Source = Literal["plant", "controller", "operator", "every node"]
 Delivery = Literal["stream", "latched", "best_effort"]
+
+# Services, all of std_srvs/Trigger.
+ESTOP_TRIGGER, ESTOP_RESET, GIVE_BACK = "estop/trigger", "estop/reset", "teleop/give_back"
 
 # Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
 SIMULATION_START_NS = 1_000_000_000
@@ -52,6 +55,14 @@ IMU = Wire(
     "stream",
     "every plant tick",
     "specific force (+g at rest) and turn rate; no orientation",
+)
+MOCAP = Wire(
+    "mocap/pose",
+    "geometry_msgs/msg/PoseStamped",
+    "plant",
+    "best_effort",
+    "every capture, where an estimator runs",
+    "pose as motion capture reports it, Z up, stamped at capture or a constant time after",
 )
 TRUTH = Wire(
     "ground_truth/odom",
@@ -190,14 +201,6 @@ AIR_BEARING = Wire(
     "on change and at 1 Hz, where there is an air bearing",
     "whether air flows through the bearing; the service `air_bearing/enable` switches it",
 )
-MOCAP = Wire(
-    "mocap/pose",
-    "geometry_msgs/msg/PoseStamped",
-    "motion capture",
-    "best_effort",
-    "camera rate",
-    "pose seen from outside, Z up, stamped at capture",
-)
 DEVICE_STATE = Wire(
     "emulator/actuators",
     "sensor_msgs/msg/JointState",
@@ -205,6 +208,38 @@ DEVICE_STATE = Wire(
     "stream",
     "every physics step of an emulated device",
     "what an emulated device does by itself, whoever is dead; `effort` by actuator name",
+)
+ESTOP = Wire(
+    "estop",
+    "std_msgs/msg/Bool",
+    "operator",
+    "latched",
+    "10 Hz, where there is one",
+    "true: nothing may move; so does its silence, once it was heard or where it is required",
+)
+TELEOP = Wire(
+    "teleop/command",
+    "sensor_msgs/msg/JointState",
+    "operator",
+    "stream",
+    "20 Hz while a person has the robot",
+    "a person's command, `effort` by actuator name; goes before the controller's until it is given back",
+)
+JOY = Wire(
+    "joy",
+    "sensor_msgs/msg/Joy",
+    "operator",
+    "stream",
+    "10 Hz and more, where there is a gamepad",
+    "axes and buttons of a gamepad, for teleoperation",
+)
+SWAP = Wire(
+    "controller/swap",
+    "std_msgs/msg/String",
+    "operator",
+    "stream",
+    "on demand",
+    "folder of the policy bundle to go on with; `controller/status` tells what came of it",
 )
 VELOCITY_COMMAND = Wire(
     "cmd_vel",
@@ -218,6 +253,7 @@ VELOCITY_COMMAND = Wire(
 WIRES: tuple[Wire, ...] = (
     ODOMETRY,
     IMU,
+    MOCAP,
     TRUTH,
     ACTUATORS_STATE,
     ACTUATORS_HEALTH,
@@ -236,8 +272,11 @@ WIRES: tuple[Wire, ...] = (
     OBSTACLES,
     BLOCK,
     AIR_BEARING,
-    MOCAP,
     DEVICE_STATE,
+    ESTOP,
+    TELEOP,
+    JOY,
+    SWAP,
 )
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

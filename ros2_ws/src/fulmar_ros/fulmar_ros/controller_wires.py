@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -13,7 +11,7 @@ from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
@@ -27,12 +25,14 @@ from fulmar_core.topics import (
     ACTUATORS_HEALTH,
     BLOCK,
     DIAGNOSTICS,
+    ESTOP,
     GOAL_WIRES,
     METADATA,
     OBSERVATION,
     OBSTACLES,
     ODOMETRY,
     STATUS,
+    SWAP,
     VELOCITY_COMMAND,
     command_wire,
 )
@@ -63,6 +63,8 @@ class ControllerWires:
         on_goal: Callable[[GoalMessage], None],
         on_obstacles: Callable[[MarkerArray], None],
         on_block: Callable[[PoseStamped], None],
+        on_estop: Callable[[Bool], None],
+        on_swap: Callable[[String], None],
         lockstep: bool,
     ) -> None:
         """Create every endpoint.
@@ -76,6 +78,8 @@ class ControllerWires:
             on_goal: Told every goal.
             on_obstacles: Told all obstacles whenever they change.
             on_block: Told where the block is.
+            on_estop: Told whether the e-stop is pressed.
+            on_swap: Told which policy shall go on.
             lockstep: Ask for lost odometry again: the plant waits for its answer.
         """
         wire = command_wire(robot)
@@ -112,6 +116,8 @@ class ControllerWires:
         self._subscriptions = [
             node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
             node.create_subscription(TYPES[goal.name], goal.name, on_goal, subscriber_qos(goal)),
+            node.create_subscription(Bool, ESTOP.name, on_estop, subscriber_qos(ESTOP)),
+            node.create_subscription(String, SWAP.name, on_swap, subscriber_qos(SWAP, reliable=True)),
         ]
         if sees_obstacles(task):
             self._subscriptions.append(
@@ -167,6 +173,6 @@ class ControllerWires:
         assert self._health is not None
         self._health.publish(self._write_health.write(effectiveness, stamp))
 
-    def publish_metadata(self, metadata: dict[str, Any]) -> None:
-        """Say who controls."""
-        self._metadata.publish(String(data=json.dumps(metadata, sort_keys=True)))
+    def publish_metadata(self, text: str) -> None:
+        """Say who controls: a JSON object."""
+        self._metadata.publish(String(data=text))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
@@ -22,11 +22,13 @@ from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
 
 NS = 1_000_000_000
+LATEST_NS = 2**31 * NS  # seconds of a message have 32 bits
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
 
 
 def stamp_of(time_ns: int) -> Time:
-    """ROS time of nanoseconds since the epoch."""
+    """ROS time of nanoseconds since the epoch; the nearest that a message can hold, since senders may err."""
+    time_ns = min(max(time_ns, -LATEST_NS), LATEST_NS - 1)
     return Time(sec=time_ns // NS, nanosec=time_ns % NS)
 
 
@@ -74,6 +76,24 @@ class OdometryWriter:
         velocity = _turned((x, y, z, -w), state.velocity_in_world.tolist())
         twist.linear.x, twist.linear.y, twist.linear.z = velocity
         twist.angular.x, twist.angular.y, twist.angular.z = state.angular_velocity_in_body.tolist()
+        return message
+
+
+class PoseWriter:
+    """States as poses of a motion capture."""
+
+    def __init__(self) -> None:
+        """Fill in what never changes."""
+        self._message = PoseStamped()
+        self._message.header.frame_id = "odom"
+
+    def write(self, state: RigidBodyState, time_ns: int) -> PoseStamped:
+        """Fill the message; it is overwritten by the next call."""
+        message = self._message
+        message.header.stamp = stamp_of(time_ns)
+        p, q = message.pose.position, message.pose.orientation
+        p.x, p.y, p.z = state.position_in_world.tolist()
+        q.x, q.y, q.z, q.w = state.quat_xyzw.tolist()
         return message
 
 

@@ -71,6 +71,7 @@ class Deadlines:
         self._anchor_ns: int | None = None
         self.beats = 0
         self.overruns = 0
+        self.late_in_a_row = 0  # beats, each of which missed its deadline by a period or more
         self.period_error_ms = Spread()
 
     def align(self, anchor_ns: int) -> None:
@@ -113,6 +114,7 @@ class Deadlines:
         self._last_ns = now
         self.beats += 1
         self._next_ns += self._period_ns
+        self.late_in_a_row = self.late_in_a_row + 1 if self._next_ns <= now else 0
         while self._next_ns <= now:
             self._next_ns += self._period_ns
             self.overruns += 1

@@ -98,6 +98,6 @@ class LockstepLoop:
                 # The first messages can get lost while endpoints still find each other.
                 self._wires.publish_sample(sample, stamp, resend=True)
             # The very command that answered: how long its answer or this thread took does not matter here.
-            command = self._guard.command
+            command = self._guard.answer(time.monotonic_ns())
         self._wires.publish_applied(command, stamp)
         return command

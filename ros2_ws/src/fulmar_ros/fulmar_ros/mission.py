@@ -75,6 +75,12 @@ class Mission:
         self._goal, self._since_ns = goal, None
         return True
 
+    def drop(self) -> None:
+        """Forget the goal, as after an emergency stop: what moves then is asked for anew."""
+        self._goal, self._since_ns, self.goal_stamp_ns = None, None, 0
+        if self._schedule is not None:
+            self._schedule = Schedule()
+
     def turn_to(self, stamp_ns: int) -> None:
         """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""
         if self._schedule is not None:

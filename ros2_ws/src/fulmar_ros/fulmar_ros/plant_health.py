@@ -97,10 +97,22 @@ class PlantHealth:
                     f"no command for {silent_ns / 1e6:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state",
                     "tripped",
                 )
+        stopped = self._estop()
+        if stopped:
+            return stopped
+        if self._guard.person:
+            return "warn", "a person has the actuators", "person"
         if self._guard.last_rejection:
             count = self._guard.rejected
             return "warn", f"{count} commands refused, the last: {self._guard.last_rejection}", "refused"
         return "ok", self.mode, ""
+
+    def _estop(self) -> tuple[str, str, str] | None:
+        """The verdict while the e-stop holds: before it ever allowed anything it is a state, after that an event."""
+        with self._wires.lock:
+            reason = self._guard.estop.reason(time.monotonic_ns())
+            level = "error" if self._guard.estop.was_released and self.mode == "running" else "warn"
+        return (level, f"{reason}: actuators in their safe state", reason[:16]) if reason else None
 
     def _values(self) -> dict[str, str]:
         values = {
@@ -110,6 +122,7 @@ class PlantHealth:
             "sim_time_s": f"{self._clock.now_ns / 1e9:.3f}",
             "watchdog_trips": str(self._guard.watchdog.trips),
             "rejected_commands": str(self._guard.rejected),
+            "commanded_by": "person" if self._guard.person else "controller",
             **self._wires.latency_ms.percentiles("latency_ms"),
         }
         if self._realtime is not None:

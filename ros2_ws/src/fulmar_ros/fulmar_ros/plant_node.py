@@ -14,10 +14,12 @@ from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
+from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_settings import PlantSettings
@@ -77,7 +79,12 @@ class PlantNode(LifecycleNode):
                 "THE COMMAND WATCHDOG IS OFF: actuators stay as they are when a controller dies."
             )
             timeout_s = 1e9
-        self.guard = ActuatorGuard(self.robot.actuators, Watchdog(round(timeout_s * 1e9)))
+        self.guard = ActuatorGuard(
+            self.robot.actuators,
+            Watchdog(round(timeout_s * 1e9)),
+            estop=EstopWatch(required=self.settings.estop),
+            control_dt=1.0 / self.settings.control_rate(self.robot),
+        )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
@@ -98,7 +105,9 @@ class PlantNode(LifecycleNode):
             self.robot,
             self.guard,
             simulated=self._simulated,
-            odometry=self.settings.measures_odometry,
+            odometry=self.settings.publishes_odometry,
+            mocap=self._motion_capture(),
+            by_hand=not self.settings.lockstep,  # where the plant waits for the controller's answers
         )
         self._make_loops(self._backend)
         self.health.open(self)
@@ -164,6 +173,12 @@ class PlantNode(LifecycleNode):
         assert self._backend is not None
         sample = self._backend.reset(episode, seed=seed, number=number)
         self._lockstep.run(sample, steps, self._stop, on_step)
+
+    def _motion_capture(self) -> MotionCapture | None:
+        """The source of poses that stands in for the odometry, where an estimator runs."""
+        if not self.settings.estimated:
+            return None
+        return MotionCapture(rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
 
     def _make_loops(self, backend: Backend) -> None:
         """New loops: neither counts nor deadlines survive a deactivation."""

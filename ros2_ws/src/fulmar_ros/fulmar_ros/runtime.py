@@ -63,6 +63,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     end_with_parent()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
+    stay_on_this_host()
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot read
@@ -76,6 +77,11 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         return BAD_USAGE
     finally:
         rclpy.try_shutdown()
+
+
+def stay_on_this_host() -> None:
+    """Let nobody on the network find this process, unless the environment asks for it; call before `rclpy.init`."""
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 
 def end_with_parent() -> None:

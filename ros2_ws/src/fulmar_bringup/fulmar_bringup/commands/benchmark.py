@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from fulmar_bringup.commands.benchmark_drift import drift
+from fulmar_bringup.commands.benchmark_estimator import estimator
 from fulmar_bringup.commands.benchmark_hardware import hardware
 from fulmar_bringup.commands.benchmark_roboran import roboran
 from fulmar_bringup.commands.benchmark_throughput import throughput
@@ -16,6 +17,7 @@ benchmark = typer.Typer(
     rich_markup_mode=None,
 )
 benchmark.command()(drift)
+benchmark.command()(estimator)
 benchmark.command()(hardware)
 benchmark.command()(roboran)
 benchmark.command()(throughput)

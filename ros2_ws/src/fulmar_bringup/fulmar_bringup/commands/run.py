@@ -81,6 +81,25 @@ def run(
     record: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the bag; runs/<time>... by default.")
     ] = None,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Take odometry from poses and inertial readings: a name from configs/estimators.",
+        ),
+    ] = None,
+    estop: Annotated[
+        bool,
+        typer.Option("--estop", help="Run an e-stop node; nothing moves without it. See `fulmar estop`."),
+    ] = False,
+    fallback: Annotated[
+        str | None,
+        typer.Option(metavar="C", help="Classical controller that takes over when the policy is refused."),
+    ] = None,
+    trusted_keys: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE|DIR", help="Public keys: run no bundle that none of them has signed."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
@@ -127,10 +146,12 @@ def run(
         goals=goals,
         hardware=hardware,
         emulate=emulate,
+        guards=asked_guards(estimator, estop, fallback, trusted_keys),
     )
-    require(
-        *modules_of(controller, backend, hardware=request.plan.hardware, emulated=emulate)
-    )  # the nodes would fail for want of them one by one
+    plan = request.plan
+    require(  # the nodes would fail for want of them one by one
+        *modules_of(controller, backend, guards=plan.guards, hardware=plan.hardware, emulated=emulate)
+    )
     outcome = conduct(request)
     if as_json:
         print_json(outcome.summary)
@@ -139,6 +160,19 @@ def run(
     if outcome.failure:
         console.print(f"run failed: {outcome.failure}", markup=False)
     raise typer.Exit(outcome.exit_code)
+
+
+def asked_guards(
+    estimator: str | None, estop: bool, fallback: str | None, trusted_keys: Path | None
+) -> dict[str, Any]:
+    """The guards that were asked for, by name."""
+    asked = {
+        "estimator": estimator,
+        "estop": estop or None,
+        "fallback": fallback,
+        "trusted_keys": str(trusted_keys) if trusted_keys else None,
+    }
+    return {key: value for key, value in asked.items() if value is not None}
 
 
 def default_record(robot: str, controller: str) -> Path:
