@@ -91,7 +91,7 @@ def test_hardware_without_a_driver_is_refused():
 
 def test_on_hardware_the_driver_stands_where_the_simulator_stood():
     nodes = by_name(list_nodes(backend="hardware"))
-    assert list(nodes) == list(by_name(list_nodes()))
+    assert set(nodes) - {"estop", "estimator"} == set(by_name(list_nodes()))
     assert nodes["plant"].module == "hardware_drivers.driver_node"
     assert nodes["plant"].parameters["hardware"].endswith("zero_g_lab.yaml")
     other = by_name(list_nodes(backend="hardware", hardware="zero_g_lab_valve_node"))
@@ -155,8 +155,13 @@ def test_a_system_without_guards_has_none_of_their_parameters():
 
 
 def test_hardware_has_an_e_stop_unless_a_system_file_says_otherwise():
-    assert default_guards("policy", "hardware").estop
+    assert default_guards("policy", "hardware", "turtlebot2").estop
     assert not default_guards("policy", "mujoco").estop
+
+
+@pytest.mark.parametrize(("hardware", "estimator"), [("zero_g_lab", "mocap_imu"), ("turtlebot2", None)])
+def test_a_device_that_does_not_know_where_it_is_gets_an_estimator(hardware, estimator):
+    assert default_guards("policy", "hardware", hardware).estimator == estimator
 
 
 @pytest.mark.parametrize(

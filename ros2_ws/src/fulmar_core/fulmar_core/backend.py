@@ -27,6 +27,13 @@ class Sample:
     stamp_ns: int | None = None  # when it was captured; None: just now, by the clock of who asked [ns]
     applied: np.ndarray | None = None  # (n,) what the actuators were told; None: the very command
 
+    @property
+    def measured(self) -> RigidBodyState:
+        """The odometry of a backend that measures it, such as every simulator."""
+        if self.odometry is None:
+            raise ValueError("this backend does not measure where it is.")
+        return self.odometry
+
 
 class Backend(Protocol):
     """Anything that can carry out the commands of one robot."""

@@ -72,6 +72,11 @@ class Estimator:
         """
         self._settings, self._limits = settings, limits
         self.outliers, self.epoch = 0, 0
+        self._filter: MotionFilter | None = None
+        self._history: list[_Event] = []
+        self._pose_ns: int | None = None
+        self._imu_ns: int | None = None
+        self._strangers: list[tuple[int, np.ndarray]] = []
         self._forget()
 
     def see_pose(self, position: np.ndarray, quat_xyzw: np.ndarray, stamp_ns: int) -> str:
@@ -148,13 +153,12 @@ class Estimator:
         return ""
 
     def _forget(self) -> None:
-        self._filter: MotionFilter | None = None
-        self._history: list[_Event] = []
-        self._pose_ns: int | None = None
-        self._imu_ns: int | None = None
+        self._filter = None
+        self._history = []
+        self._pose_ns = self._imu_ns = None
         self._believed_ns = 0
         self._height, self._tilt = 0.0, np.array([0.0, 0.0, 0.0, 1.0])
-        self._strangers: list[tuple[int, np.ndarray]] = []
+        self._strangers = []
         self.problem = "no pose yet. Is the motion capture running, and does it see the robot?"
 
     def _begin(self, stamp_ns: int, pose: np.ndarray) -> None:

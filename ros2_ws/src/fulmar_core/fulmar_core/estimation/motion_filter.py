@@ -130,6 +130,6 @@ class MotionFilter(ExtendedKalmanFilter):  # type: ignore[misc]
 
     @staticmethod
     def _pose_error(measured: np.ndarray, expected: np.ndarray) -> np.ndarray:
-        error = measured - expected
+        error: np.ndarray = measured - expected
         error[2] = math.remainder(error[2], 2.0 * math.pi)
         return error
