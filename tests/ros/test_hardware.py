@@ -56,7 +56,7 @@ class Rig:
 
     @property
     def driver(self) -> psutil.Process:
-        return self.group._children["plant"]
+        return self.group.process("plant")
 
     def command(self) -> None:
         """As hard as it goes, in the wire of the robot."""

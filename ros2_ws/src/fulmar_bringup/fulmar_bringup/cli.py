@@ -17,6 +17,7 @@ from fulmar_bringup.commands.estop import estop
 from fulmar_bringup.commands.evaluate import EPILOG as MEANINGS
 from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
+from fulmar_bringup.commands.faults import faults
 from fulmar_bringup.commands.goals import goals
 from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
@@ -46,6 +47,7 @@ app.command()(goals)
 app.command()(teleop)
 app.command()(estop)
 app.command()(swap)
+app.command()(faults)
 app.command()(train)
 app.command()(policies)
 app.command()(export)

@@ -39,6 +39,7 @@ class NodeSpec:
     namespace: str
     parameters: dict[str, Parameter] = field(default_factory=dict)
     quiet: bool = False  # says only what is wrong
+    remappings: dict[str, str] = field(default_factory=dict)  # topics under other names
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ def to_node(spec: NodeSpec) -> Node:
         name=spec.name,
         namespace=spec.namespace,
         parameters=[parameters] if parameters else [],
+        remappings=list(spec.remappings.items()),
         output="screen",
         on_exit=Shutdown(reason=f"{spec.name} ended"),
     )

@@ -1,0 +1,109 @@
+"""Measurements that are wrong, late or missing while the robot moves."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable
+
+from nav_msgs.msg import Odometry
+
+from fulmar_bringup.faults.finding import Finding, stopped
+from fulmar_bringup.faults.live_system import LiveSystem
+from fulmar_bringup.faults.spoiler import Spoil
+from fulmar_core.safety.input_gate import FROZEN_AFTER
+from fulmar_ros.convert import stamp_ns, stamp_of
+
+LATE_S = 1.0  # longer than any input may be old
+
+
+def _spoilt(live: LiveSystem, name: str, spoil: Spoil, detection_s: float) -> Finding:
+    """Spoil every message from now on; the controller commands what is safe with its next beat."""
+    since_s = live.until_it_moves()
+    live.spoiler.spoil = spoil
+    return stopped(live, name, since_s, detection_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s)
+
+
+def _changed(change: Callable[[Odometry], None]) -> Spoil:
+    def spoil(message: Odometry) -> Odometry:
+        change(message)
+        return message
+
+    return spoil
+
+
+def odometry_silent(live: LiveSystem) -> Finding:
+    """Nothing comes any more."""
+    return _spoilt(live, "odometry_silent", lambda _message: None, live.watchdog_s)
+
+
+def odometry_frozen(live: LiveSystem) -> Finding:
+    """The same measurement with new stamps."""
+    kept: list[Odometry] = []
+
+    def spoil(message: Odometry) -> Odometry:
+        kept.append(kept[0] if kept else copy.deepcopy(message))
+        frozen = copy.deepcopy(kept[0])
+        frozen.header.stamp = message.header.stamp
+        return frozen
+
+    return _spoilt(live, "odometry_frozen", spoil, (FROZEN_AFTER + 1) * live.tick_s)
+
+
+def odometry_late(live: LiveSystem) -> Finding:
+    """Everything comes a second late."""
+    since_s = live.until_it_moves()
+    live.spoiler.delay_s = LATE_S
+    limit_s = live.watchdog_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s
+    return stopped(live, "odometry_late", since_s, limit_s)
+
+
+def odometry_not_a_number(live: LiveSystem) -> Finding:
+    """A velocity is NaN."""
+
+    def change(message: Odometry) -> None:
+        message.twist.twist.linear.x = math.nan
+
+    return _spoilt(live, "odometry_not_a_number", _changed(change), live.tick_s)
+
+
+def odometry_in_a_wrong_frame(live: LiveSystem) -> Finding:
+    """The frame is another one."""
+
+    def change(message: Odometry) -> None:
+        message.header.frame_id = "map"
+
+    return _spoilt(live, "odometry_in_a_wrong_frame", _changed(change), live.tick_s)
+
+
+def odometry_with_a_wrong_quaternion(live: LiveSystem) -> Finding:
+    """The quaternion has no unit length."""
+
+    def change(message: Odometry) -> None:
+        message.pose.pose.orientation.w += 1.0
+
+    return _spoilt(live, "odometry_with_a_wrong_quaternion", _changed(change), live.tick_s)
+
+
+def odometry_out_of_order(live: LiveSystem) -> Finding:
+    """Stamps go back from message to message."""
+    first: list[int] = []
+
+    def change(message: Odometry) -> None:
+        stamp = stamp_ns(message.header.stamp)
+        first.append(stamp)
+        back_ns = min(2 * (stamp - first[0]), 900_000_000) + 20_000_000  # within what counts as reordering
+        message.header.stamp = stamp_of(stamp - back_ns)
+
+    return _spoilt(live, "odometry_out_of_order", _changed(change), live.watchdog_s)
+
+
+INPUT_FAULTS = (
+    odometry_silent,
+    odometry_frozen,
+    odometry_late,
+    odometry_not_a_number,
+    odometry_in_a_wrong_frame,
+    odometry_with_a_wrong_quaternion,
+    odometry_out_of_order,
+)

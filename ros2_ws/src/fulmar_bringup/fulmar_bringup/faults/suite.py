@@ -1,0 +1,110 @@
+"""Every fault, each to a system of its own."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.faults.command_faults import command_faults
+from fulmar_bringup.faults.finding import Finding
+from fulmar_bringup.faults.input_faults import INPUT_FAULTS
+from fulmar_bringup.faults.live_system import LiveSystem, live_system
+from fulmar_bringup.faults.policy_faults import POLICY_FAULTS
+from fulmar_bringup.faults.process_faults import (
+    controller_hangs,
+    controller_killed,
+    estop_hangs,
+    estop_killed,
+    recorder_killed,
+)
+from fulmar_bringup.planning import RunRequest, default_task, plan_run
+from fulmar_core.errors import RunFailed, UnknownNameError
+from fulmar_core.robot import load_robot
+from fulmar_core.topics import VELOCITY_COMMAND, command_wire
+
+Fault = Callable[[LiveSystem], Finding]
+PROCESS_FAULTS: tuple[Fault, ...] = (
+    controller_killed,
+    controller_hangs,
+    estop_killed,
+    estop_hangs,
+    recorder_killed,
+)
+FAR_M = 6.0  # the robot is under way for seconds
+
+
+def faults_of(robot: str, names: list[str] | None = None) -> list[Fault]:
+    """The faults that a robot can have, or some of them by name.
+
+    Raises:
+        UnknownNameError: There is no such fault for it.
+    """
+    has_names = command_wire(load_robot(robot)) is not VELOCITY_COMMAND
+    every = {
+        fault.__name__: fault
+        for fault in (*PROCESS_FAULTS, *INPUT_FAULTS, *command_faults(has_names), *POLICY_FAULTS)
+    }
+    for name in names or ():
+        if name not in every:
+            raise UnknownNameError("fault", name, every)
+    return [every[name] for name in names] if names else list(every.values())
+
+
+def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[Finding]:
+    """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
+
+    Args:
+        robot: Whose system.
+        faults: From `faults_of`.
+        progress: Told how many are over.
+    """
+    findings = []
+    before = os.environ.get("ROS_DOMAIN_ID")
+    with reserved_domains(1) as (domain,):
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        try:
+            for count, fault in enumerate(faults, 1):
+                with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
+                    findings.append(_run(robot, fault, Path(folder)))
+                progress(count)
+        finally:
+            if before is None:
+                del os.environ["ROS_DOMAIN_ID"]
+            else:
+                os.environ["ROS_DOMAIN_ID"] = before
+    return findings
+
+
+def _run(robot: str, fault: Fault, folder: Path) -> Finding:
+    try:
+        with live_system(_request(robot, folder / "bag")) as live:
+            return fault(live)
+    except RunFailed as error:
+        return Finding(fault.__name__, "", str(error), None, None, False)
+
+
+def _request(robot: str, record: Path) -> RunRequest:
+    """A robot that has far to go, with an e-stop."""
+    request = plan_run(
+        robot=robot,
+        task=default_task(robot),
+        controller="policy",
+        backend="mujoco",
+        policy=None,
+        goal=(FAR_M, 0.0, 0.0),
+        start=(0.0, 0.0, 0.0),
+        duration_s=None,
+        lockstep=False,
+        rate=1.0,
+        control_hz=None,
+        scenario="nominal",
+        seed=0,
+        record=record,
+        command="fulmar faults",
+        guards={"estop": True},
+    )
+    return replace(request, plan=replace(request.plan, duration_s=0.0))
