@@ -81,13 +81,13 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
 
 def _run(robot: str, fault: Fault, folder: Path) -> Finding:
     try:
-        with live_system(_request(robot, folder / "bag")) as live:
+        with live_system(request_of(robot, folder / "bag")) as live:
             return fault(live)
     except RunFailed as error:
         return Finding(fault.__name__, "", str(error), None, None, False)
 
 
-def _request(robot: str, record: Path) -> RunRequest:
+def request_of(robot: str, record: Path) -> RunRequest:
     """A robot that has far to go, with an e-stop."""
     request = plan_run(
         robot=robot,
