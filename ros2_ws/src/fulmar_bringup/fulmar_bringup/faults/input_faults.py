@@ -1,4 +1,4 @@
-"""Measurements that are wrong, late or missing while the robot moves."""
+"""Measurements that are wrong or missing while the robot moves."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from fulmar_bringup.faults.live_system import LiveSystem
 from fulmar_bringup.faults.spoiler import Spoil
 from fulmar_core.safety.input_gate import FROZEN_AFTER
 from fulmar_ros.convert import stamp_ns, stamp_of
-
-LATE_S = 1.0  # longer than any input may be old
 
 
 def _spoilt(live: LiveSystem, name: str, spoil: Spoil, detection_s: float) -> Finding:
@@ -48,14 +46,6 @@ def odometry_frozen(live: LiveSystem) -> Finding:
         return frozen
 
     return _spoilt(live, "odometry_frozen", spoil, (FROZEN_AFTER + 1) * live.tick_s)
-
-
-def odometry_late(live: LiveSystem) -> Finding:
-    """Everything comes a second late."""
-    since_s = live.until_it_moves()
-    live.spoiler.delay_s = LATE_S
-    limit_s = live.watchdog_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s
-    return stopped(live, "odometry_late", since_s, limit_s)
 
 
 def odometry_not_a_number(live: LiveSystem) -> Finding:
@@ -101,7 +91,6 @@ def odometry_out_of_order(live: LiveSystem) -> Finding:
 INPUT_FAULTS = (
     odometry_silent,
     odometry_frozen,
-    odometry_late,
     odometry_not_a_number,
     odometry_in_a_wrong_frame,
     odometry_with_a_wrong_quaternion,

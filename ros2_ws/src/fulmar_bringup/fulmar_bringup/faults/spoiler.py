@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable
 
 from nav_msgs.msg import Odometry
@@ -27,7 +25,6 @@ class Spoiler:
     def __init__(self, node: Node) -> None:
         """Begin as if it were not there."""
         self.spoil: Spoil = unspoiled
-        self.delay_s = 0.0
         self._publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
         node.create_subscription(
             Odometry, MEASURED, self._pass, subscriber_qos(ODOMETRY, reliable=True, depth=10)
@@ -35,13 +32,5 @@ class Spoiler:
 
     def _pass(self, message: Odometry) -> None:
         spoilt = self.spoil(message)
-        if spoilt is None:
-            return
-        if self.delay_s:
-            threading.Thread(target=self._later, args=(spoilt, self.delay_s), daemon=True).start()
-        else:
+        if spoilt is not None:
             self._publisher.publish(spoilt)
-
-    def _later(self, message: Odometry, delay_s: float) -> None:
-        time.sleep(delay_s)
-        self._publisher.publish(message)
