@@ -163,6 +163,7 @@ NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
     MavlinkBoat: ("pymavlink",),
 }
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
+SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that motion capture alone knows the place of
 MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device knows where it is
 FITS = {
     "thrusters": (GpioValves, ValveTopic),
@@ -188,6 +189,11 @@ class Hardware:
     def measures_odometry(self) -> bool:
         """Whether the device knows where it is; if not, motion capture or another node says so."""
         return isinstance(self.driver, MEASURES)
+
+    @property
+    def seen_from_outside(self) -> bool:
+        """Whether motion capture alone knows where the robot is."""
+        return isinstance(self.driver, SEEN_FROM_OUTSIDE)
 
 
 def hardware_path(name: str) -> Path:

@@ -159,8 +159,16 @@ def test_hardware_has_an_e_stop_unless_a_system_file_says_otherwise():
     assert not default_guards("policy", "mujoco").estop
 
 
-@pytest.mark.parametrize(("hardware", "estimator"), [("zero_g_lab", "mocap_imu"), ("turtlebot2", None)])
-def test_a_device_that_does_not_know_where_it_is_gets_an_estimator(hardware, estimator):
+@pytest.mark.parametrize(
+    ("hardware", "estimator"),
+    [
+        ("zero_g_lab", "mocap_imu"),
+        ("zero_g_lab_valve_node", "mocap_imu"),
+        ("turtlebot2", None),
+        ("turtlebot2_kobuki_node", None),
+    ],
+)
+def test_a_robot_that_only_motion_capture_sees_gets_an_estimator(hardware, estimator):
     assert default_guards("policy", "hardware", hardware).estimator == estimator
 
 

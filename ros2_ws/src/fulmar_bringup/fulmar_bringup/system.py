@@ -214,7 +214,7 @@ def default_control_hz(robot: str, task: str, controller: str, backend: str) -> 
 def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:
     """Guards of the matching system file; where there is none, nothing in simulation, and on hardware an e-stop.
 
-    Where a device does not know where it is, motion capture and an estimator do.
+    Where motion capture alone knows where a robot is, an estimator makes odometry of it.
 
     Args:
         controller: Name of the controller.
@@ -226,6 +226,5 @@ def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:
         return system.guards
     if backend != "hardware":
         return NONE
-    return Guards(
-        estop=True, estimator=None if load_hardware(hardware).measures_odometry else DEFAULT_ESTIMATOR
-    )
+    seen = load_hardware(hardware).seen_from_outside
+    return Guards(estop=True, estimator=DEFAULT_ESTIMATOR if seen else None)
