@@ -60,10 +60,7 @@ def went_on(
         reaction: What was said.
         told: Whether that is what had to be said.
     """
-    trips = [
-        word.values.get("watchdog_trips", "0")
-        for word in live.witness.words_since(since_s)
-        if word.who == "plant"
-    ]
-    held = bool(trips) and set(trips) == {"0"}
+    words = live.witness.words_since(since_s - WORDS_S)  # with one from before, to compare with
+    trips = {word.values.get("watchdog_trips", "") for word in words if word.who == "plant"}
+    held = len(trips) == 1
     return Finding(name, detected_by, reaction, None, None, told and held)
