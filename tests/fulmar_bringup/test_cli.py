@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup import cli, provenance
+from fulmar_bringup import cli
+from fulmar_ros import provenance
 from fulmar_core import policy_bundle
 from fulmar_core.paths import config_directory
 from policy_server.shipped import shipped_policy

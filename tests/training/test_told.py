@@ -18,7 +18,9 @@ HZ = ROBOT.timing.control_hz
 
 def lived(scenario, steps, *, worlds=8, seed=4):
     """Random valves for a while: what was told last, the estimator's completed observations, and the simulation."""
-    simulation = BatchSimulation(ROBOT, TASK, load_scenario(scenario), worlds=worlds, seed=seed, control_hz=HZ)
+    simulation = BatchSimulation(
+        ROBOT, TASK, load_scenario(scenario), worlds=worlds, seed=seed, control_hz=HZ
+    )
     told, rng = Told(ROBOT, TASK, HZ), np.random.default_rng(1)
     for _ in range(steps):
         seen = told.complete(np.asarray(simulation.observe()))
@@ -32,7 +34,9 @@ def pushes(told, simulation):
     """Told and true push in the body's frame, shape (worlds, 3) each."""
     world, yaw = simulation.world, simulation.truth.yaw
     c, s = np.cos(yaw), np.sin(yaw)
-    true = np.stack((c * world.force_x + s * world.force_y, c * world.force_y - s * world.force_x, world.torque), -1)
+    true = np.stack(
+        (c * world.force_x + s * world.force_y, c * world.force_y - s * world.force_x, world.torque), -1
+    )
     return told[:, len(NAMES) : len(NAMES) + 3], true
 
 
@@ -73,7 +77,9 @@ def test_without_noise_the_terms_of_the_task_stay_what_they_are():
 
 
 def test_a_learner_is_told_the_same_as_a_deployed_network_up_to_errors():
-    env = BatchVecEnv(ROBOT, TASK, load_scenario("drift_force_4"), worlds=4, seed=2, told=True, staggered=False)
+    env = BatchVecEnv(
+        ROBOT, TASK, load_scenario("drift_force_4"), worlds=4, seed=2, told=True, staggered=False
+    )
     assert env.observation_space.shape == (len(NAMES) + 11,)
     seen = env.reset()
     np.testing.assert_allclose(seen[:, -11:-8], 0.0, atol=0.05)
@@ -85,7 +91,9 @@ def test_a_learner_is_told_the_same_as_a_deployed_network_up_to_errors():
 
 
 def test_a_learner_forgets_pushes_and_dead_valves_when_an_episode_begins():
-    env = BatchVecEnv(ROBOT, TASK, load_scenario("drift_two_lost"), worlds=4, seed=2, told=True, staggered=False)
+    env = BatchVecEnv(
+        ROBOT, TASK, load_scenario("drift_two_lost"), worlds=4, seed=2, told=True, staggered=False
+    )
     env.reset()
     for _ in range(3):
         seen, _, _, _ = env.step(np.ones((4, 8)))
@@ -97,7 +105,8 @@ def test_a_learner_forgets_pushes_and_dead_valves_when_an_episode_begins():
 
 def test_what_a_learner_knows_survives_an_interruption():
     env, other = (
-        BatchVecEnv(ROBOT, TASK, load_scenario("drift_training"), worlds=4, seed=seed, told=True) for seed in (2, 3)
+        BatchVecEnv(ROBOT, TASK, load_scenario("drift_training"), worlds=4, seed=seed, told=True)
+        for seed in (2, 3)
     )
     for each in (env, other):
         each.reset()

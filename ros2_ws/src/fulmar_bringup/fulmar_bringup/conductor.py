@@ -19,7 +19,7 @@ from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, reco
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
-from fulmar_bringup.provenance import fulmar_version, git_revision
+from fulmar_ros.provenance import fulmar_version, git_revision
 from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor

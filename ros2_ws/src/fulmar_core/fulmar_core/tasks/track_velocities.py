@@ -48,7 +48,9 @@ class TrackVelocities:
     fine_velocity: float  # where the magnified velocity error saturates [m/s]
     fine_yaw_rate: float  # same for the turn rate [rad/s]
     reward_weights: VelocityReward
-    turning: float = 0.0  # how fast the direction of a target turns at most, by `STEP_S`; 0: not at all [rad/s]
+    turning: float = (
+        0.0  # how fast the direction of a target turns at most, by `STEP_S`; 0: not at all [rad/s]
+    )
     spin: float = 1.0  # largest turn rate of targets, as a share of the robot's [-]
 
     goal_topic: ClassVar[str] = "goal_velocity"
