@@ -1,7 +1,8 @@
 """Keeps the newest messages in memory, and begins to write when told of a fault. Knows no rclpy.
 
-Each fault gives a file of the bag: what came before it, and what came for a while after. Latched messages that are older
-than the memory, such as the goal, come first in it, at the time where it begins, as a late subscriber would get them.
+Each fault gives a file of the bag: what came before it, and what came for a while after. Latched messages that are
+older than the memory, such as the goal, come first in it, at the time where it begins, as a late subscriber would get
+them.
 """
 
 from __future__ import annotations
