@@ -201,10 +201,10 @@ MOCAP = Wire(
 ESTOP = Wire(
     "estop",
     "std_msgs/msg/Bool",
-    "device",
+    "operator",
     "latched",
-    "on change and at least 5 Hz",
-    "true: stop",
+    "10 Hz, where there is one",
+    "true: nothing may move; so does its silence, once it was heard or where it is required",
 )
 AIR_BEARING = Wire(
     "air_bearing/state",
