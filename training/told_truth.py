@@ -13,7 +13,9 @@ import numpy as np
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 
-LEARNED = 0.35  # share of what is unknown of a push that one control step reveals, as the estimator on average [-]
+LEARNED = (
+    0.35  # share of what is unknown of a push that one control step reveals, as the estimator on average [-]
+)
 ERROR = np.array([0.01, 0.01, 0.002])  # standard deviation of a known push [N, N, N·m]
 
 

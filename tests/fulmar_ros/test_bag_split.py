@@ -24,7 +24,7 @@ def split_bag(folder, **limits) -> BagWriter:
     bag.tick(0.0)
     for number, text in enumerate(WORDS):
         bag.write(TOPIC, word(text), log_ns=START_NS + number * 100_000_000)
-        bag.tick((number + 1) / 10)
+        bag.tick(number / 10)
     return bag
 
 

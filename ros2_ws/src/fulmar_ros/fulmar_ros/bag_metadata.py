@@ -12,6 +12,8 @@ from typing import Any
 import yaml
 
 METADATA_FILE = "metadata.yaml"
+# Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.
+_DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ def write_metadata(
     }
     # A deep copy of its own for each place, because other YAML readers need not know aliases.
     document = {"rosbag2_bagfile_information": _without_sharing(information)}
-    replace_file(directory / METADATA_FILE, yaml.safe_dump(document, sort_keys=False, width=10**6).encode())
+    text = yaml.dump(document, Dumper=_DUMPER, sort_keys=False, width=10**6)
+    replace_file(directory / METADATA_FILE, text.encode())
 
 
 def _times(span: BagSpan) -> dict[str, dict[str, int]]:
