@@ -103,7 +103,7 @@ def test_the_tenth_file_comes_after_the_ninth(tmp_path):
 
 def test_recovery_keeps_whole_files_and_what_can_be_read_of_a_torn_one(bag):
     torn = bag_files(bag)[1]
-    torn.write_bytes(torn.read_bytes()[:-400])
+    torn.write_bytes(torn.read_bytes()[: torn.stat().st_size // 2])
     bag_files(bag)[2].write_bytes(b"")
     (bag / "metadata.yaml").unlink()
 

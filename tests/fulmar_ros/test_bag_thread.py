@@ -136,7 +136,7 @@ def test_on_a_disk_of_256_kb_the_bag_stays_readable_and_goes_on_when_there_is_ro
         ballast = disk / "ballast"
         thread.put(TOPIC, word("word 0"), START_NS)
         wait_until(lambda: thread.account().recorded == 1)
-        ballast.write_bytes(bytes(120_000))
+        ballast.write_bytes(bytes(200_000))
         for number in range(1, 101):
             text = random.Random(number).randbytes(1000).hex()  # does not compress
             thread.put(TOPIC, word(text), START_NS + number)
@@ -148,4 +148,4 @@ def test_on_a_disk_of_256_kb_the_bag_stays_readable_and_goes_on_when_there_is_ro
         assert len(words_by_rosbags(disk / "bag")) == 101
         assert any("the disk is full" in line for line in told)
     finally:
-        subprocess.run(["umount", str(disk)], check=True)
+        subprocess.run(["umount", "--lazy", str(disk)], check=True)

@@ -306,7 +306,7 @@ def test_a_ring_writes_the_run_of_a_controller_that_died(ros_domain: RosDomain, 
     controller = child_running(run, "policy_server.lqr_node")
     time.sleep(10.0)
     controller.kill()
-    out, err = run.communicate(timeout=30.0)
+    _, err = run.communicate(timeout=30.0)
     assert run.returncode == 1, err
     record = read_run(tmp_path / "bag")
     assert len(record.goals) == 1

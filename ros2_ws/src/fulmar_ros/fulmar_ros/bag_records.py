@@ -47,7 +47,7 @@ def bag_files(bag: Path) -> list[Path]:
         raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
     files = sorted(bag.glob("*.mcap"), key=_place)
     if not files:
-        raise BagError(f"{bag}: no .mcap file where a bag folder has one or more. Give a bag folder.")
+        raise BagError(f"{bag}: 0 .mcap files where a bag folder has one or more. Give a bag folder.")
     return files
 
 

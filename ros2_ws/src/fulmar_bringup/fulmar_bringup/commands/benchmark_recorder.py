@@ -119,8 +119,8 @@ def _lockstep(figures: dict[str, Any]) -> str:
 def _kills(figures: dict[str, Any]) -> str:
     missing = figures["missing_at_the_end_s"]
     return (
-        f"{figures['opened_by_rosbags_and_mcap']} of {figures['kills']} bags open, {figures['bags_with_gaps']} with gaps; "
-        f"missing at the end: {missing['median']:.2f} s median, {missing['max']:.2f} s at most"
+        f"{figures['opened_by_rosbags_and_mcap']} of {figures['kills']} bags open, "
+        f"{figures['bags_with_gaps']} with gaps; missing at the end: {missing['median']:.2f} s median, {missing['max']:.2f} s at most"
     )
 
 
