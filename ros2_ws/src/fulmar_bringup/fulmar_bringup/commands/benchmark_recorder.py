@@ -118,10 +118,9 @@ def _lockstep(figures: dict[str, Any]) -> str:
 
 def _kills(figures: dict[str, Any]) -> str:
     missing = figures["missing_at_the_end_s"]
-    return (
-        f"{figures['opened_by_rosbags_and_mcap']} of {figures['kills']} bags open, "
-        f"{figures['bags_with_gaps']} with gaps; missing at the end: {missing['median']:.2f} s median, {missing['max']:.2f} s at most"
-    )
+    ends = f"missing at the end: {missing['median']:.2f} s median, {missing['max']:.2f} s at most"
+    opened, torn = figures["opened_by_rosbags_and_mcap"], figures["bags_with_gaps"]
+    return f"{opened} of {figures['kills']} bags open, {torn} with gaps; {ends}"
 
 
 _WORDS = {"cost": _cost, "loss": _loss, "lockstep": _lockstep, "kills": _kills}
