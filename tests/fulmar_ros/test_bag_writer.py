@@ -77,6 +77,15 @@ def test_a_bag_is_whole_from_its_first_moment_to_its_last(tmp_path):
     assert_readable(folder, 150)
 
 
+def test_a_bag_whose_recorder_died_before_the_first_message_opens_with_its_types(tmp_path):
+    bag = open_bag(tmp_path / "bag")
+    bag.flush()
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert [(c.topic, c.msgtype) for c in reader.connections] == [(TOPIC, TYPE)]
+    with file_of(tmp_path / "bag").open("rb") as stream:
+        assert list(make_reader(stream).iter_messages()) == []
+
+
 def test_metadata_counts_what_is_in_the_bag_after_each_flush(tmp_path):
     folder = tmp_path / "bag"
     bag = open_bag(folder)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
 from mcap.writer import Writer
 
@@ -95,19 +97,29 @@ class BagPart:
         self._mcap.add_metadata(name, dict(record))
 
     def add_topic(self, topic: Topic) -> None:
-        """Announce a topic."""
-        kind = topic.type
+        """Announce a topic; its definition reaches the disk with the next flush, also without a message."""
+        kind, definition = topic.type, topic.type.definition.encode()
+        builder = RecordBuilder()
         if kind.name not in self._schemas:
-            self._schemas[kind.name] = self._mcap.register_schema(
-                kind.name, SchemaEncoding.ROS2, kind.definition.encode()
-            )
-        qos = yaml.safe_dump(offered_qos(topic.delivery), sort_keys=False)
-        self._channels[topic.name] = self._mcap.register_channel(
-            topic.name,
-            MessageEncoding.CDR,
-            self._schemas[kind.name],
-            {"offered_qos_profiles": qos, "topic_type_hash": kind.hash},
-        )
+            number = self._mcap.register_schema(kind.name, SchemaEncoding.ROS2, definition)
+            self._schemas[kind.name] = number
+            Schema(id=number, data=definition, encoding=SchemaEncoding.ROS2, name=kind.name).write(builder)
+        about = {
+            "offered_qos_profiles": yaml.safe_dump(offered_qos(topic.delivery), sort_keys=False),
+            "topic_type_hash": kind.hash,
+        }
+        schema = self._schemas[kind.name]
+        number = self._mcap.register_channel(topic.name, MessageEncoding.CDR, schema, about)
+        self._channels[topic.name] = number
+        Channel(
+            id=number,
+            topic=topic.name,
+            message_encoding=MessageEncoding.CDR,
+            metadata=about,
+            schema_id=schema,
+        ).write(builder)
+        # The writer keeps its own copies for the first chunk, and a chunk without messages is never written.
+        self._file.write(builder.end())
 
     def add(self, topic: str, data: bytes, *, log_ns: int, publish_ns: int, sequence: int) -> None:
         """Add a message; times since the epoch [ns], log times never backwards."""

@@ -73,6 +73,7 @@ class RecorderNode(Node):
         return f"ring: {self._ring.kept_s:.0f} s in memory, {len(self._ring.faults)} faults written{short}"
 
     def _open_bag(self) -> BagWriter:
+        """Make the bag, with its topics."""
         bag = BagWriter(
             self._directory,
             run_info=self._run_info,
@@ -82,6 +83,7 @@ class RecorderNode(Node):
         )
         for wire, topic in self._topics.items():
             bag.add_topic(topic, wire.type, wire.delivery)
+        bag.flush()
         return bag
 
     def _new_ring(self) -> BagRing:
