@@ -87,6 +87,7 @@ def test_what_is_attached_late_is_in_this_file_and_the_following(tmp_path):
 
 def test_a_bag_is_readable_at_every_moment_of_a_split(tmp_path):
     bag = split_bag(tmp_path / "bag", split_s=1.0)
+    bag.flush()
     assert words_by_rosbags(tmp_path / "bag") == words_by_mcap(tmp_path / "bag") == WORDS
     bag.close()
 

@@ -31,14 +31,20 @@ def stamps_by_topic(bag: Path) -> dict[str, list[int]]:
     return stamps
 
 
-def count_by_rosbags(bag: Path) -> int:
-    """Messages that the reader of `rosbags` finds."""
+def opens(bag: Path) -> bool:
+    """Whether the readers of `rosbags` and of `mcap` open a bag and find the same number of messages."""
+    try:
+        return _count_by_rosbags(bag) == _count_by_mcap(bag)
+    except Exception:  # noqa: BLE001 - whatever a reader raises is the finding
+        return False
+
+
+def _count_by_rosbags(bag: Path) -> int:
     with AnyReader([bag]) as reader:
         return sum(1 for _ in reader.messages())
 
 
-def count_by_mcap(bag: Path) -> int:
-    """Messages that the reader of `mcap` finds."""
+def _count_by_mcap(bag: Path) -> int:
     count = 0
     for path in bag_files(bag):
         with path.open("rb") as stream:

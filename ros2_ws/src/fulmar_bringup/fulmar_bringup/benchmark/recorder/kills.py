@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.benchmark.recorder.bag_stamps import count_by_mcap, count_by_rosbags, stamps_by_topic
+from fulmar_bringup.benchmark.recorder.bag_stamps import opens, stamps_by_topic
 from fulmar_bringup.benchmark.recorder.recorders import recorders
 from fulmar_bringup.benchmark.recorder.traffic import EVERY, Traffic, traffic
 from fulmar_bringup.domains import reserved_domains
@@ -64,8 +64,7 @@ def killed(
                 died_s.append(time.monotonic())
             source.stop()
             for recorder, moment_s in zip(alive, died_s, strict=True):
-                count_here = count_by_rosbags(recorder.bag)
-                opened += count_here == count_by_mcap(recorder.bag)
+                opened += opens(recorder.bag)
                 gap, lost_s = _lost(recorder.bag, plan.robot, source, moment_s)
                 torn += gap
                 missing_s.append(lost_s)
