@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.benchmark.recorder.bag_stamps import stamps_by_topic
 from fulmar_bringup.conductor import conduct
 from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.planning import plan_run
+from fulmar_core.errors import RunFailed
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
@@ -40,6 +42,9 @@ def lost_in_lock_step(
 
     Returns:
         Figures by name, ready for JSON.
+
+    Raises:
+        RunFailed: The run did not begin.
     """
     request = plan_run(
         robot=robot,
@@ -59,8 +64,10 @@ def lost_in_lock_step(
         command="fulmar benchmark recorder",
     )
     with reserved_domains(1) as (domain,), in_domain(domain):
-        failure = conduct(replace(request)).failure
-    log_s = read_run(request.record).odom.log_s
+        failure = conduct(request).failure
+    log_s = read_run(request.record).odom.log_s if request.record.exists() else np.empty(0)
+    if len(log_s) < 2:
+        raise RunFailed(f"nothing was recorded: {failure or 'the run said nothing'}.")
     period_ns, steps = round(1e9 / control_hz), round(simulated_s * control_hz)
     expected = {SIMULATION_START_NS + step * period_ns for step in range(steps)}
     stamps = stamps_by_topic(request.record)
