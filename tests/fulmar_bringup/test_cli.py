@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup import cli, provenance
+from fulmar_bringup import cli
 from fulmar_core import policy_bundle
 from fulmar_core.paths import config_directory
+from fulmar_ros import provenance
 from policy_server.shipped import shipped_policy
 
 SHIPPED = str(shipped_policy("floating_platform", "go_to_pose"))

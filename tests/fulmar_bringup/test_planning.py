@@ -10,6 +10,8 @@ import pytest
 
 from fulmar_bringup.planning import plan_run
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.paths import config_directory
+from fulmar_core.recording import Recording
 from policy_server.shipped import shipped_policy
 
 NAN = float("nan")
@@ -163,3 +165,22 @@ def test_commands_rarer_than_the_watchdog_allows_are_refused_in_real_time_alone(
 @pytest.mark.parametrize(("control_hz", "rate"), [(2.5, 1.0), (5.0, 0.1), (1.0, 3.0)])
 def test_commands_that_the_watchdog_allows_are_planned(plan, control_hz, rate):
     assert plan(control_hz=control_hz, rate=rate).plan.rate == rate
+
+
+def test_the_recorder_keeps_everything_unless_asked_otherwise(plan):
+    assert plan().plan.recording.mode == "whole"
+    assert plan(recording="ring").plan.recording.mode == "ring"
+
+
+def test_an_unknown_way_to_record_is_refused_with_the_nearest(plan):
+    with pytest.raises(UnknownNameError, match="Did you mean 'ring'"):
+        plan(recording="rign")
+
+
+def test_the_system_file_says_how_to_record(plan, tmp_path, monkeypatch):
+    shutil.copytree(config_directory(), tmp_path / "configs")
+    with (tmp_path / "configs" / "systems" / "mujoco_lqr.yaml").open("a") as file:
+        file.write("recorder:\n  mode: ring\n  before_fault_s: 10.0\n")
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path / "configs"))
+    assert plan().plan.recording == Recording(mode="ring", before_fault_s=10.0)
+    assert plan(recording="whole").plan.recording == Recording(before_fault_s=10.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ from fulmar_core.topics import (
     Wire,
 )
 from fulmar_ros.bag_metadata import METADATA_FILE
-from fulmar_ros.bag_records import bag_file, read_records
+from fulmar_ros.bag_records import bag_files, read_records
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
 
@@ -64,31 +65,55 @@ def read_run(path: Path) -> RunRecord:
         BagError: There is no bag, it is empty, or Fulmar did not record it.
     """
     path = Path(path)
-    file = bag_file(path)
+    files = bag_files(path)
     warnings: list[str] = []
-    channels: dict[int, tuple[str, str]] = {}  # topic and type
-    schemas: dict[int, str] = {}
-    messages: list[Message] = []
+    decoded: dict[Wire, Decoded] = {wire: [] for wire in READ}
+    topics: set[str] = set()
     info: dict[str, Any] | None = None
-    for record in read_records(file, warnings):
-        if isinstance(record, Message):
-            messages.append(record)
-        elif isinstance(record, Schema):
-            schemas[record.id] = record.name
-        elif isinstance(record, Channel):
-            channels[record.id] = (record.topic, schemas.get(record.schema_id, ""))
-        elif isinstance(record, Metadata) and record.name == RUN_RECORD:
-            info = _json_object(record.metadata.get(RUN_KEY, ""))
-    info = info or _info_beside(file)
+    count = 0
+    for file in files:
+        content = _content(file, warnings, alone=len(files) == 1)
+        info = info or content.info or _info_beside(file)
+        topics |= {topic for topic, _ in content.channels.values()}
+        count += len(content.messages)
+        robot = str((info or {}).get("robot", ""))
+        _decode(robot, content.channels, content.messages, warnings, decoded)
     if info is None:
-        found = ", ".join(sorted(topic for topic, _ in channels.values())[:3]) or "none"
+        found = ", ".join(sorted(topics)[:3]) or "none"
         raise BagError(
-            f"{file}: no recording of Fulmar: lacks '{RUN_RECORD}', topics: {found}. Give a bag of a run."
+            f"{files[0]}: no recording of Fulmar: lacks '{RUN_RECORD}', topics: {found}. Give a bag of a run."
         )
-    decoded = _decode(str(info.get("robot", "")), channels, messages, warnings)
-    if not messages:
-        warnings.append(f"{file.name}: holds no message.")
+    if not count:
+        warnings.append(f"{files[0].name}: holds no message.")
     return _record(path, info, decoded, warnings)
+
+
+@dataclass
+class _Content:
+    """One file, not decoded."""
+
+    channels: dict[int, tuple[str, str]] = field(default_factory=dict)  # topic and type
+    messages: list[Message] = field(default_factory=list)
+    info: dict[str, Any] | None = None
+
+
+def _content(file: Path, warnings: list[str], *, alone: bool) -> _Content:
+    content, schemas = _Content(), dict[int, str]()
+    try:
+        for record in read_records(file, warnings):
+            if isinstance(record, Message):
+                content.messages.append(record)
+            elif isinstance(record, Schema):
+                schemas[record.id] = record.name
+            elif isinstance(record, Channel):
+                content.channels[record.id] = (record.topic, schemas.get(record.schema_id, ""))
+            elif isinstance(record, Metadata) and record.name == RUN_RECORD:
+                content.info = _json_object(record.metadata.get(RUN_KEY, ""))
+    except BagError as error:  # of several files the others tell their part
+        if alone:
+            raise
+        warnings.append(str(error))
+    return content
 
 
 def _info_beside(file: Path) -> dict[str, Any] | None:
@@ -109,10 +134,14 @@ def _json_object(text: str) -> dict[str, Any] | None:
 
 
 def _decode(
-    robot: str, channels: dict[int, tuple[str, str]], messages: Sequence[Message], warnings: list[str]
-) -> dict[Wire, Decoded]:
+    robot: str,
+    channels: dict[int, tuple[str, str]],
+    messages: Sequence[Message],
+    warnings: list[str],
+    decoded: dict[Wire, Decoded],
+) -> None:
+    """Add what one file holds to what is `decoded` already."""
     wires = {wire.name if wire.name.startswith("/") else f"/{robot}/{wire.name}": wire for wire in READ}
-    decoded: dict[Wire, Decoded] = {wire: [] for wire in READ}
     bad: Counter[str] = Counter()
     for message in messages:
         topic, kind = channels.get(message.channel_id, ("", ""))
@@ -127,7 +156,6 @@ def _decode(
         except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; they are counted
             bad[topic] += 1
     warnings += [f"{count} messages of {topic} cannot be read." for topic, count in bad.items() if count]
-    return decoded
 
 
 def _record(path: Path, info: dict[str, Any], decoded: dict[Wire, Decoded], warnings: list[str]) -> RunRecord:

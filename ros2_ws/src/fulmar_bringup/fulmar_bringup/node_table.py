@@ -5,10 +5,12 @@ Both `fulmar run` and `launch/system.launch.py` start exactly what this lists.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
+from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
 from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, load_system
+from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
@@ -46,6 +48,7 @@ class RunPlan:
     rate: float = 1.0  # simulated seconds a wall-clock second
     goals: str = ""  # goal file that a node of its own tells; empty: somebody else gives the goal
     supervised: bool = False  # somebody else activates the plant when all are ready
+    recording: Recording = Recording()
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
@@ -96,18 +99,25 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
     return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", f"/{plan.robot}", parameters)
 
 
-def recorder_spec(
-    plan: RunPlan, *, directory: str = "", run_info: str = "", attachments: str = ""
-) -> NodeSpec:
-    """The node that records; without a directory it makes one under `runs/`."""
-    texts = {"directory": directory, "run_info": run_info, "attachments": attachments}
+def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: str = "") -> NodeSpec:
+    """The node that records.
+
+    Args:
+        plan: What to run.
+        directory: The bag folder; empty: the node makes one under `runs/`.
+        info: As `bag_origin.run_info` gives it.
+        files: As `bag_origin.attachments` gives it.
+    """
+    texts = {"directory": directory, "run_info": info, "attachments": files}
+    usual = asdict(Recording())
+    unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
     return NodeSpec(
         "recorder",
         "fulmar_ros",
         "recorder_node",
         "fulmar_ros.recorder_node",
         f"/{plan.robot}",
-        {key: text for key, text in texts.items() if text},
+        {key: text for key, text in texts.items() if text} | unusual,
     )
 
 
@@ -174,8 +184,9 @@ def list_nodes(
     as_written = chosen == (base.robot, base.task, base.controller, base.backend)
     hz = base.control_hz if as_written else default_control_hz(*chosen)
     load_robot(chosen[0]).timing.substeps(hz)
-    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "")
-    nodes = recorder_spec(plan), plant_spec(plan), controller_spec(plan)
+    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "", recording=base.recorder)
+    recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan, system or "mujoco_policy"))
+    nodes = recorder, plant_spec(plan), controller_spec(plan)
     if not goals:
         return nodes
     checked_goals(goals, load_robot(plan.robot), load_task(plan.task))

@@ -6,19 +6,21 @@ import itertools
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.system import check_names, default_control_hz
+from fulmar_bringup.system import check_names, default_control_hz, system_of
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, read_passport
+from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
@@ -57,6 +59,7 @@ def plan_run(
     record: Path,
     command: str,
     goals: str | None = None,
+    recording: str | None = None,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -78,6 +81,7 @@ def plan_run(
         record: Folder of the bag; must not exist.
         command: Command line.
         goals: Goal file, a name or a path that ends in `.yaml`; its goals come one after another.
+        recording: `whole` or `ring`; the system file's by default.
 
     Returns:
         The request.
@@ -123,6 +127,7 @@ def plan_run(
         lockstep=lockstep,
         rate=rate,
         goals=str(goal_path(goals)) if goals else "",
+        recording=chosen_recording(controller, backend, recording),
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
@@ -198,6 +203,21 @@ def checked_rate(robot: Robot, control_hz: float) -> float:
     except ValueError as error:
         raise ConfigError(f"robot '{robot.name}': {error}") from error
     return control_hz
+
+
+def chosen_recording(controller: str, backend: str, mode: str | None) -> Recording:
+    """What the system file says of the recorder, in another mode where one is given.
+
+    Raises:
+        ConfigError: There is no such mode.
+    """
+    system = system_of(controller, backend)
+    recording = system.recorder if system else Recording()
+    if mode is None:
+        return recording
+    if mode not in MODES:
+        raise UnknownNameError("recording", mode, MODES)
+    return replace(recording, mode=cast(Mode, mode))
 
 
 def check_beat(control_hz: float, rate: float) -> None:

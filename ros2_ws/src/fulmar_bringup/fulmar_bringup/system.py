@@ -11,6 +11,7 @@ from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, 
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_names, config_path
+from fulmar_core.recording import Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
 
@@ -97,6 +98,7 @@ class System:
     controller: str
     backend: str
     control_hz: float  # [Hz]
+    recorder: Recording = Recording()
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at."""

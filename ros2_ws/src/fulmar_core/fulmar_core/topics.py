@@ -12,7 +12,7 @@ from typing import Literal
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 
-Source = Literal["plant", "controller", "operator", "every node"]
+Source = Literal["plant", "controller", "operator", "every node", "device"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
 # Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
@@ -131,7 +131,7 @@ DIAGNOSTICS = Wire(
     "every node",
     "stream",
     "on change and at least 1 Hz",
-    "health of each node: `<robot>: plant`, `<robot>: controller`",
+    "health of each node: `<robot>: plant`, `<robot>: controller`, `<robot>: recorder`",
 )
 GOAL_POSE = Wire(
     "goal_pose",
@@ -190,10 +190,43 @@ VELOCITY_COMMAND = Wire(
     "control rate",
     "for robots that take speed and turn rate: `linear.x` and `angular.z`, stamped as the observation it answers",
 )
+MOCAP = Wire(
+    "mocap/pose",
+    "geometry_msgs/msg/PoseStamped",
+    "device",
+    "best_effort",
+    "as the cameras give it",
+    "pose from motion capture, Z up, stamped at capture",
+)
+ESTOP = Wire(
+    "estop",
+    "std_msgs/msg/Bool",
+    "operator",
+    "latched",
+    "10 Hz, where there is one",
+    "true: nothing may move; so does its silence, once it was heard or where it is required",
+)
+AIR_BEARING = Wire(
+    "air_bearing/state",
+    "std_msgs/msg/Bool",
+    "device",
+    "latched",
+    "on change",
+    "whether the bearing has air",
+)
+TRANSFORMS = Wire(
+    "/tf",
+    "tf2_msgs/msg/TFMessage",
+    "device",
+    "stream",
+    "as its publishers like",
+    "frames, recorded where tf2_msgs is installed; nothing that controls needs them",
+)
 
 WIRES: tuple[Wire, ...] = (
     ODOMETRY,
     IMU,
+    MOCAP,
     TRUTH,
     ACTUATORS_STATE,
     ACTUATORS_HEALTH,
@@ -211,6 +244,9 @@ WIRES: tuple[Wire, ...] = (
     GOAL_VELOCITY,
     OBSTACLES,
     BLOCK,
+    ESTOP,
+    AIR_BEARING,
+    TRANSFORMS,
 )
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

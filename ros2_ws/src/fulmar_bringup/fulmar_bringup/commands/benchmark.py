@@ -5,16 +5,18 @@ from __future__ import annotations
 import typer
 
 from fulmar_bringup.commands.benchmark_drift import drift
+from fulmar_bringup.commands.benchmark_recorder import recorder
 from fulmar_bringup.commands.benchmark_roboran import roboran
 from fulmar_bringup.commands.benchmark_throughput import throughput
 from fulmar_bringup.commands.benchmark_training import training
 
 benchmark = typer.Typer(
-    help="Measure policies, simulators and training beside published figures.",
+    help="Measure policies, simulators, training and recording.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 benchmark.command()(drift)
+benchmark.command()(recorder)
 benchmark.command()(roboran)
 benchmark.command()(throughput)
 benchmark.command()(training)

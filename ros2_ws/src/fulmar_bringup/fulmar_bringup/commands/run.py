@@ -70,6 +70,15 @@ def run(
     record: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the bag; runs/<time>... by default.")
     ] = None,
+    recording: Annotated[
+        str | None,
+        typer.Option(
+            metavar="whole|ring",
+            help="whole: every message. ring: the last 30 s stay in memory and are written only when a fault shows "
+            "(an error of plant or controller, the watchdog, the e-stop), with 5 s after it; without one there is "
+            "no bag and no verdict on the goal, and the exit code is 0. The system file's `recorder:` by default.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
@@ -86,6 +95,8 @@ def run(
     fulmar run turtlebot2 --task go_through_positions --controller classical
 
     fulmar run floating_platform --controller classical --goals circle
+
+    fulmar run floating_platform --controller lqr --duration 3600 --recording ring
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
@@ -112,6 +123,7 @@ def run(
         record=record or default_record(robot, controller),
         command="fulmar " + " ".join(sys.argv[1:]),
         goals=goals,
+        recording=recording,
     )
     require(*modules_of(controller, backend))  # the nodes would fail for want of them one by one
     outcome = conduct(request)
@@ -147,6 +159,8 @@ def told_figure(summary: dict[str, Any], name: str) -> str:
 
 def verdict(summary: dict[str, Any]) -> str:
     """One run in a few lines."""
+    if summary["success"] is None:
+        return f"{summary['controller']}: no fault, so the ring of the recorder was not written; no verdict on the goal"
     reached = "goal met" if summary["success"] else "goal missed"
     latency = summary["latency_ms"]
     told = [words for words in (told_figure(summary, name) for name in TOLD) if words]

@@ -149,7 +149,7 @@ def _resumed(run: Path) -> dict[str, Any]:
 
 
 def _revision() -> str:
-    from fulmar_bringup.provenance import git_revision
+    from fulmar_ros.provenance import git_revision
 
     return git_revision()
 
