@@ -32,12 +32,15 @@ def actuation_of(robot: Robot, safe: Array) -> ActuationState:
 def longest_delay(robot: Robot, scenario: Scenario) -> float:
     """Until the latest command of any world acts [s]."""
     actuation = scenario.actuation
-    return robot.actuators.response.delay_s + actuation.delay_s + actuation.opening_delay_s[1]
+    response = robot.actuators.response
+    own = response.delay_s + response.opening_delay_s
+    return own + actuation.delay_s + actuation.opening_delay_s[1]
 
 
 def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:
     """Whether the centre of mass is beside the body's origin in any world."""
-    return scenario.body == "uncertain" and robot.uncertainty.center_of_mass > 0.0
+    uncertain = scenario.body == "uncertain" and robot.uncertainty.center_of_mass > 0.0
+    return uncertain or any(robot.body.center_of_mass)
 
 
 def control_step(

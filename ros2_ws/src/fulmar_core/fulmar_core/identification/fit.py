@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.identification.drive import Drive
@@ -84,7 +84,7 @@ def fit(model: Model, drives: Sequence[Drive], known: Sequence[Known], *, dt: fl
     search.sigma = sigma
     place = search.run(place)
     deviations, freedom = search.deviations(place)
-    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom)) * deviations
+    reach = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * deviations
     estimates = {
         u.name: Estimate(
             u.name,

@@ -15,7 +15,7 @@ import numpy as np
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.identification.drive import Drive
-from fulmar_core.identification.held_input import mean_over_steps
+from fulmar_core.identification.held_input import for_each_copy, mean_over_steps
 from fulmar_core.identification.model import Unknown, Values, nominal_world
 from fulmar_core.identification.windows import Windows
 from fulmar_core.planar import PlanarState
@@ -97,12 +97,9 @@ class PlatformModel:
 
     def _inputs(self, values: Values, windows: Windows) -> np.ndarray:
         """Wrench of 1 N valves in each step, shape (steps, 3, copies, windows)."""
-        pairs = np.stack((values["delay"][:, 0], values["opening_delay"][:, 0]), axis=1)
-        made: dict[tuple[float, float], np.ndarray] = {}
-        for delay, opening in map(tuple, pairs):
-            if (delay, opening) not in made:
-                made[delay, opening] = self._held(delay, opening, windows)
-        return np.stack([made[delay, opening] for delay, opening in map(tuple, pairs)], axis=2)
+        return for_each_copy(
+            lambda delay, opening: self._held(delay, opening, windows), values["delay"], values["opening_delay"]
+        )
 
     def _held(self, delay: float, opening: float, windows: Windows) -> np.ndarray:
         held = np.zeros((windows.steps, 3, len(windows)))
