@@ -23,6 +23,7 @@ from fulmar_bringup.provenance import fulmar_version, git_revision
 from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor
+from fulmar_core.calibration import calibration_path
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.paths import config_path
@@ -198,11 +199,14 @@ def _recording(request: RunRequest) -> dict[str, str]:
         "start": list(plan.start),
         "goal": list(request.goal) if request.goal else None,
         **_of_goals(plan),
+        "calibration": str(calibration_path() or ""),
         "fulmar_version": fulmar_version(),
         "git_revision": git_revision(),
         "command": request.command,
     }
+    calibration = calibration_path()
     files = {
+        **({"calibration.yaml": calibration} if calibration else {}),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
         "robot.yaml": config_path("robots", plan.robot),
         "task.yaml": config_path("tasks", plan.task),

@@ -20,7 +20,14 @@ DASHED = (0, (4, 3))
 VARIABLES = {INK: "var(--ink)", FAINT: "var(--faint)", PAPER: "var(--paper)"}
 
 # A controller keeps its colour from report to report; each is readable on white and on near-black.
-CONTROLLER_COLOURS = {"policy": "#3b7ddd", "lqr": "#d9780f", "mpc": "#a23b9e", "lqr_drift": "#8a6d3b", "classical": "#1a9e84"}
+CONTROLLER_COLOURS = {
+    "policy": "#3b7ddd",
+    "lqr": "#d9780f",
+    "mpc": "#a23b9e",
+    "lqr_drift": "#8a6d3b",
+    "classical": "#1a9e84",
+    "excite": "#777777",
+}
 OTHER_COLOURS = ("#8d62d9", "#3f9e4d", "#b8860b", "#c2477f", "#5f7a8c")
 
 _RC = {
