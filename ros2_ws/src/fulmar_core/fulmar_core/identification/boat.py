@@ -42,11 +42,11 @@ class BoatModel:
         ]
         for axis, i in DRAGS:
             force, speed = ("N·m", "rad/s") if axis == "yaw" else ("N", "m/s")
+            drags = self._water.linear_damping[i], self._water.quadratic_damping[i]
+            units = f"{force} per {speed}", f"{force} per ({speed})²"
             unknowns += [
-                Unknown(f"{axis}_linear_drag", self._water.linear_damping[i], f"{force} per {speed}", positive=False),
-                Unknown(
-                    f"{axis}_quadratic_drag", self._water.quadratic_damping[i], f"{force} per ({speed})²", positive=False
-                ),
+                Unknown(f"{axis}_{kind}_drag", drag_now, unit, positive=False, scale=max(*drags, 1.0))
+                for kind, drag_now, unit in zip(("linear", "quadratic"), drags, units, strict=True)
             ]
         self.unknowns = tuple(unknowns)
 

@@ -71,9 +71,9 @@ def fit(model: Model, drives: Sequence[Drive], known: Sequence[Known], *, dt: fl
     Raises:
         ConfigError: The runs are too short, or do not tell every unknown.
     """
-    place = np.array([_to_search(model, u.name, u.start) for u in model.unknowns])
-    for each in known:
-        place[_index(model, each.name)] = _to_search(model, each.name, each.value)
+    place = np.array([u.to_search(u.start) for u in model.unknowns])
+    for i, value, _ in (_prior(model, each) for each in known):
+        place[i] = value
     sigma = np.array([noise[0], noise[0], noise[1]])
     longest = max(drive.duration_s for drive in drives)
     spans = [span for span in model.spans_s if span <= longest] or [model.spans_s[0]]
@@ -88,7 +88,7 @@ def fit(model: Model, drives: Sequence[Drive], known: Sequence[Known], *, dt: fl
     estimates = {
         u.name: Estimate(
             u.name,
-            *(float(_from_search(model, i, place[i] + sign * reach[i])) for sign in (0.0, -1.0, 1.0)),
+            *(float(u.from_search(place[i] + sign * reach[i])) for sign in (0.0, -1.0, 1.0)),
             u.unit,
         )
         for i, u in enumerate(model.unknowns)
@@ -103,9 +103,7 @@ class _Search:
         self.model, self.windows, self.sigma = model, windows, sigma
         self._own = model.own_of(windows.first_states())
         self._weight = windows.valid[:, :, None] * np.ones(3)
-        self._prior = [
-            (_index(model, k.name), _to_search(model, k.name, k.value), _relative(model, k)) for k in known
-        ]
+        self._prior = [_prior(model, each) for each in known]
 
     def run(self, place: np.ndarray) -> np.ndarray:
         """Search from `place`; returns where the cost is least."""
@@ -228,7 +226,7 @@ class _Search:
     def _residuals(self, places: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Same for copies: places (p, copies), own (q, copies, w)."""
         values = {
-            u.name: _from_search(self.model, i, places[i])[:, None] for i, u in enumerate(self.model.unknowns)
+            u.name: u.from_search(places[i])[:, None] for i, u in enumerate(self.model.unknowns)
         }
         with np.errstate(over="ignore", invalid="ignore"):
             grid = self.model.predict(values, own, self.windows)
@@ -260,13 +258,9 @@ def _index(model: Model, name: str) -> int:
     return next(i for i, u in enumerate(model.unknowns) if u.name == name)
 
 
-def _to_search(model: Model, name: str, value: float) -> float:
-    return float(np.log(value)) if model.unknowns[_index(model, name)].positive else value
-
-
-def _from_search(model: Model, index: int, place: np.ndarray) -> np.ndarray:
-    return np.exp(place) if model.unknowns[index].positive else place
-
-
-def _relative(model: Model, known: Known) -> float:
-    return known.std / known.value if model.unknowns[_index(model, known.name)].positive else known.std
+def _prior(model: Model, known: Known) -> tuple[int, float, float]:
+    """Which unknown a known quantity is, and its value and standard deviation as the fit works with them."""
+    i = _index(model, known.name)
+    unknown = model.unknowns[i]
+    size = known.value if unknown.positive else unknown.scale
+    return i, unknown.to_search(known.value), known.std / size

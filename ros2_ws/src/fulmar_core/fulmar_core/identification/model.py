@@ -25,6 +25,15 @@ class Unknown:
     start: float  # where the search begins; the nominal value
     unit: str
     positive: bool = True  # searched by its logarithm: it has a size, and so has its relative error
+    scale: float = 1.0  # its usual size, for one that may be 0 or less
+
+    def to_search(self, value: float) -> float:
+        """The number that the fit works with."""
+        return float(np.log(value)) if self.positive else value / self.scale
+
+    def from_search(self, place: np.ndarray) -> np.ndarray:
+        """Values of such numbers."""
+        return np.exp(place) if self.positive else place * self.scale
 
 
 @dataclass(frozen=True)
