@@ -14,7 +14,13 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.progress import ProgressFile, Watcher
-from training.run_folder import CALIBRATION_FILE, CHECKPOINT_FILE, PROGRESS_FILE, read_run_record, write_run_record
+from training.run_folder import (
+    CALIBRATION_FILE,
+    CHECKPOINT_FILE,
+    PROGRESS_FILE,
+    read_run_record,
+    write_run_record,
+)
 from training.settings import TrainingSettings
 from training.train import check_seed, train
 

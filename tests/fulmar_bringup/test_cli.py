@@ -76,7 +76,10 @@ RUN = ["run", "floating_platform"]
             "the targets of task 'race_waypoints' cannot be said in one --goal",
         ),
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
-        ([*RUN, "--controller", "pid"], "unknown controller 'pid'. Known: classical, excite, lqr, lqr_drift, mpc, policy."),
+        (
+            [*RUN, "--controller", "pid"],
+            "unknown controller 'pid'. Known: classical, excite, lqr, lqr_drift, mpc, policy.",
+        ),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         ([*RUN, "--backend", "hardware"], "there is no hardware driver for 'floating_platform'"),
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),

@@ -96,9 +96,7 @@ CONTROLLERS = {
     "classical": ControllerEntry(
         f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
     ),
-    "excite": ControllerEntry(
-        Excite.title, "excite_node", _load_excite, _check_excite, strives=False
-    ),
+    "excite": ControllerEntry(Excite.title, "excite_node", _load_excite, _check_excite, strives=False),
 }
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")

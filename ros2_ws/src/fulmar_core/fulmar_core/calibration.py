@@ -1,7 +1,7 @@
 """What was measured on one machine, in place of what the YAML of its kind says.
 
-`fulmar identify` writes such a file; `--calibration FILE` of `run`, `evaluate` and `train` puts it to use. It travels in
-the environment variable FULMAR_CALIBRATION, so that every process of a run loads the same robot: the simulator, the
+`fulmar identify` writes such a file; `--calibration FILE` of `run`, `evaluate` and `train` puts it to use. It travels
+in the environment variable FULMAR_CALIBRATION, so that every process of a run loads the same robot: the simulator, the
 controllers that compute with its mass, and the workers of a training.
 """
 
@@ -23,7 +23,11 @@ if TYPE_CHECKING:
     from fulmar_core.robot import Robot
 
 VARIABLE = "FULMAR_CALIBRATION"
-DRAGS = (("surge", 0), ("sway", 1), ("yaw", 5))  # axes, and where each stands among the six of `Hydrodynamics`
+DRAGS = (
+    ("surge", 0),
+    ("sway", 1),
+    ("yaw", 5),
+)  # axes, and where each stands among the six of `Hydrodynamics`
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
     for name, found in calibration.measured.items():
         document[name] = {part: float(f"{getattr(found, part):.7g}") for part in ("value", "low", "high")}
     path.parent.mkdir(parents=True, exist_ok=True)
-    head = "# Made by `fulmar identify`. Use it with: --calibration FILE. Intervals are of 95 % confidence, in SI units.\n"
+    head = "# Made by `fulmar identify`; use it with --calibration. SI units, intervals of 95 % confidence.\n"
     path.write_text(head + yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
 
 
@@ -107,7 +111,9 @@ def use_calibration(path: Path | None, robot: str) -> None:
 
     calibration = load_calibration(path)
     if calibration.robot != robot:
-        raise ConfigError(f"{path} is for '{calibration.robot}', not for '{robot}'. Identify '{robot}' first.")
+        raise ConfigError(
+            f"{path} is for '{calibration.robot}', not for '{robot}'. Identify '{robot}' first."
+        )
     os.environ.pop(VARIABLE, None)
     calibrated(load_robot(robot), calibration)
     os.environ[VARIABLE] = str(path.absolute())
@@ -178,7 +184,9 @@ def _body(robot: Robot, calibration: Calibration) -> Robot:
         body = replace(body, inertia=(roll, pitch, yaw))
         spans = replace(spans, yaw_inertia=(inertia.low, inertia.high))
     if cx and cy:
-        reach = (max(cx.high - cx.value, cx.value - cx.low) ** 2 + max(cy.high - cy.value, cy.value - cy.low) ** 2) ** 0.5
+        reach = (
+            max(cx.high - cx.value, cx.value - cx.low) ** 2 + max(cy.high - cy.value, cy.value - cy.low) ** 2
+        ) ** 0.5
         body = replace(body, center_of_mass=(cx.value, cy.value))
         spans = replace(spans, center_of_mass=reach)
     return replace(robot, body=body, uncertainty=spans)
@@ -213,5 +221,7 @@ def _actuators(robot: Robot, calibration: Calibration) -> Robot:
     if calibration.thrust and isinstance(actuators, Thrusters):
         factor = calibration.thrust.value / actuators.thrust
         actuators = replace(actuators, thrust=calibration.thrust.value)
-        performance = replace(performance, force=factor * performance.force, torque=factor * performance.torque)
+        performance = replace(
+            performance, force=factor * performance.force, torque=factor * performance.torque
+        )
     return replace(robot, actuators=replace(actuators, response=response), performance=performance)

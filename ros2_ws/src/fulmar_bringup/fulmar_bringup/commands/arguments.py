@@ -28,7 +28,9 @@ ScenarioOption = Annotated[
 CalibrationOption = Annotated[
     Path | None,
     typer.Option(
-        "--calibration", metavar="FILE", help="What `fulmar identify` measured on this robot, instead of its YAML."
+        "--calibration",
+        metavar="FILE",
+        help="What `fulmar identify` measured on this robot, instead of its YAML.",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

@@ -25,10 +25,12 @@ def identify(
     ] = "floating_platform",
     seed: SeedOption = 1,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", min=10.0, help="Length of each run; the usual of its family by default.")
+        float | None,
+        typer.Option(metavar="S", min=10.0, help="Length of each run; the usual of its family by default."),
     ] = None,
     bags: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Keep the bags and truths here; they are thrown away by default.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep the bags and truths here; they are thrown away by default."),
     ] = None,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Processes at once; one for each core.")
@@ -61,7 +63,9 @@ def identify(
     trials = [Trial(name, number, seed, duration, bags) for name in names for number in range(platforms)]
     with work_bar("driving") as progress:
         results = run_identification(
-            trials, jobs=jobs or len(os.sched_getaffinity(0)), on_done=lambda done, total: progress(done, total)
+            trials,
+            jobs=jobs or len(os.sched_getaffinity(0)),
+            on_done=lambda done, total: progress(done, total),
         )
     document = document_of(results, seed=seed)
     if as_json:
@@ -78,7 +82,10 @@ def _print(document: dict[str, Any]) -> None:
         for column in ("", "machines", "mean", "worst", "worst", "95 % interval", "inside"):
             table.add_column(column, justify="left" if not column else "right")
         for name, f in figures.items():
-            percent = ["–" if f[k] is None else f"{f[k]:.2f} %" for k in ("mean_error_percent", "worst_error_percent")]
+            percent = [
+                "–" if f[k] is None else f"{f[k]:.2f} %"
+                for k in ("mean_error_percent", "worst_error_percent")
+            ]
             unit = f["unit"]
             table.add_row(
                 name,

@@ -21,14 +21,17 @@ def identify(
     bags: Annotated[list[Path], typer.Argument(metavar="BAG...", help="Driven runs of one robot.")],
     known: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE+-ERROR", help="A quantity that was measured, such as mass=5.32+-0.02."),
+        typer.Option(
+            metavar="NAME=VALUE+-ERROR", help="A quantity that was measured, such as mass=5.32+-0.02."
+        ),
     ] = None,
     ballast: Annotated[
         list[str] | None,
         typer.Option(metavar="BAG=KG+-KG", help="A weight that was aboard during one of the runs, anywhere."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a calibration for --calibration of run, evaluate, train.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a calibration for --calibration of run, evaluate, train."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -108,9 +111,7 @@ def _loads(bags: list[Path], ballast: list[str]) -> tuple[list[int], dict[int, t
         name, mass, error = _read(text, "--ballast", "runs/heavy=2.0+-0.005")
         place = places.get(Path(name).resolve())
         if place is None:
-            raise ConfigError(
-                f"--ballast {text}: '{name}' is none of the bags: {', '.join(map(str, bags))}."
-            )
+            raise ConfigError(f"--ballast {text}: '{name}' is none of the bags: {', '.join(map(str, bags))}.")
         if loads[place]:
             raise ConfigError(f"--ballast: '{name}' is named twice; add the masses up.")
         loads[place], ballasts[number] = number, (mass, error)

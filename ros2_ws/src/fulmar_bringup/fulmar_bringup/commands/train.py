@@ -93,9 +93,13 @@ def train(
         raise ConfigError(f"--executor {executor}: must be local or ray.")
     if calibration is not None:
         if resume:
-            raise ConfigError("--resume goes on with the calibration that the run began with; leave --calibration out.")
+            raise ConfigError(
+                "--resume goes on with the calibration that the run began with; leave --calibration out."
+            )
         if executor == "ray":
-            raise ConfigError("--calibration is a file of this machine; --executor ray does not carry it. Use local.")
+            raise ConfigError(
+                "--calibration is a file of this machine; --executor ray does not carry it. Use local."
+            )
         use_calibration(calibration, robot or "")
     job = Job(
         name="",

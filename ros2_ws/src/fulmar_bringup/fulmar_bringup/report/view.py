@@ -13,7 +13,14 @@ from fulmar_bringup.run_judgement import Judgement, judge
 from fulmar_bringup.run_record import RunRecord
 from fulmar_bringup.run_summary import latencies_ms, summarise
 
-SPOKEN = {"lqr": "LQR", "mpc": "MPC", "lqr_drift": "DRIFT's LQR", "policy": "policy", "classical": "classical law", "excite": "excitation"}
+SPOKEN = {
+    "lqr": "LQR",
+    "mpc": "MPC",
+    "lqr_drift": "DRIFT's LQR",
+    "policy": "policy",
+    "classical": "classical law",
+    "excite": "excitation",
+}
 
 
 @dataclass(frozen=True)

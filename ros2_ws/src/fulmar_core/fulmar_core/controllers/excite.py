@@ -1,7 +1,7 @@
 """Commands that make a robot tell what it is: random, and yet it stays where it is allowed to be.
 
-A run that identifies a model needs every actuator at work, in changing company and for changing times; a controller that
-reaches its goal and stops tells little. Random commands alone let a body without friction drift away. Here several
+A run that identifies a model needs every actuator at work, in changing company and for changing times; a controller
+that reaches its goal and stops tells little. Random commands alone let a body without friction drift away. Here several
 random commands are drawn each time, the core predicts where each would lead, and the one that leads back best is taken:
 few candidates near the goal, which leaves most of the randomness, more of them farther out.
 """
@@ -92,7 +92,8 @@ class Excite(Law):
         room = how.room * self.robot.limits.geofence
         share = np.minimum(np.hypot(x, y) / room, 1.0) ** 2
         allowed = how.near + np.floor((how.far - how.near) * share)  # candidates, shape (rows,)
-        candidates = self._drawn(how.far * count)
+        # The same ones for every row, so that a row's answer does not depend on its neighbours.
+        candidates = np.repeat(self._drawn(how.far), count, axis=0)
         before = PlanarState(*(np.tile(part, how.far) for part in (-x, -y, 0.0 * x, u, v, r)))
         safe = np.tile(self.reader.previous(rows), (how.far, 1)).T
         actuation = actuation_of(self.robot, safe)

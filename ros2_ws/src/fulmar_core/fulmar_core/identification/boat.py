@@ -20,7 +20,6 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 
 
-
 class BoatModel:
     """Unknowns: mass, yaw inertia, delay, linear and quadratic drag of surge, sway and yaw."""
 

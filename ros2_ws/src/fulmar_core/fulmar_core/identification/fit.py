@@ -55,7 +55,9 @@ class Fit:
     windows: int
 
 
-def fit(model: Model, drives: Sequence[Drive], known: Sequence[Known], *, dt: float, noise: tuple[float, float]) -> Fit:
+def fit(
+    model: Model, drives: Sequence[Drive], known: Sequence[Known], *, dt: float, noise: tuple[float, float]
+) -> Fit:
     """Estimate a model's unknowns.
 
     Args:
@@ -225,9 +227,7 @@ class _Search:
 
     def _residuals(self, places: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Same for copies: places (p, copies), own (q, copies, w)."""
-        values = {
-            u.name: u.from_search(places[i])[:, None] for i, u in enumerate(self.model.unknowns)
-        }
+        values = {u.name: u.from_search(places[i])[:, None] for i, u in enumerate(self.model.unknowns)}
         with np.errstate(over="ignore", invalid="ignore"):
             grid = self.model.predict(values, own, self.windows)
         return np.asarray((self.windows.pose - self.windows.at_measurements(grid)) / self.sigma)

@@ -33,7 +33,9 @@ def mean_over_steps(
     edges = begin_s[None, :] + dt * np.arange(steps + 1)[:, None]  # (steps + 1, w)
     end = max(float(edges.max()), float(knots[-1])) + 1.0
     knots = np.append(knots, end)
-    integral = np.concatenate((np.zeros((1, rates.shape[1])), np.cumsum(rates * np.diff(knots)[:, None], axis=0)))
+    integral = np.concatenate(
+        (np.zeros((1, rates.shape[1])), np.cumsum(rates * np.diff(knots)[:, None], axis=0))
+    )
     at_edges = np.stack(
         [np.interp(edges, knots, integral[:, c], left=0.0) for c in range(integral.shape[1])], axis=1
     )
@@ -75,9 +77,7 @@ def followed(windows: Windows, delay: float, slew: tuple[float, ...]) -> np.ndar
     return np.concatenate(parts, axis=2)
 
 
-def for_each_copy(
-    make: Callable[..., np.ndarray], *columns: np.ndarray
-) -> np.ndarray:
+def for_each_copy(make: Callable[..., np.ndarray], *columns: np.ndarray) -> np.ndarray:
     """Inputs of all copies of a fit; most copies share theirs, which is made once.
 
     Args:

@@ -40,7 +40,11 @@ class Identified:
 
 
 def identify(
-    robot: Robot, drives: Sequence[Drive], *, known: Sequence[Known] = (), ballasts: Mapping[int, Weight] | None = None
+    robot: Robot,
+    drives: Sequence[Drive],
+    *,
+    known: Sequence[Known] = (),
+    ballasts: Mapping[int, Weight] | None = None,
 ) -> Identified:
     """Estimate everything that a robot's runs tell.
 
@@ -107,7 +111,9 @@ def _prepared(
         )
         return model, scale, False, known
     if ballasts:
-        raise ConfigError(f"--ballast is for robots with thrusters; '{robot.name}' has {robot.actuators.kind}.")
+        raise ConfigError(
+            f"--ballast is for robots with thrusters; '{robot.name}' has {robot.actuators.kind}."
+        )
     if isinstance(robot.actuators, Propellers) and robot.hydrodynamics is not None:
         scale = "mass, inertia and drag rest on the thrust curve of the robot's YAML"
         return BoatModel(robot), scale, True, known

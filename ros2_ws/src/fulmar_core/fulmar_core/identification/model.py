@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
+from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.disturbances.world import World
-from fulmar_core.counter_rng import Draws
 from fulmar_core.identification.windows import Windows
 from fulmar_core.robot import Robot
 

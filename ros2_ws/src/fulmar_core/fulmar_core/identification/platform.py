@@ -75,7 +75,8 @@ class PlatformModel:
             (values[ballast_name(each)] * (load == each) for each in self._loads), np.zeros(len(load))
         )
         inertia, cx, cy = (
-            self._by_load(values, name, load) for name in ("yaw_inertia", "center_of_mass_x", "center_of_mass_y")
+            self._by_load(values, name, load)
+            for name in ("yaw_inertia", "center_of_mass_x", "center_of_mass_y")
         )
         inputs = self._inputs(values, windows) * values["thrust"]
         world = nominal_world(self._robot, mass=mass, yaw_inertia=inertia)
@@ -98,7 +99,9 @@ class PlatformModel:
     def _inputs(self, values: Values, windows: Windows) -> np.ndarray:
         """Wrench of 1 N valves in each step, shape (steps, 3, copies, windows)."""
         return for_each_copy(
-            lambda delay, opening: self._held(delay, opening, windows), values["delay"], values["opening_delay"]
+            lambda delay, opening: self._held(delay, opening, windows),
+            values["delay"],
+            values["opening_delay"],
         )
 
     def _held(self, delay: float, opening: float, windows: Windows) -> np.ndarray:

@@ -44,7 +44,9 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
     episode = draw_episode(nominal, task, load_scenario("nominal"), seed=seed, number=0)
     zero = np.asarray(0.0)
     goal = replace(episode.goal, targets=np.zeros_like(episode.goal.targets))
-    sample = backend.reset(Episode(at_rest(zero, zero, zero), goal, _world(machine, leg, episode.world)), seed=seed)
+    sample = backend.reset(
+        Episode(at_rest(zero, zero, zero), goal, _world(machine, leg, episode.world)), seed=seed
+    )
     goals, command = stack_goals([goal]), nominal.actuators.safe_command
     dt, substeps = nominal.timing.physics_dt, nominal.timing.substeps(controller.control_hz)
     with SampleBag(folder, nominal) as bag:
