@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from fulmar_bringup.commands.arguments import JsonOption, SeedOption
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
@@ -61,12 +61,21 @@ def identify(
         if name not in ROBOTS:
             raise UnknownNameError("robot to identify", name, ROBOTS)
     trials = [Trial(name, number, seed, duration, bags) for name in names for number in range(platforms)]
-    with work_bar("driving") as progress:
-        results = run_identification(
-            trials,
-            jobs=jobs or len(os.sched_getaffinity(0)),
-            on_done=lambda done, total: progress(done, total),
+    done = 0
+
+    def tell(result: dict[str, Any]) -> None:
+        nonlocal done
+        done += 1
+        progress(done, len(trials))
+        worst = ", ".join(
+            f"{name} {'–' if q['error_percent'] is None else format(q['error_percent'], '.2f')} %"
+            f"{'' if q['inside'] else ' (outside)'}"
+            for name, q in result["quantities"].items()
         )
+        console.print(f"{result['robot']} {result['number']}: {worst}", markup=False, soft_wrap=True)
+
+    with work_bar("driving") as progress:
+        results = run_identification(trials, jobs=jobs or len(os.sched_getaffinity(0)), on_done=tell)
     document = document_of(results, seed=seed)
     if as_json:
         print_json(document)

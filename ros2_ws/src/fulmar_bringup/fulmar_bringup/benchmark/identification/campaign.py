@@ -20,21 +20,21 @@ PLATFORM = "floating_platform"
 
 
 def run_identification(
-    trials: Sequence[Trial], *, jobs: int, on_done: Callable[[int, int], None] = lambda done, total: None
+    trials: Sequence[Trial], *, jobs: int, on_done: Callable[[dict[str, Any]], None] = lambda result: None
 ) -> list[dict[str, Any]]:
     """Run trials in processes of their own; results in the order of the trials.
 
     Args:
         trials: What to do.
         jobs: Processes at once.
-        on_done: Told how many are done, of how many.
+        on_done: Given each result as it comes.
     """
     results: dict[int, dict[str, Any]] = {}
     with _one_thread(), ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         futures = {pool.submit(run_trial, trial): i for i, trial in enumerate(trials)}
         for future in as_completed(futures):
             results[futures[future]] = future.result()
-            on_done(len(results), len(trials))
+            on_done(future.result())
     return [results[i] for i in range(len(trials))]
 
 
