@@ -42,7 +42,7 @@ def test_headings_do_not_jump_at_a_half_turn():
 
 
 def test_a_run_that_is_too_short_is_refused_with_what_to_do():
-    with pytest.raises(ConfigError, match="the longest of 1 runs has 1.0 s; at least 4 s") as told:
+    with pytest.raises(ConfigError, match=r"the longest of 1 runs has 1\.0 s; at least 4 s") as told:
         cut([drive(np.linspace(0.0, 1.0, 50))], length_s=4.0, dt=0.02)
     assert "--controller excite" in str(told.value)
 
