@@ -94,7 +94,7 @@ def move(
             state = rolling_step(state, target, actuation.gain, outside, world, robot.actuators, dt)
         return state
     if off_centre:
-        state = _moved(state, world, 1.0)
+        state = to_center(state, world)
     push: Wrench | None = None
     doing: Array = None
     for _ in range(substeps):
@@ -106,10 +106,10 @@ def move(
                 ahead, left, moment = push
                 push = ahead, left, moment - (world.com_x * left - world.com_y * ahead)
         state = free_body_step(state, push, outside, world, robot.hydrodynamics, dt)
-    return _moved(state, world, -1.0) if off_centre else state
+    return to_center(state, world, -1.0) if off_centre else state
 
 
-def _moved(state: PlanarState, world: World, sign: float) -> PlanarState:
+def to_center(state: PlanarState, world: World, sign: float = 1.0) -> PlanarState:
     """State of the centre of mass from that of the origin (+1), or back (-1)."""
     xp = array_namespace(state.x)
     c, s = xp.cos(state.yaw), xp.sin(state.yaw)

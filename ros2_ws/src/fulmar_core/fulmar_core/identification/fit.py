@@ -184,7 +184,7 @@ class _Search:
         count = slopes.shape[0]
         whole, pull = np.zeros((count, count)), np.zeros(count)
         for w in range(len(self.windows)):
-            a, _, r = self._projected(residual, slopes, own_slopes, w)
+            a, r = self._projected(residual, slopes, own_slopes, w)
             whole += a @ a.T
             pull += a @ r
         for i, value, std in self._prior:
@@ -193,31 +193,34 @@ class _Search:
         return whole, pull
 
     def _pull(self, residual: np.ndarray, slopes: np.ndarray, own_slopes: np.ndarray, w: int) -> np.ndarray:
-        a, _, r = self._projected(residual, slopes, own_slopes, w)
+        a, r = self._projected(residual, slopes, own_slopes, w)
         return np.asarray(a @ r)
 
     def _projected(
         self, residual: np.ndarray, slopes: np.ndarray, own_slopes: np.ndarray, w: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Slopes (p, n) and residual (n,) of one window, free of what its own numbers can explain."""
-        root = np.sqrt(self._weight[w] * _robust(residual[w])).ravel()
-        a = slopes[:, w].reshape(len(slopes), -1) * root
-        b = own_slopes[:, w].reshape(len(own_slopes), -1) * root
-        r = residual[w].ravel() * root
+        a, b, r = self._weighted(residual, slopes, own_slopes, w)
         q, upper = np.linalg.qr(b.T)
         full = np.abs(np.diag(upper)) > 1e-9 * np.abs(np.diag(upper)).max()
         q = q[:, full]
-        return a - (a @ q) @ q.T, b, r - q @ (q.T @ r)
+        return a - (a @ q) @ q.T, r - q @ (q.T @ r)
+
+    def _weighted(
+        self, residual: np.ndarray, slopes: np.ndarray, own_slopes: np.ndarray, w: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Slopes (p, n), own slopes (q, n) and residual (n,) of one window; padding and outliers weigh little."""
+        root = np.sqrt(self._weight[w] * _robust(residual[w])).ravel()
+        a = slopes[:, w].reshape(len(slopes), -1) * root
+        b = own_slopes[:, w].reshape(len(own_slopes), -1) * root
+        return a, b, residual[w].ravel() * root
 
     def _own_step(
         self, residual: np.ndarray, slopes: np.ndarray, own_slopes: np.ndarray, step: np.ndarray
     ) -> np.ndarray:
         change = np.zeros_like(self._own)
         for w in range(len(self.windows)):
-            root = np.sqrt(self._weight[w] * _robust(residual[w])).ravel()
-            a = slopes[:, w].reshape(len(slopes), -1) * root
-            b = own_slopes[:, w].reshape(len(own_slopes), -1) * root
-            r = residual[w].ravel() * root
+            a, b, r = self._weighted(residual, slopes, own_slopes, w)
             change[:, w] = np.linalg.lstsq(b.T, r - step @ a, rcond=1e-9)[0]
         return change
 

@@ -18,6 +18,7 @@ from fulmar_core.identification.drive import Drive
 from fulmar_core.identification.held_input import for_each_copy, mean_over_steps
 from fulmar_core.identification.model import Unknown, Values, nominal_world
 from fulmar_core.identification.windows import Windows
+from fulmar_core.motion import to_center
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 
@@ -79,13 +80,13 @@ class PlatformModel:
             for name in ("yaw_inertia", "center_of_mass_x", "center_of_mass_y")
         )
         inputs = self._inputs(values, windows) * values["thrust"]
-        world = nominal_world(self._robot, mass=mass, yaw_inertia=inertia)
+        world = nominal_world(self._robot, mass=mass, yaw_inertia=inertia, com_x=cx, com_y=cy)
         # Pushes are fitted as accelerations: a sloping floor gives the same one whatever the mass.
         outside = own[6] * mass, own[7] * mass, own[8] * inertia
-        state = _moved(PlanarState(*own[:6]), cx, cy, 1.0)
+        state = to_center(PlanarState(*own[:6]), world)
         poses = np.empty((windows.steps + 1, 3, *own.shape[1:]))
         for step in range(windows.steps + 1):
-            origin = _moved(state, cx, cy, -1.0)
+            origin = to_center(state, world, -1.0)
             poses[step] = origin.x, origin.y, origin.yaw
             if step < windows.steps:
                 ahead, left, moment = inputs[step]
@@ -130,9 +131,3 @@ class PlatformModel:
         wrench = self._thrusters.planar_wrench(command.T, np.ones_like(command.T))
         return np.stack(wrench, axis=1) / self._thrusters.thrust
 
-
-def _moved(state: PlanarState, cx: np.ndarray, cy: np.ndarray, sign: float) -> PlanarState:
-    """State of the centre of mass from that of the origin (+1), or back (-1)."""
-    c, s, r = np.cos(state.yaw), np.sin(state.yaw), state.yaw_rate
-    dx, dy = sign * (c * cx - s * cy), sign * (s * cx + c * cy)
-    return PlanarState(state.x + dx, state.y + dy, state.yaw, state.vx - r * dy, state.vy + r * dx, r)
