@@ -61,6 +61,6 @@ def run_trial(trial: Trial) -> dict[str, Any]:
             "high": e.high,
             "unit": e.unit,
             "error_percent": 100.0 * abs(e.value / truth - 1.0) if truth else None,
-            "inside": e.low <= truth <= e.high,
+            "inside": bool(e.low <= truth <= e.high),
         }
     return {"robot": trial.robot, "number": trial.number, "quantities": quantities}
