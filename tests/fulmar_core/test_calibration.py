@@ -24,7 +24,7 @@ from fulmar_core.robot import load_robot
 
 
 def near(value, width=0.01):
-    return Measured(value, value - width, value + width)
+    return Measured(value, round(value - width, 6), round(value + width, 6))
 
 
 PLATFORM = Calibration(
