@@ -23,7 +23,7 @@ from fulmar_core.tasks import load_task
 PLATFORM, BOAT, BASE = (load_robot(name) for name in ("floating_platform", "kingfisher", "turtlebot2"))
 
 
-def driven(true, nominal, *, duration_s=60.0, seed=1, load=0, spoil=None):
+def driven(true, nominal, *, duration_s=120.0, seed=1, load=0, spoil=None):
     """A run of a true robot under excitation by somebody who knows the nominal one."""
     simulation = BatchSimulation(
         true, load_task("go_to_position"), load_scenario("nominal"), worlds=1, seed=seed, dtype=np.float64

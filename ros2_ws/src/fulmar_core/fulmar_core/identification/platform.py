@@ -130,4 +130,3 @@ class PlatformModel:
         """Forces and moment if one open valve gave 1 N, shape (k, 3)."""
         wrench = self._thrusters.planar_wrench(command.T, np.ones_like(command.T))
         return np.stack(wrench, axis=1) / self._thrusters.thrust
-
