@@ -18,6 +18,7 @@ PROGRAMS = {
     "fulmar_ros/recorder_node": "fulmar_ros.recorder_node",
     "policy_server/classical_node": "policy_server.classical_node",
     "policy_server/lqr_drift_node": "policy_server.lqr_drift_node",
+    "policy_server/excite_node": "policy_server.excite_node",
     "policy_server/lqr_node": "policy_server.lqr_node",
     "policy_server/mpc_node": "policy_server.mpc_node",
     "policy_server/policy_node": "policy_server.policy_node",

@@ -9,6 +9,7 @@ import pytest
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.node_table import RunPlan, list_nodes, recorder_spec
+from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
 from fulmar_core.recording import Recording
 
 LQR = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
@@ -45,6 +46,18 @@ def test_the_given_bundle_goes_before_the_shipped_one(tmp_path):
 )
 def test_the_law_of_a_family_carries_its_gains(robot, file):
     assert names(RunPlan(robot, "go_to_pose", "classical", "mock", 10.0))["controller.yaml"] == file
+
+
+def test_a_calibration_in_use_is_carried_and_named(tmp_path, monkeypatch):
+    calibration = tmp_path / "measured.yaml"
+    save_calibration(Calibration("floating_platform", mass=Measured(5.3, 5.2, 5.4)), calibration)
+    monkeypatch.setenv(VARIABLE, str(calibration))
+    assert names(LQR)["calibration.yaml"] == "measured.yaml"
+    assert json.loads(run_info(LQR))["calibration"] == str(calibration)
+
+
+def test_an_excited_run_has_no_gains_to_carry():
+    assert "controller.yaml" not in names(RunPlan("turtlebot2", "go_to_pose", "excite", "mujoco", 10.0))
 
 
 def test_a_launched_system_says_as_much_as_a_run():

@@ -77,7 +77,10 @@ RUN = ["run", "floating_platform"]
             "the targets of task 'race_waypoints' cannot be said in one --goal",
         ),
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
-        ([*RUN, "--controller", "pid"], "unknown controller 'pid'. Known: classical, lqr, lqr_drift, mpc, policy."),
+        (
+            [*RUN, "--controller", "pid"],
+            "unknown controller 'pid'. Known: classical, excite, lqr, lqr_drift, mpc, policy.",
+        ),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         ([*RUN, "--backend", "hardware"], "there is no hardware driver for 'floating_platform'"),
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),
@@ -278,7 +281,7 @@ def test_the_list_is_one_json_object(fulmar):
     assert (code, err) == (0, "")
     found = json.loads(out)
     assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals"]
-    assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical"]
+    assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical", "excite"]
     tasks = json.loads(fulmar("list", "tasks", "--json")[1])["tasks"]
     assert {"go_to_pose", "go_to_position", "go_through_positions", "track_velocities"} <= set(tasks)
 

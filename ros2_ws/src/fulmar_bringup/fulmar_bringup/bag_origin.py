@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_path
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.policy_bundle import PASSPORT
@@ -30,6 +31,7 @@ def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
         {
             **{key: value for key, value in asdict(plan).items() if key != "supervised"},
             **(more or {}),
+            "calibration": str(calibration_path() or ""),
             "fulmar_version": fulmar_version(),
             "git_revision": git_revision(),
         }
@@ -44,12 +46,14 @@ def attachments(plan: RunPlan, system: str = "") -> str:
         system: File of `configs/systems` that it was made from; that of backend and controller by default.
     """
     system = system or f"{plan.backend}_{plan.controller}"
+    calibration = calibration_path()
     files = {
         "robot.yaml": config_path("robots", plan.robot),
         "task.yaml": config_path("tasks", plan.task),
         "scenario.yaml": config_path("scenarios", plan.scenario),
         **({"system.yaml": config_path("systems", system)} if system in config_names("systems") else {}),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
+        **({"calibration.yaml": calibration} if calibration else {}),
         **_of_controller(plan),
     }
     return json.dumps({name: str(path.absolute()) for name, path in files.items()})
@@ -57,6 +61,8 @@ def attachments(plan: RunPlan, system: str = "") -> str:
 
 def _of_controller(plan: RunPlan) -> dict[str, Path]:
     """The passport of a policy, which has the hash of its weights; the gains of a law."""
+    if plan.controller == "excite":
+        return {}
     if plan.controller != "policy":
         law = None if plan.controller == "classical" else plan.controller
         return {"controller.yaml": gains_path(load_robot(plan.robot), law)}

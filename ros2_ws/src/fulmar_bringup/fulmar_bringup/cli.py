@@ -17,6 +17,7 @@ from fulmar_bringup.commands.evaluate import EPILOG as MEANINGS
 from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
 from fulmar_bringup.commands.goals import goals
+from fulmar_bringup.commands.identify import identify
 from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
@@ -47,6 +48,7 @@ app.command(epilog=MEANINGS)(evaluate)
 app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
 app.command()(report)
+app.command()(identify)
 app.command()(demo)
 app.command()(doctor)
 

@@ -9,6 +9,8 @@ from pathlib import Path
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
+from fulmar_core.controllers.excite import Excite
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
@@ -38,6 +40,10 @@ def _load_classical(robot: Robot, task: Task, control_hz: float, _policy: str) -
     return load_classical(robot, task, control_hz=control_hz)
 
 
+def _load_excite(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
+    return Excite(robot, task, control_hz=control_hz)
+
+
 def _check_lqr(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr")
 
@@ -48,6 +54,14 @@ def _check_mpc(robot: Robot, task: Task) -> None:
 
 def _check_lqr_drift(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr_drift")
+
+
+def _check_excite(robot: Robot, task: Task) -> None:
+    if task.kind not in EXCITE_TASKS:
+        raise ConfigError(
+            f"controller 'excite' stays around one place, '{task.name}' has none. "
+            f"Use --task with one of: {', '.join(EXCITE_TASKS)}."
+        )
 
 
 def _any_pair(robot: Robot, task: Task) -> None:
@@ -63,6 +77,7 @@ class ControllerEntry:
     load: Callable[[Robot, Task, float, str], Controller]  # with the command rate and the folder of a bundle
     check: Callable[[Robot, Task], None]  # refuses a robot and a task that it has nothing for
     needs: tuple[str, ...] = ()  # modules that an extra brings
+    strives: bool = True  # whether it means to meet the goal
 
 
 _LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
@@ -82,6 +97,7 @@ CONTROLLERS = {
     "classical": ControllerEntry(
         f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
     ),
+    "excite": ControllerEntry(Excite.title, "excite_node", _load_excite, _check_excite, strives=False),
 }
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")

@@ -25,6 +25,14 @@ SeedOption = Annotated[
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", metavar="NAME", help="Disturbances: a name from configs/scenarios.")
 ]
+CalibrationOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration",
+        metavar="FILE",
+        help="What `fulmar identify` measured on this robot, instead of its YAML.",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from fulmar_bringup.commands.benchmark_drift import drift
+from fulmar_bringup.commands.benchmark_identify import identify
 from fulmar_bringup.commands.benchmark_recorder import recorder
 from fulmar_bringup.commands.benchmark_roboran import roboran
 from fulmar_bringup.commands.benchmark_throughput import throughput
@@ -16,6 +17,7 @@ benchmark = typer.Typer(
     rich_markup_mode=None,
 )
 benchmark.command()(drift)
+benchmark.command()(identify)
 benchmark.command()(recorder)
 benchmark.command()(roboran)
 benchmark.command()(throughput)
