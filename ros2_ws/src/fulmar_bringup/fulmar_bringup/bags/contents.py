@@ -108,7 +108,9 @@ class Bag:
             return next(iter(known.values()))
         if not known:
             raise BagError(f"{self.path}: holds no {kind}. It has: {', '.join(self.topics) or 'nothing'}.")
-        raise BagError(f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC.")
+        raise BagError(
+            f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC."
+        )
 
 
 def open_bag(path: Path) -> Bag:

@@ -60,7 +60,7 @@ def messages(topic: Topic) -> list[tuple[int, Any]]:
     for log_ns, data in zip(topic.log_ns, topic.data, strict=True):
         try:
             found.append((log_ns, store.deserialize_cdr(data, topic.type)))
-        except Exception:  # noqa: BLE001, PERF203 - foreign bytes raise whatever they please; callers see the count
+        except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; callers see the count
             continue
     return found
 
@@ -102,9 +102,7 @@ def joint_vectors(topic: Topic, field: str) -> Vectors:
     found = messages(topic)
     names = tuple(found[0][1].name) if found else ()
     alike = [
-        (log_ns, m)
-        for log_ns, m in found
-        if tuple(m.name) == names and len(getattr(m, field)) == len(names)
+        (log_ns, m) for log_ns, m in found if tuple(m.name) == names and len(getattr(m, field)) == len(names)
     ]
     return Vectors(
         names,
@@ -152,7 +150,14 @@ def odometries(topic: Topic) -> Odometries:
         np.array([log_ns for log_ns, _ in found], dtype=np.int64),
         tuple(m.header.frame_id for _, m in found),
         tuple(m.child_frame_id for _, m in found),
-        column(lambda m: [*_xyz(m.pose.pose.position), *_xyz(m.pose.pose.orientation), m.pose.pose.orientation.w], 7),
+        column(
+            lambda m: [
+                *_xyz(m.pose.pose.position),
+                *_xyz(m.pose.pose.orientation),
+                m.pose.pose.orientation.w,
+            ],
+            7,
+        ),
         column(lambda m: [*_xyz(m.twist.twist.linear), *_xyz(m.twist.twist.angular)], 6),
         len(topic) - len(found),
     )
@@ -174,13 +179,15 @@ class _Decoded:
     numbers: np.ndarray  # (n, m)
 
 
-def _alike(topic: Topic, walk_through: Callable[[_Walk], tuple[tuple[str, ...], list[int]]]) -> _Decoded | None:
+def _alike(
+    topic: Topic, walk_through: Callable[[_Walk], tuple[tuple[str, ...], list[int]]]
+) -> _Decoded | None:
     """All messages at once, if only their stamps and the numbers that are asked for differ in layout.
 
     Returns:
         None where they have not all the layout of the first one.
     """
-    if not topic.data or not topic.data[0][1:2] == bytes([LITTLE_ENDIAN]):
+    if not topic.data or topic.data[0][1:2] != bytes([LITTLE_ENDIAN]):
         return None
     first = topic.data[0]
     try:
@@ -192,7 +199,7 @@ def _alike(topic: Topic, walk_through: Callable[[_Walk], tuple[tuple[str, ...], 
         return None
     table = np.frombuffer(b"".join(topic.data), dtype=np.uint8).reshape(len(topic), len(first))
     fixed = np.zeros(len(first), dtype=bool)
-    fixed[: ENCAPSULATION] = True
+    fixed[:ENCAPSULATION] = True
     for begin, end in walk.fixed:
         fixed[begin:end] = True
     if not (table[:, fixed] == table[0, fixed]).all():

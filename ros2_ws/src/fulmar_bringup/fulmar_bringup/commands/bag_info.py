@@ -83,7 +83,9 @@ def _show_origin(origin: dict[str, Any]) -> None:
     for key in ORIGIN:
         if origin[key] not in (None, ""):
             _say(f"{key}: {origin[key]}")
-    _say(f"code: fulmar {origin['fulmar_version'] or 'unknown'}, revision {origin['git_revision'] or 'unknown'}")
+    _say(
+        f"code: fulmar {origin['fulmar_version'] or 'unknown'}, revision {origin['git_revision'] or 'unknown'}"
+    )
     if origin["controller_sha256"]:
         _say(f"controller SHA-256: {origin['controller_sha256']}")
     for name, sha256 in origin["attachments"].items():
