@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from fulmar_bringup.commands.bag_info import info
+from fulmar_bringup.commands.bag_rerun import rerun
 
 EPILOG = """\b
 Any rosbag2 folder with MCAP or sqlite3 will do, or one file of it; nothing here needs ROS but `play` and
@@ -21,3 +22,4 @@ bag = typer.Typer(
     epilog=EPILOG,
 )
 bag.command()(info)
+bag.command()(rerun)
