@@ -47,6 +47,7 @@ class Told:
     log_ns: int  # [ns]
     stamp_ns: int  # [ns]
     what: Any  # a Goal, discs of shape (m, 3), or a place of shape (2,)
+    index: int = ABSENT  # of the message in its topic
 
 
 @dataclass(frozen=True)
@@ -163,8 +164,8 @@ def course_of(
         goals=_goals(bag, the_task, goal, int(log_ns[0]), warnings),
         obstacles=_obstacles(bag, warnings),
         blocks=tuple(
-            Told(log, stamp_of(m), np.array([m.pose.position.x, m.pose.position.y]))
-            for log, m in messages(bag.of(BLOCK))
+            Told(log, stamp_of(m), np.array([m.pose.position.x, m.pose.position.y]), index)
+            for index, (log, m) in enumerate(messages(bag.of(BLOCK)))
         ),
         warnings=tuple(warnings),
     )
@@ -273,12 +274,12 @@ def _goals(
     bag: Bag, task: Task, asked: PoseTuple | None, begin_ns: int, warnings: list[str]
 ) -> tuple[Told, ...]:
     found = []
-    for log, message in messages(bag.of(GOAL_WIRES[task.goal_topic])):
+    for index, (log, message) in enumerate(messages(bag.of(GOAL_WIRES[task.goal_topic]))):
         goal, problem = goal_of(message)
         if goal is None:
             warnings.append(f"a message of {task.goal_topic} was left out: {problem}.")
             continue
-        found.append(Told(log, stamp_of(message), goal))
+        found.append(Told(log, stamp_of(message), goal, index))
     if asked is not None:
         found = [Told(begin_ns, 0, _goal(asked))]
     return tuple(found)
@@ -290,13 +291,13 @@ def _goal(pose: PoseTuple) -> Goal:
 
 def _obstacles(bag: Bag, warnings: list[str]) -> tuple[Told, ...]:
     found = []
-    for log, message in messages(bag.of(OBSTACLES)):
+    for index, (log, message) in enumerate(messages(bag.of(OBSTACLES))):
         discs, problem = obstacles_of(message)
         if discs is None:
             warnings.append(f"a message of {OBSTACLES.name} was left out: {problem}.")
             continue
         stamp = stamp_of(message.markers[0]) if message.markers else 0
-        found.append(Told(log, stamp, discs))
+        found.append(Told(log, stamp, discs, index))
     return tuple(found)
 
 

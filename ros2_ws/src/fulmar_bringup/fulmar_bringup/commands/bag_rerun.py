@@ -99,7 +99,13 @@ def rerun(
     for warning in course.warnings:
         console.print(f"warning: {warning}", markup=False, soft_wrap=True)
     name, folder = _chosen(opened, course, controller, policy)
-    answers, sha256 = _answers(course, name, folder, "odometry" if foreign else source, through)
+    if through == "node":
+        from fulmar_bringup.bags.live_node import rerun_through_node, without_repeats
+
+        course = without_repeats(course)
+        answers, sha256 = rerun_through_node(opened, course, name, folder)
+    else:
+        answers, sha256 = _answers(course, name, folder, "odometry" if foreign else source)
     fields = judge_answers(course, answers, tolerances)
     first = first_difference(fields)
     recorded = controller_of(opened)
@@ -152,16 +158,10 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
     return name, str(folder)
 
 
-def _answers(
-    course: Course, name: str, folder: str, source: str, through: str
-) -> tuple[Answers, str | None]:
+def _answers(course: Course, name: str, folder: str, source: str) -> tuple[Answers, str | None]:
     from fulmar_bringup.bags.rerun import rerun as run_again
     from fulmar_bringup.system import CONTROLLERS
 
-    if through == "node":
-        from fulmar_bringup.bags.live_node import rerun_through_node
-
-        return rerun_through_node(course, name, folder)
     hz = course.settings.control_rate(course.robot)
     loaded = CONTROLLERS[name].load(course.robot, course.task, hz, folder)
     return run_again(course, loaded, source=source), loaded.metadata().get("sha256")
