@@ -196,7 +196,11 @@ def _checked(
     if len(found) and by_name and found.names != names:
         warnings.append(f"{topic} is about {', '.join(found.names)}, not about {', '.join(names)}: left out.")
         return Vectors(
-            names, found.stamp_ns[:0], found.log_ns[:0], np.zeros((0, len(names))), found.left_out + len(found)
+            names,
+            found.stamp_ns[:0],
+            found.log_ns[:0],
+            np.zeros((0, len(names))),
+            found.left_out + len(found),
         )
     return found if len(found) else Vectors(names, found.stamp_ns, found.log_ns, np.zeros((0, len(names))), 0)
 

@@ -240,7 +240,9 @@ def _feed(
         until = time.monotonic() + ANSWER_TIMEOUT_S
         while not answered:
             if time.monotonic() > until:
-                raise RunFailed(f"the controller node did not answer step {step} within {ANSWER_TIMEOUT_S:g} s")
+                raise RunFailed(
+                    f"the controller node did not answer step {step} within {ANSWER_TIMEOUT_S:g} s"
+                )
             wires.odometry.publish(data)
             with heard.changed:
                 answered = heard.changed.wait_for(lambda stamp=stamp: stamp in heard.commands, RESEND_S)
@@ -301,5 +303,3 @@ def _tell(
                     START_TIMEOUT_S,
                     f"did not take its {name}",
                 )
-
-

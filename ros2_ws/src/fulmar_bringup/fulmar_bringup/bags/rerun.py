@@ -17,11 +17,11 @@ from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
+from fulmar_core.rotation import rotate
 from fulmar_core.safety.arbiter import Flags, arbitrate
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.state import RigidBodyState
-from fulmar_core.rotation import rotate
 from fulmar_ros.mission import Mission
 
 FROM = ("observations", "odometry")
@@ -68,7 +68,13 @@ def _check_observations(course: Course, controller: Controller) -> None:
     if course.observation_names != controller.observation_names:
         gone = [name for name in course.observation_names if name not in controller.observation_names]
         new = [name for name in controller.observation_names if name not in course.observation_names]
-        what = f"lacks {', '.join(new)}" if new else f"has {', '.join(gone)} too" if gone else "has another order"
+        what = (
+            f"lacks {', '.join(new)}"
+            if new
+            else f"has {', '.join(gone)} too"
+            if gone
+            else "has another order"
+        )
         raise BagError(
             f"the recorded observation {what}, so '{controller.name}' cannot read it. Use --from odometry."
         )

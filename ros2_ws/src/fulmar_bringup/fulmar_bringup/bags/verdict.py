@@ -30,7 +30,12 @@ def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, flo
     parts: list[tuple[str, Sequence[str], np.ndarray, np.ndarray]] = []
     if course.own:
         parts.append(
-            ("decision", ("acted",), course.acted[:, None].astype(float), answers.acted[:, None].astype(float))
+            (
+                "decision",
+                ("acted",),
+                course.acted[:, None].astype(float),
+                answers.acted[:, None].astype(float),
+            )
         )
     if course.observation_names == answers.observation_names:
         parts.append(("observation", course.observation_names, course.observations, answers.observations))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import typer
 
+from fulmar_bringup.commands.bag_diff import diff
+from fulmar_bringup.commands.bag_export import export
 from fulmar_bringup.commands.bag_info import info
 from fulmar_bringup.commands.bag_rerun import rerun
 
@@ -23,3 +25,5 @@ bag = typer.Typer(
 )
 bag.command()(info)
 bag.command()(rerun)
+bag.command()(diff)
+bag.command()(export)

@@ -49,8 +49,12 @@ def rerun(
             "action, command; 0, the same bits, by default. May be repeated.",
         ),
     ] = None,
-    robot: Annotated[str | None, typer.Option(metavar="R", help="Whose bag it is, if it does not say.")] = None,
-    task: Annotated[str | None, typer.Option(metavar="T", help="What was to be done, if it does not say.")] = None,
+    robot: Annotated[
+        str | None, typer.Option(metavar="R", help="Whose bag it is, if it does not say.")
+    ] = None,
+    task: Annotated[
+        str | None, typer.Option(metavar="T", help="What was to be done, if it does not say.")
+    ] = None,
     goal: Annotated[
         str | None, typer.Option(metavar="x,y,deg", help="The goal, for a bag that holds none.")
     ] = None,
@@ -148,7 +152,9 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
         raise UnknownNameError("controller", name, CONTROLLERS)
     if name != "policy":
         if policy is not None:
-            raise ConfigError(f"--policy is for --controller policy, not for '{name}'. Leave one of them out.")
+            raise ConfigError(
+                f"--policy is for --controller policy, not for '{name}'. Leave one of them out."
+            )
         return name, ""
     folder = policy or policy_folder(bag) or shipped_policy(course.robot.name, course.task.name)
     if folder is None:
@@ -180,7 +186,9 @@ def _show(result: dict[str, Any], sums: list[dict[str, Any]]) -> None:
         return
     for each in sums:
         verdict = "the same" if not each["differing"] else f"{each['differing']} numbers differ"
-        _say(f"  {each['field']:<12} {each['steps']:>7} steps  {verdict}, largest difference {each['largest']:.3g}")
+        _say(
+            f"  {each['field']:<12} {each['steps']:>7} steps  {verdict}, largest difference {each['largest']:.3g}"
+        )
     first = result["first_difference"]
     if first is None:
         _say("same")
