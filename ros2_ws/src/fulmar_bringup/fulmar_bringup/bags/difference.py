@@ -34,8 +34,8 @@ def differing(
 ) -> dict[str, Any]:
     """Compare two bags.
 
-    Messages of one topic belong together by their stamp, or by their number where they have none. Topics belong together
-    by name without the robot's.
+    Messages of one topic belong together by their stamp, or by their number where they have none; topics by their name
+    without the robot's.
 
     Args:
         first: One bag.

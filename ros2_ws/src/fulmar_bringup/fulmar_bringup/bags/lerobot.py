@@ -1,7 +1,7 @@
 """Bags as a dataset in the layout of LeRobot, version 2.1 of its format: parquet by episode, meta data as JSON.
 
-Source: `meta/info.json` of public datasets of that version, and LeRobot's own documentation. Each bag is one episode, each
-control step one frame: what the controller was fed is `observation.state`, what it answered is `action`.
+Source: `meta/info.json` of public datasets of that version. Each bag is one episode, each control step one frame: what
+the controller was fed is `observation.state`, what it answered is `action`.
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ import typer
 from fulmar_bringup.commands.bag_diff import diff
 from fulmar_bringup.commands.bag_export import export
 from fulmar_bringup.commands.bag_info import info
+from fulmar_bringup.commands.bag_play import play
+from fulmar_bringup.commands.bag_reference import reference
 from fulmar_bringup.commands.bag_rerun import rerun
 
 EPILOG = """\b
@@ -27,3 +29,5 @@ bag.command()(info)
 bag.command()(rerun)
 bag.command()(diff)
 bag.command()(export)
+bag.command()(reference)
+bag.command()(play)

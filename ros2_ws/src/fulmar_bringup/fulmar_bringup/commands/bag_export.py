@@ -33,8 +33,8 @@ def export(
     """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
 
     The dataset follows version 2.1 of LeRobot's format: `meta/info.json`, tasks, episodes and their statistics as JSON
-    lines, and a parquet file for each episode, with `observation.state` and `action` as the controller saw and said them.
-    It needs the extra 'datasets'.
+    lines, and a parquet file for each episode, with `observation.state` and `action` as the controller saw and said
+    them. It needs the extra 'datasets'.
     """
     from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.bags.tables import write_csv, write_npz

@@ -69,8 +69,8 @@ def rerun(
     """Show a recorded run to a controller, and compare its answers with the recorded ones, field by field.
 
     Each step is shown as it was recorded, whatever the controller answered before; at goals, pauses and jumps of time
-    it forgets, as in the node. Bags of others need --robot, --task, mostly --goal, and --from odometry; without recorded
-    actions there is nothing to compare, and the answers alone are summed up.
+    it forgets, as in the node. Bags of others are fed from odometry and need --robot, --task and mostly --goal; without
+    recorded actions there is nothing to compare.
 
     Exit code: 0 all fields are the same within the tolerance, 1 one differs or nothing could be compared, 2 the bag
     cannot be read.
