@@ -8,6 +8,7 @@ from fulmar_bringup.commands.bag_diff import diff
 from fulmar_bringup.commands.bag_export import export
 from fulmar_bringup.commands.bag_info import info
 from fulmar_bringup.commands.bag_play import play
+from fulmar_bringup.commands.bag_plot import plot
 from fulmar_bringup.commands.bag_reference import reference
 from fulmar_bringup.commands.bag_rerun import rerun
 
@@ -31,3 +32,4 @@ bag.command()(diff)
 bag.command()(export)
 bag.command()(reference)
 bag.command()(play)
+bag.command()(plot)

@@ -32,8 +32,9 @@ def play(
 ) -> None:
     """Publish what was recorded, byte for byte, at the pace of the run.
 
-    The pace is that of the stamps: a lock-step run, recorded in a second, plays for as long as it lasted. Goals and other
-    latched messages from before --start are told at the start. With --loop time jumps back, as with a restarted plant.
+    The pace is that of the stamps: a lock-step run, recorded in a second, plays for as long as it lasted. Goals and
+    other latched messages from before --start are told at the start. With --loop time jumps back, as with a restarted
+    plant.
 
     Try, with a controller listening: fulmar bag play runs/demo_x/lqr --topic odom --topic goal_pose --clock
     """
