@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,9 +23,9 @@ from visualization_msgs.msg import MarkerArray
 from fulmar_bringup.bags.contents import Bag, json_object
 from fulmar_bringup.bags.course import ABSENT, Course, Told
 from fulmar_bringup.bags.rerun import Answers
-from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec
-from fulmar_bringup.processes import ProcessGroup, child_environment
+from fulmar_bringup.processes import ProcessGroup
 from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.topics import (
     ACTION,
@@ -93,32 +92,13 @@ def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -
         lockstep=True,
         goals="streamed" if course.settings.goals_streamed else "",
     )
-    group = ProcessGroup()
-    with _own_domain() as environment:
+    with own_domain() as environment:
         group = ProcessGroup(environment)
         try:
             group.start(controller_spec(plan, subscribers=1))
             return _exchange(bag, course, group)
         finally:
             group.stop_all()
-
-
-@contextmanager
-def _own_domain() -> Iterator[dict[str, str]]:
-    """A domain that nobody else uses, for us and our children."""
-    with reserved_domains(1) as (number,):
-        environment = {"ROS_DOMAIN_ID": str(number), **child_environment()}
-        before = {key: os.environ.get(key) for key in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE")}
-        for key in before:
-            os.environ[key] = environment[key]
-        try:
-            yield environment
-        finally:
-            for key, value in before.items():
-                if value is None:
-                    os.environ.pop(key, None)
-                else:
-                    os.environ[key] = value
 
 
 @dataclass

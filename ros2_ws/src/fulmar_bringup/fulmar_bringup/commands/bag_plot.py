@@ -18,7 +18,7 @@ def plot(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="An .html page that works offline, or a .png picture; may be repeated. Beside the bag by default, both.",
+            help="An .html page that works offline, or a .png picture; may be repeated. Both, beside the bag, by default.",
         ),
     ] = None,
     odometry: Annotated[
