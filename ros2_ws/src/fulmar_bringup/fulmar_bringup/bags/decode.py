@@ -108,7 +108,7 @@ def joint_vectors(topic: Topic, field: str) -> Vectors:
         names,
         np.array([stamp_of(m) for _, m in alike], dtype=np.int64),
         np.array([log_ns for log_ns, _ in alike], dtype=np.int64),
-        np.array([getattr(m, field) for _, m in alike], dtype=float).reshape(-1, len(names)),
+        np.array([getattr(m, field) for _, m in alike], dtype=float).reshape(len(alike), len(names)),
         len(topic) - len(alike),
     )
 
