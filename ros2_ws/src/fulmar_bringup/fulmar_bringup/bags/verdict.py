@@ -27,16 +27,10 @@ def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, flo
         far as they were recorded.
     """
     actuators = course.robot.actuators.names
+    kept = ~_lost(course)  # what the record has lost, cannot be compared
     parts: list[tuple[str, Sequence[str], np.ndarray, np.ndarray]] = []
     if course.own:
-        parts.append(
-            (
-                "decision",
-                ("acted",),
-                course.acted[:, None].astype(float),
-                answers.acted[:, None].astype(float),
-            )
-        )
+        parts.append(("decision", ("acted",), course.acted[:, None], answers.acted[:, None]))
     if course.observation_names == answers.observation_names:
         parts.append(("observation", course.observation_names, course.observations, answers.observations))
     if np.isfinite(course.actions).any():
@@ -47,8 +41,23 @@ def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, flo
     return [
         line
         for field, names, recorded, found in parts
-        for line in compare(field, names, recorded, found, course.stamp_ns, tolerances[field])
+        for line in compare(
+            field,
+            names,
+            recorded.astype(float),
+            found.astype(float) if field == "command" else np.where(kept[:, None], found, recorded),
+            course.stamp_ns,
+            tolerances[field],
+        )
     ]
+
+
+def _lost(course: Course) -> np.ndarray:
+    """Steps whose observation is not in the bag, though a command that is not the safe one shows that there was one."""
+    driven = np.isfinite(course.commands).all(axis=1) & (
+        course.commands != course.robot.actuators.safe_command
+    ).any(axis=1)
+    return ~course.acted & driven
 
 
 @dataclass(frozen=True)
