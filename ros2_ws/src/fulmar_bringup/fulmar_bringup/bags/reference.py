@@ -7,9 +7,10 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from fulmar_bringup.bags.comparison import Field
-from fulmar_bringup.bags.contents import Bag, open_bag
+from fulmar_bringup.bags.comparison import Field, first_difference
+from fulmar_bringup.bags.contents import Bag, Topic, open_bag
 from fulmar_bringup.bags.course import course_of
+from fulmar_bringup.bags.decode import stamps_ns
 from fulmar_bringup.bags.rerun import rerun
 from fulmar_bringup.bags.verdict import judge_answers
 from fulmar_bringup.domains import own_domain
@@ -42,10 +43,11 @@ KEPT = (
     BLOCK,
     *GOAL_WIRES.values(),
 )
+STEPPED = (ODOMETRY, COMMAND, VELOCITY_COMMAND)
 # What a machine and a moment leave in a record, and what therefore stays out of one that is kept.
 OF_THE_MACHINE = ("policy", "command", "git_revision", "fulmar_version", "goals", "path")
-# Another processor adds float32 sums of a network in another order, and rounds a sine otherwise in the last bit. A valve
-# that opens differs by 1.
+# Another processor adds float32 sums of a network in another order, and rounds a sine otherwise in the last bit.
+# A valve that opens differs by 1.
 TOLERANCES = {"decision": 0.0, "observation": 1e-9, "action": 1e-5, "command": 1e-5}
 
 
@@ -116,6 +118,12 @@ def record_reference(reference: Reference, folder: Path) -> Path:
             raise RunFailed(f"reference '{reference.name}': {outcome.failure}")
         new = Path(scratch) / "kept" / reference.name
         _write_kept(open_bag(recorded), new)
+        first = first_difference(check_reference(new))
+        if first is not None:
+            raise RunFailed(
+                f"reference '{reference.name}': not even now is it answered as recorded, from step {first.first_step} on "
+                f"({first.field} {first.name}). Was the machine busy? Record it once more."
+            )
         target = folder / reference.name
         shutil.rmtree(target, ignore_errors=True)
         folder.mkdir(parents=True, exist_ok=True)
@@ -132,11 +140,23 @@ def _write_kept(bag: Bag, folder: Path) -> None:
     topics = [(wire, bag.of(wire)) for wire in KEPT if len(bag.of(wire))]
     for wire, topic in topics:
         writer.add_topic(topic.name, topic.type, delivery[wire.name])
-    every = sorted((log, topic.name, index) for _, topic in topics for index, log in enumerate(topic.log_ns))
+    # A machine that was slow to start refuses its first odometry as too old: a reference begins where it is believed.
+    begin_ns = min(_stamps(bag.of(OBSERVATION)), default=0)
+    every = sorted(
+        (log, topic.name, index)
+        for wire, topic in topics
+        for index, (log, stamp) in enumerate(zip(topic.log_ns, _stamps(topic), strict=True))
+        if wire not in STEPPED or stamp >= begin_ns
+    )
     by_name = {topic.name: topic for _, topic in topics}
     for log, name, index in every:
         writer.write(name, by_name[name].data[index], log_ns=log)
     writer.close()
+
+
+def _stamps(topic: Topic) -> list[int]:
+    found = stamps_ns(topic)
+    return list(topic.log_ns) if found is None else [int(stamp) for stamp in found]
 
 
 def check_reference(path: Path) -> list[Field]:

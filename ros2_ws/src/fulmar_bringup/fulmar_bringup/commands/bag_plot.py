@@ -18,7 +18,7 @@ def plot(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="An .html page that works offline, or a .png picture; may be repeated. Both, beside the bag, by default.",
+            help="A page (.html) or a .png picture; may be repeated. By default both, beside the bag.",
         ),
     ] = None,
     odometry: Annotated[

@@ -29,8 +29,8 @@ def reference(
     """Check that the reference bags are answered as they were recorded, or record them anew.
 
     Each is a short lock-step run. It is run again from its odometry: the gates decide, observations are made, the
-    controller acts, commands are limited. Whatever differs by more than another processor rounds, is told with its field
-    and its step.
+    controller acts, commands are limited. Whatever differs by more than another processor rounds is told, with its
+    field and its step.
 
     Exit code: 0 all are the same, or were recorded; 1 something differs.
     """
