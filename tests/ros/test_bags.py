@@ -101,7 +101,7 @@ def test_the_deployed_node_gives_the_recorded_answers(bag: Path, ros_domain: Ros
     done = fulmar("bag", "rerun", str(bag), "--through", "node", "--json", env=ros_domain.env, cwd=tmp_path)
     found = json_of(done.stdout)
     assert done.returncode == 0, found["first_difference"]
-    assert found["asked"] == 100
+    assert found["asked"] == found["steps"]
     assert found["sha256"] == found["recorded_sha256"]
 
 

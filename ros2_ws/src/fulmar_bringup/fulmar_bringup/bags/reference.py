@@ -121,7 +121,7 @@ def record_reference(reference: Reference, folder: Path) -> Path:
         first = first_difference(check_reference(new))
         if first is not None:
             raise RunFailed(
-                f"reference '{reference.name}': not even now is it answered as recorded, from step {first.first_step} on "
+                f"reference '{reference.name}': not answered as recorded from step {first.first_step} on "
                 f"({first.field} {first.name}). Was the machine busy? Record it once more."
             )
         target = folder / reference.name
