@@ -9,6 +9,7 @@ from types import FrameType
 
 import typer
 
+from fulmar_bringup.commands.bag import bag
 from fulmar_bringup.commands.benchmark import benchmark
 from fulmar_bringup.commands.bundle import bundle
 from fulmar_bringup.commands.demo import demo
@@ -47,6 +48,7 @@ app.command()(export)
 app.command(epilog=MEANINGS)(evaluate)
 app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
+app.add_typer(bag, name="bag")
 app.command()(report)
 app.command()(identify)
 app.command()(demo)

@@ -73,6 +73,30 @@ def claimed_domain() -> Iterator[int]:
         yield domain
 
 
+@contextlib.contextmanager
+def own_domain() -> Iterator[dict[str, str]]:
+    """A domain that nobody else uses, for this process and its children, until the context ends.
+
+    Yields:
+        The environment of the children, which is ours meanwhile.
+
+    Raises:
+        ConfigError: If none is free.
+    """
+    with reserved_domains(1) as (number,):
+        environment = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        before = {key: os.environ.get(key) for key in environment}
+        os.environ.update(environment)
+        try:
+            yield environment
+        finally:
+            for key, value in before.items():
+                if value is None:
+                    del os.environ[key]
+                else:
+                    os.environ[key] = value
+
+
 def _lock_folder() -> Path:
     folder = Path(tempfile.gettempdir()) / f"fulmar_ros_domains_{os.getuid()}"
     folder.mkdir(exist_ok=True)

@@ -23,6 +23,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "policy": ("onnxruntime",),
     "bags": ("mcap", "rosbags", "mcap_ros2", "zstandard"),
     "view": ("matplotlib",),
+    "datasets": ("pyarrow",),
     "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
     "cluster": ("ray",),
     "wandb": ("wandb",),

@@ -29,8 +29,9 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     command_wire,
 )
-from fulmar_ros.convert import ImuWriter, OdometryWriter, VectorWriter, stamp_ns, stamp_of
+from fulmar_ros.convert import ImuWriter, OdometryWriter, VectorWriter, stamp_of
 from fulmar_ros.deadline import Spread
+from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second

@@ -33,6 +33,9 @@ CalibrationOption = Annotated[
         help="What `fulmar identify` measured on this robot, instead of its YAML.",
     ),
 ]
+BagArgument = Annotated[
+    Path, typer.Argument(metavar="BAG", help="A bag folder, or the .mcap or .db3 file in it.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
