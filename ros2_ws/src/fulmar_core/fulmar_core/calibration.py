@@ -196,7 +196,7 @@ def _water(robot: Robot, calibration: Calibration) -> Robot:
     water = robot.hydrodynamics
     if water is None:
         return robot
-    dampings = {}
+    dampings: dict[str, Any] = {}
     for kind in ("linear", "quadratic"):
         values = list(getattr(water, f"{kind}_damping"))
         for axis, i in DRAGS:

@@ -45,13 +45,13 @@ def bag_files(bag: Path) -> list[Path]:
         return [bag]
     if not bag.is_dir():
         raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
-    files = sorted(bag.glob("*.mcap"), key=_place)
+    files = sorted(bag.glob("*.mcap"), key=place_in_bag)
     if not files:
         raise BagError(f"{bag}: 0 .mcap files where a bag folder has one or more. Give a bag folder.")
     return files
 
 
-def _place(path: Path) -> tuple[str, int]:
+def place_in_bag(path: Path) -> tuple[str, int]:
     """What files of a bag are sorted by: `run_10.mcap` comes after `run_9.mcap`."""
     stem, _, number = path.stem.rpartition("_")
     return (stem, int(number)) if number.isdecimal() else (path.stem, 0)

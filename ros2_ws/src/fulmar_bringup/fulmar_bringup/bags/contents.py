@@ -16,7 +16,7 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from fulmar_core.errors import BagError, UnknownNameError
 from fulmar_core.topics import Wire
 from fulmar_ros.bag_metadata import METADATA_FILE
-from fulmar_ros.bag_records import read_records
+from fulmar_ros.bag_records import place_in_bag, read_records
 from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
 
 ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
@@ -75,15 +75,22 @@ class Bag:
 
         Under the robot's name, or, where no robot is named, under the only namespace that has the wire.
         """
+        name = self.topic_name(wire)
+        found = [topic for topic in self.topics.values() if topic.name == name and topic.type == wire.type]
+        return found[0] if found else Topic(name, wire.type)
+
+    def topic_name(self, wire: Wire) -> str:
+        """Absolute name of a wire's topic; the wire's own name where it cannot be told."""
         if wire.name.startswith("/"):
-            names = [wire.name]
-        elif self.robot:
-            names = [f"/{self.robot}/{wire.name}"]
-        else:
-            names = [name for name in self.topics if name.endswith(f"/{wire.name}")]
-        found = [self.topics[name] for name in names if name in self.topics]
-        alike = [topic for topic in found if topic.type == wire.type]
-        return alike[0] if len(alike) == 1 else Topic(names[0] if names else wire.name, wire.type)
+            return wire.name
+        if self.robot:
+            return f"/{self.robot}/{wire.name}"
+        names = {
+            topic.name
+            for topic in self.topics.values()
+            if topic.name.endswith(f"/{wire.name}") and topic.type == wire.type
+        }
+        return names.pop() if len(names) == 1 else wire.name
 
     def odometry(self, chosen: str | None = None) -> Topic:
         """The odometry: that of the robot, the one that was chosen, or the only one there is.
@@ -158,16 +165,11 @@ def _files(path: Path) -> tuple[Path, ...]:
     if not path.is_dir():
         raise BagError(f"{path}: there is no such bag. Give a bag folder, or the .mcap or .db3 file in it.")
     for ending in ENDINGS:
-        files = sorted(path.glob(f"*{ending}"), key=_number)
+        files = sorted(path.glob(f"*{ending}"), key=place_in_bag)
         if files:
             return tuple(files)
     found = ", ".join(sorted(each.name for each in path.iterdir())[:4]) or "nothing"
     raise BagError(f"{path}: has no .mcap and no .db3 file, only {found}. Give a bag folder.")
-
-
-def _number(file: Path) -> tuple[int, str]:
-    number = file.stem.rpartition("_")[2]
-    return (int(number) if number.isdecimal() else 0, file.name)
 
 
 class _Gathered:

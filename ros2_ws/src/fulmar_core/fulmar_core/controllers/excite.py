@@ -115,7 +115,7 @@ class Excite(Law):
         cost = (miss**2 + spin**2).reshape(how.far, count)
         cost = np.where(np.arange(how.far)[:, None] < allowed, cost, np.inf)
         best = np.argmin(cost, axis=0)
-        return candidates.reshape(how.far, count, -1)[best, np.arange(count)]
+        return np.asarray(candidates.reshape(how.far, count, -1)[best, np.arange(count)])
 
     def _drawn(self, count: int) -> np.ndarray:
         """Random commands, shape (count, m): one to three valves, or anything between full astern and full ahead."""

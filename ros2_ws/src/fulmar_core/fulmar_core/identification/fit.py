@@ -87,13 +87,12 @@ def fit(
     place = search.run(place)
     deviations, freedom = search.deviations(place)
     reach = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * deviations
+    values, lows, highs = (
+        [float(u.from_search(number)) for u, number in zip(model.unknowns, numbers, strict=True)]
+        for numbers in (place, place - reach, place + reach)
+    )
     estimates = {
-        u.name: Estimate(
-            u.name,
-            *(float(u.from_search(place[i] + sign * reach[i])) for sign in (0.0, -1.0, 1.0)),
-            u.unit,
-        )
-        for i, u in enumerate(model.unknowns)
+        u.name: Estimate(u.name, values[i], lows[i], highs[i], u.unit) for i, u in enumerate(model.unknowns)
     }
     return Fit(estimates, (float(sigma[0]), float(sigma[1]), float(sigma[2])), len(search.windows))
 
@@ -226,7 +225,7 @@ class _Search:
 
     def _residual(self, place: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Measured minus predicted, in standard deviations, shape (w, n, 3)."""
-        return self._residuals(place[:, None], own[:, None, :])[0]
+        return np.asarray(self._residuals(place[:, None], own[:, None, :])[0])
 
     def _residuals(self, places: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Same for copies: places (p, copies), own (q, copies, w)."""

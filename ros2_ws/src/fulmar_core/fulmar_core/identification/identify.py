@@ -86,7 +86,7 @@ def calibration_of(robot: Robot, identified: Identified, runs: Sequence[str] = (
         for name, found in identified.fit.estimates.items()
         if name in allowed
     }
-    return Calibration(robot=robot.name, runs=tuple(runs), **measured)  # type: ignore[arg-type]
+    return Calibration(robot=robot.name, runs=tuple(runs), **measured)
 
 
 def _prepared(

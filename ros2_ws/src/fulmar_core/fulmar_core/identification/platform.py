@@ -37,7 +37,7 @@ class PlatformModel:
     """Unknowns: thrust, mass, delays; and for each load inertia and centre of mass."""
 
     own = 9  # six of the state; a constant push along the world's x and y [m/s²] and in yaw [rad/s²]
-    spans_s = (2.0, 5.0, 10.0)
+    spans_s: tuple[float, ...] = (2.0, 5.0, 10.0)
 
     def __init__(self, robot: Robot, ballasts: Mapping[int, float]) -> None:
         """Prepare.
@@ -95,7 +95,7 @@ class PlatformModel:
         return poses
 
     def _by_load(self, values: Values, name: str, load: np.ndarray) -> np.ndarray:
-        return sum(values[of_load(name, each)] * (load == each) for each in (0, *self._loads))
+        return np.asarray(sum(values[of_load(name, each)] * (load == each) for each in (0, *self._loads)))
 
     def _inputs(self, values: Values, windows: Windows) -> np.ndarray:
         """Wrench of 1 N valves in each step, shape (steps, 3, copies, windows)."""

@@ -20,7 +20,7 @@ class WheelModel:
     """Unknowns: factors on speed and turn rate, lag of the wheels' servos, delay."""
 
     own = 6
-    spans_s = (3.0, 8.0, 15.0)
+    spans_s: tuple[float, ...] = (3.0, 8.0, 15.0)
 
     def __init__(self, robot: Robot) -> None:
         """Prepare.
@@ -31,7 +31,7 @@ class WheelModel:
         assert isinstance(robot.actuators, DifferentialDrive)
         self._drive = robot.actuators
         response = robot.actuators.response
-        self.unknowns = (
+        self.unknowns: tuple[Unknown, ...] = (
             Unknown("wheel_scale", 1.0, "-"),
             Unknown("turn_scale", 1.0, "-"),
             Unknown("lag", max(response.lag_s, SERVO_S), "s"),

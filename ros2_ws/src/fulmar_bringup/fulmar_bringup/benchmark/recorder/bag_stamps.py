@@ -1,34 +1,22 @@
-"""Stamps of the messages of a bag, without decoding them."""
+"""Stamps of the messages of a bag, and whether the readers of others open it."""
 
 from __future__ import annotations
 
-import struct
 from collections import defaultdict
 from pathlib import Path
 
 from mcap.reader import make_reader
-from mcap.records import Channel, Message
 from rosbags.highlevel import AnyReader
 
-from fulmar_ros.bag_records import bag_files, read_records
-
-STAMP = struct.Struct("<iI")  # seconds and nanoseconds of a header, which such a message begins with
-CDR_HEAD = 4  # bytes before the message
-NS = 1_000_000_000
+from fulmar_bringup.bags.contents import open_bag
+from fulmar_bringup.bags.decode import stamps_ns
+from fulmar_ros.bag_records import bag_files
 
 
 def stamps_by_topic(bag: Path) -> dict[str, list[int]]:
-    """Stamps of every message [ns], by topic, as they were recorded; of topics without a header they mean nothing."""
-    stamps: dict[str, list[int]] = defaultdict(list)
-    for path in bag_files(bag):
-        topics: dict[int, str] = {}
-        for record in read_records(path, []):
-            if isinstance(record, Channel):
-                topics[record.id] = record.topic
-            elif isinstance(record, Message) and len(record.data) >= CDR_HEAD + STAMP.size:
-                seconds, rest = STAMP.unpack_from(record.data, CDR_HEAD)
-                stamps[topics[record.channel_id]].append(seconds * NS + rest)
-    return stamps
+    """Stamps of every message [ns], by topic, as they were recorded; none where there is no message or no header."""
+    stamps = {name: stamps_ns(topic) for name, topic in open_bag(bag).topics.items() if len(topic)}
+    return defaultdict(list, {name: found.tolist() for name, found in stamps.items() if found is not None})
 
 
 def opens(bag: Path) -> bool:
