@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from fulmar_bringup.environment import environment
 from fulmar_core.errors import ConfigError
 
 LARGEST = 232  # of DDS
@@ -84,17 +85,9 @@ def own_domain() -> Iterator[dict[str, str]]:
         ConfigError: If none is free.
     """
     with reserved_domains(1) as (number,):
-        environment = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        before = {key: os.environ.get(key) for key in environment}
-        os.environ.update(environment)
-        try:
-            yield environment
-        finally:
-            for key, value in before.items():
-                if value is None:
-                    del os.environ[key]
-                else:
-                    os.environ[key] = value
+        own = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        with environment(own):
+            yield own
 
 
 def _lock_folder() -> Path:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from fulmar_bringup.benchmark.identification.trial import Trial, run_trial
+from fulmar_bringup.benchmark.work import ONE_THREAD, ended_with_us
+from fulmar_bringup.environment import environment
 
 ASKED = ("mass", "yaw_inertia", "thrust")  # of platforms
 MOST_ERROR_PERCENT = 3.0
@@ -30,7 +30,8 @@ def run_identification(
         on_done: Given each result as it comes.
     """
     results: dict[int, dict[str, Any]] = {}
-    with _one_thread(), ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+    spawn = multiprocessing.get_context("spawn")
+    with environment(ONE_THREAD), ended_with_us(ProcessPoolExecutor(jobs, spawn)) as pool:
         futures = {pool.submit(run_trial, trial): i for i, trial in enumerate(trials)}
         for future in as_completed(futures):
             results[futures[future]] = future.result()
@@ -81,19 +82,3 @@ def _figures(results: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
             "coverage": float(np.mean([each["inside"] for each in every])),
         }
     return figures
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Children whose linear algebra keeps to one thread each: they share the cores among themselves."""
-    limits = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "MKL", "OPENBLAS")}
-    before = {name: os.environ.get(name) for name in limits}
-    os.environ.update(limits)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

@@ -18,7 +18,7 @@ import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.benchmark.recorder.recorders import recorders
-from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
@@ -46,7 +46,6 @@ def cost_of_recording(
     stretches: int,
     stretch_s: float,
     out: Path,
-    in_domain: Callable[[int], Any],
     progress: Callable[[], None],
 ) -> dict[str, Any]:
     """Measure.
@@ -56,7 +55,6 @@ def cost_of_recording(
         stretches: With a recorder, and as many without, >= 1.
         stretch_s: Length of each [s].
         out: Folder of the bags.
-        in_domain: A context that makes a ROS domain that of this process and its children.
         progress: Told of each stretch.
 
     Returns:
@@ -69,7 +67,7 @@ def cost_of_recording(
     rate = ODOMETRY_HZ / physics_hz
     plan = replace(plan, rate=rate, control_hz=COMMAND_HZ / rate, supervised=True)
     measured: dict[bool, list[np.ndarray]] = {True: [], False: []}
-    with reserved_domains(1) as (domain,), in_domain(domain), _running(plan) as plant:
+    with own_domain(), _running(plan) as plant:
         for number in range(2 * stretches):
             recorded = TURNS[number % len(TURNS)]
             bags = {out / f"cost_{number}": plan} if recorded else {}

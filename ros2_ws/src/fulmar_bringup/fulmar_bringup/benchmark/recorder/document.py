@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,7 +54,6 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
                 stretches=asked.stretches,
                 stretch_s=asked.stretch_s,
                 out=asked.out,
-                in_domain=in_domain,
                 progress=lambda: progress("cost"),
             )
         elif part == "loss":
@@ -63,7 +61,6 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
                 plan,
                 seconds=asked.loss_s,
                 out=asked.out,
-                in_domain=in_domain,
                 progress=lambda seconds: progress(f"loss: {seconds:.0f} of {asked.loss_s:.0f} s"),
             )
         elif part == "lockstep":
@@ -72,14 +69,12 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
                 control_hz=asked.lockstep_hz,
                 simulated_s=asked.lockstep_s,
                 out=asked.out,
-                in_domain=in_domain,
             )
         else:
             found[part] = killed(
                 plan,
                 kills=asked.kills,
                 out=asked.out,
-                in_domain=in_domain,
                 progress=lambda: progress("kills"),
             )
     return {
@@ -90,19 +85,3 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
         "fulmar_version": fulmar_version(),
         "git_revision": git_revision(),
     }
-
-
-@contextlib.contextmanager
-def in_domain(domain: int) -> Iterator[None]:
-    """Make a ROS domain, on this machine only, that of this process and its children until the context ends."""
-    own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    before = {name: os.environ.get(name) for name in own}
-    os.environ.update(own)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

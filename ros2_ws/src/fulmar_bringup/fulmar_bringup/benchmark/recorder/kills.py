@@ -12,27 +12,24 @@ from typing import Any
 from fulmar_bringup.benchmark.recorder.bag_stamps import opens, stamps_by_topic
 from fulmar_bringup.benchmark.recorder.recorders import recorders
 from fulmar_bringup.benchmark.recorder.traffic import EVERY, Traffic, traffic
-from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 
 AT_ONCE = 5  # recorders that hear the same traffic and die one after another
-LONGEST_S = 4.0  # a recorder lives up to this long [s]
+LONGEST_S = 10.0  # a recorder lives up to this long [s]
 SHORT_FILES = Recording(split_s=1.0)  # every other recorder, so that some die while they change files
 
 
-def killed(
-    plan: RunPlan, *, kills: int, out: Path, in_domain: Callable[[int], Any], progress: Callable[[], None]
-) -> dict[str, Any]:
+def killed(plan: RunPlan, *, kills: int, out: Path, progress: Callable[[], None]) -> dict[str, Any]:
     """Kill recorders.
 
     Args:
         plan: Whose wires.
         kills: How many, >= 1.
         out: Folder of the bags.
-        in_domain: A context that makes a ROS domain that of this process and its children.
         progress: Told of each.
 
     Returns:
@@ -49,8 +46,7 @@ def killed(
             for i in range(count)
         }
         with (
-            reserved_domains(1) as (domain,),
-            in_domain(domain),
+            own_domain(),
             traffic(load_robot(plan.robot)) as source,
             recorders(plans) as alive,
         ):

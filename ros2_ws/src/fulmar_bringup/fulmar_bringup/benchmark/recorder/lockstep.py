@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.benchmark.recorder.bag_stamps import stamps_by_topic
 from fulmar_bringup.conductor import conduct
-from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.domains import own_domain
 from fulmar_bringup.planning import plan_run
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import (
@@ -28,9 +27,7 @@ WIRES = (ODOMETRY, TRUTH, COMMAND, ACTUATORS_STATE, OBSERVATION, ACTION)
 WANTED_RATE = 20.0  # simulated seconds a second
 
 
-def lost_in_lock_step(
-    robot: str, *, control_hz: float, simulated_s: float, out: Path, in_domain: Callable[[int], Any]
-) -> dict[str, Any]:
+def lost_in_lock_step(robot: str, *, control_hz: float, simulated_s: float, out: Path) -> dict[str, Any]:
     """Run LQR in lock step.
 
     Args:
@@ -38,7 +35,6 @@ def lost_in_lock_step(
         control_hz: Steps a simulated second [Hz].
         simulated_s: Length of the run [s].
         out: Folder of the bag.
-        in_domain: A context that makes a ROS domain that of this process and its children.
 
     Returns:
         Figures by name, ready for JSON.
@@ -63,7 +59,7 @@ def lost_in_lock_step(
         record=out / "lock_step",
         command="fulmar benchmark recorder",
     )
-    with reserved_domains(1) as (domain,), in_domain(domain):
+    with own_domain():
         failure = conduct(request).failure
     log_s = read_run(request.record).odom.log_s if request.record.exists() else np.empty(0)
     if len(log_s) < 2:

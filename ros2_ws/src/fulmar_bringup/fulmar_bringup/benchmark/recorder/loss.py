@@ -10,7 +10,7 @@ from typing import Any
 from fulmar_bringup.benchmark.recorder.bag_stamps import stamps_by_topic
 from fulmar_bringup.benchmark.recorder.recorders import recorders
 from fulmar_bringup.benchmark.recorder.traffic import EVERY, traffic
-from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
@@ -23,7 +23,6 @@ def lost_in_real_time(
     *,
     seconds: float,
     out: Path,
-    in_domain: Callable[[int], Any],
     progress: Callable[[float], None],
 ) -> dict[str, Any]:
     """Record traffic.
@@ -32,7 +31,6 @@ def lost_in_real_time(
         plan: Whose wires.
         seconds: How long.
         out: Folder of the bag.
-        in_domain: A context that makes a ROS domain that of this process and its children.
         progress: Told how long it has gone on [s].
 
     Returns:
@@ -40,8 +38,7 @@ def lost_in_real_time(
     """
     bag = out / "real_time"
     with (
-        reserved_domains(1) as (domain,),
-        in_domain(domain),
+        own_domain(),
         traffic(load_robot(plan.robot)) as source,
         recorders({bag: plan}) as (recorder,),
     ):
