@@ -44,6 +44,27 @@ def file_of(bag: Path) -> Path:
     return next(bag.glob("*.mcap"))
 
 
+def test_info_tells_what_the_recorder_dropped_and_which_packages_it_ran_with(tmp_path):
+    bag = BagWriter(
+        tmp_path / "bag",
+        run_info={"robot": "floating_platform"},
+        attachments={
+            "provenance.json": b'{"python": "3.12.1", "platform": "Linux"}',
+            "uncommitted.patch": b"--- a",
+        },
+    )
+    bag.add_topic("/floating_platform/odom", "nav_msgs/msg/Odometry", "stream")
+    bag.write("/floating_platform/odom", bytes(100), log_ns=1)
+    bag.note("fulmar_recording", json.dumps({"complete": False, "dropped": {"/floating_platform/odom": 7}}))
+    bag.close()
+    found = describe(open_bag(tmp_path / "bag"))
+    assert found["topics"][0]["dropped"] == 7
+    assert found["provenance"]["made_by"]["python"] == "3.12.1"
+    assert found["provenance"]["uncommitted_changes"] is True
+    assert found["provenance"]["recorded_to_its_end"] is False
+    assert "did not come to an orderly end" in ask("info", tmp_path / "bag").stdout
+
+
 @pytest.fixture
 def copy(tmp_path) -> Path:
     return Path(shutil.copytree(POLICY, tmp_path / "bag"))

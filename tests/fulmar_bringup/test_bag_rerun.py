@@ -12,6 +12,7 @@ import onnxruntime
 import pytest
 from typer.testing import CliRunner
 
+from fulmar_bringup.bags.calibration import calibrated_as
 from fulmar_bringup.bags.comparison import compare, first_difference, read_tolerances
 from fulmar_bringup.bags.contents import open_bag
 from fulmar_bringup.bags.course import course_of
@@ -19,8 +20,11 @@ from fulmar_bringup.bags.rerun import rerun
 from fulmar_bringup.bags.verdict import FIELDS, judge_answers
 from fulmar_bringup.cli import app
 from fulmar_bringup.system import CONTROLLERS
+from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.policy_bundle import NETWORK, Golden, read_golden, read_passport, write_bundle
+from fulmar_core.robot import load_robot
+from fulmar_ros.bag_writer import BagWriter
 from policy_server.shipped import shipped_policy
 
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"
@@ -71,6 +75,22 @@ def test_the_same_bundle_gives_the_same_bits_and_exit_code_0(source):
 @pytest.mark.parametrize("source", ["observations", "odometry"])
 def test_a_law_that_watches_its_valves_and_remembers_gives_the_same_bits(source):
     assert first_difference(answered(LQR, "lqr", source)) is None
+
+
+def test_a_run_is_repeated_with_the_calibration_that_it_was_driven_with(tmp_path, monkeypatch):
+    def half_as_strong(name):
+        path = tmp_path / name
+        save_calibration(Calibration("floating_platform", thrust=Measured(0.5, 0.49, 0.51)), path)
+        return path
+
+    carried = {"calibration.yaml": half_as_strong("carried").read_bytes()}
+    BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"}, attachments=carried).close()
+    with calibrated_as(open_bag(tmp_path / "bag")):
+        assert load_robot("floating_platform").actuators.thrust == 0.5
+    monkeypatch.setenv(VARIABLE, str(half_as_strong("mine")))
+    with calibrated_as(open_bag(POLICY)):
+        assert load_robot("floating_platform").actuators.thrust == 1.0
+    assert load_robot("floating_platform").actuators.thrust == 0.5
 
 
 def test_another_bundle_is_found_out_with_its_first_step(other_bundle):

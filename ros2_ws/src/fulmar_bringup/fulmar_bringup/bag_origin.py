@@ -19,6 +19,8 @@ from policy_server.shipped import shipped_policy
 if TYPE_CHECKING:
     from fulmar_bringup.node_table import RunPlan
 
+CALIBRATION = "calibration.yaml"  # name of the attachment
+
 
 def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
     """The plan as the JSON object that the recorder is given.
@@ -53,7 +55,7 @@ def attachments(plan: RunPlan, system: str = "") -> str:
         "scenario.yaml": config_path("scenarios", plan.scenario),
         **({"system.yaml": config_path("systems", system)} if system in config_names("systems") else {}),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
-        **({"calibration.yaml": calibration} if calibration else {}),
+        **({CALIBRATION: calibration} if calibration else {}),
         **_of_controller(plan),
     }
     return json.dumps({name: str(path.absolute()) for name, path in files.items()})

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+MADE_BY, PATCH = "provenance.json", "uncommitted.patch"  # attachments of a bag
 LARGEST_PATCH = 1_000_000  # bytes
 
 
@@ -87,6 +88,6 @@ def attachments() -> dict[str, bytes]:
     """Files that tell a reader of a bag the code and the packages; the patch only where there is one."""
     patch = uncommitted_changes()
     return {
-        "provenance.json": json.dumps(made_by(), indent=1).encode(),
-        **({"uncommitted.patch": patch} if patch else {}),
+        MADE_BY: json.dumps(made_by(), indent=1).encode(),
+        **({PATCH: patch} if patch else {}),
     }

@@ -17,6 +17,7 @@ from fulmar_core.errors import BagError, UnknownNameError
 from fulmar_core.topics import Wire
 from fulmar_ros.bag_metadata import METADATA_FILE
 from fulmar_ros.bag_records import place_in_bag, read_records
+from fulmar_ros.bag_thread import RECORDING
 from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
 
 ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
@@ -57,6 +58,7 @@ class Bag:
     files: tuple[Path, ...]
     topics: dict[str, Topic]  # by absolute name, sorted
     info: dict[str, Any] | None  # what kind of run this is; None: Fulmar did not record it
+    recording: dict[str, Any]  # what became of the messages, as far as the recorder told it
     attachments: dict[str, bytes]
     warnings: tuple[str, ...]  # what could not be read
 
@@ -144,13 +146,14 @@ def open_bag(path: Path) -> Bag:
     if len(problems) == len(files):
         raise BagError(problems[0])
     folder = path if path.is_dir() else path.parent
-    info = gathered.info or _info_beside(folder)
+    info = gathered.info or _told_beside(folder, RUN_RECORD)
     return Bag(
         path=path,
         storage=ENDINGS[files[0].suffix],
         files=files,
         topics=dict(sorted(gathered.topics.items())),
         info=info,
+        recording=_told_beside(folder, RECORDING) or {},
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )
@@ -242,11 +245,11 @@ def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [""])[0].rstrip(".") or type(error).__name__
 
 
-def _info_beside(folder: Path) -> dict[str, Any] | None:
-    """Run information of the `metadata.yaml` next to a damaged file."""
+def _told_beside(folder: Path, entry: str) -> dict[str, Any] | None:
+    """An entry of `custom_data` in the bag's `metadata.yaml`; None where it is not there."""
     try:
         document = yaml.safe_load((folder / METADATA_FILE).read_text())
-        return json_object(document["rosbag2_bagfile_information"]["custom_data"][RUN_RECORD])
+        return json_object(document["rosbag2_bagfile_information"]["custom_data"][entry])
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
         return None
 

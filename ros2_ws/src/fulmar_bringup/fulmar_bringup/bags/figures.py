@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bringup.bags.contents import Bag, Topic, span_ns
+from fulmar_bringup.bags.contents import Bag, Topic, json_object, span_ns
 from fulmar_bringup.bags.decode import messages, stamps_ns
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
 from fulmar_core.topics import COMMAND, METADATA, ODOMETRY, VELOCITY_COMMAND
+from fulmar_ros.provenance import MADE_BY, PATCH
 
 NS = 1_000_000_000
 GAP = 2.5  # periods without a message that count as a gap
@@ -51,7 +52,9 @@ def provenance(bag: Bag) -> dict[str, Any]:
         "git_revision": info.get("git_revision"),
         "policy": info.get("policy") or None,
         "controller_sha256": controller.get("sha256"),
-        "package_versions": info.get("package_versions"),
+        "made_by": json_object(bag.attachments.get(MADE_BY, b"").decode(errors="replace")),
+        "uncommitted_changes": PATCH in bag.attachments,
+        "recorded_to_its_end": bag.recording.get("complete"),
         "attachments": {name: hashlib.sha256(data).hexdigest() for name, data in bag.attachments.items()},
         "config_changed_since": changed_config(bag),
     }
@@ -59,8 +62,6 @@ def provenance(bag: Bag) -> dict[str, Any]:
 
 def controller_of(bag: Bag) -> dict[str, Any]:
     """What the controller said of itself last; empty where it said nothing."""
-    from fulmar_bringup.bags.contents import json_object
-
     texts = (json_object(message.data) for _, message in reversed(messages(bag.of(METADATA))))
     return next((text for text in texts if text), {})
 
@@ -128,13 +129,13 @@ def _lateness(
 def _dropped(topic: Topic, bag: Bag) -> int | None:
     """Messages that are known to be missing; None where nothing tells.
 
-    A recorder counts what it gets, which shows what a damaged file has lost. What answers an odometry must have it in
-    the bag: where the odometry is not there, the recorder has not got it.
+    A recorder tells what found no room in its memory, and counts what it writes, which shows what a damaged file has
+    lost. What answers an odometry must have it in the bag: where it is not there, the recorder has not got it.
     """
-    known = None
+    known = (bag.recording.get("dropped") or {}).get(topic.name)
     numbers = np.array(topic.sequence, dtype=np.int64)
     if len(numbers) and numbers.min() > 0 and len(np.unique(numbers)) == len(numbers):
-        known = int(numbers.max() - len(numbers))
+        known = (known or 0) + int(numbers.max() - len(numbers))
     if topic is bag.of(ODOMETRY):
         answered = [stamps_ns(bag.of(wire)) for wire in (COMMAND, VELOCITY_COMMAND) if len(bag.of(wire))]
         own = stamps_ns(topic)

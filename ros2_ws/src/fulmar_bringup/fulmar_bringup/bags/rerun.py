@@ -6,7 +6,6 @@ record, not from the new answer. So one different command does not make everythi
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,7 +92,7 @@ class _Rerun:
         self._mission = Mission(robot, course.task, streamed=course.settings.goals_streamed)
         self._gate = InputGate(robot.limits, frozen_after=0)
         self._answered_ns, self._answer, self._seen_ns = -1, self._safe, 0
-        self._states = _states(course)
+        self._states = _States(course)
         # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
         self._gated = source == "odometry" and (course.settings.lockstep or not course.own)
         self._fed = 0
@@ -216,7 +215,7 @@ class _Rerun:
         return slewed(self._robot.actuators.limited(action), self._answer, self._robot, self._control_s)
 
 
-class _LazyStates:
+class _States:
     """The state of each odometry message, made when it is asked for."""
 
     def __init__(self, course: Course) -> None:
@@ -228,10 +227,3 @@ class _LazyStates:
     def __getitem__(self, index: int) -> RigidBodyState:
         pose = self._pose[index]
         return RigidBodyState(pose[:3], pose[3:], self._velocity[index], self._turn[index])
-
-
-def _states(course: Course) -> _LazyStates:
-    return _LazyStates(course)
-
-
-MakeController = Callable[[Course], Controller]

@@ -86,6 +86,10 @@ def _show_origin(origin: dict[str, Any]) -> None:
     _say(
         f"code: fulmar {origin['fulmar_version'] or 'unknown'}, revision {origin['git_revision'] or 'unknown'}"
     )
+    if origin["made_by"]:
+        _say(f"on {origin['made_by']['platform']}, Python {origin['made_by']['python']}")
+    if origin["recorded_to_its_end"] is False:
+        _say("the recorder did not come to an orderly end")
     if origin["controller_sha256"]:
         _say(f"controller SHA-256: {origin['controller_sha256']}")
     for name, sha256 in origin["attachments"].items():

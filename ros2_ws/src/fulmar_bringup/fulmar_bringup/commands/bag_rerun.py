@@ -77,6 +77,7 @@ def rerun(
 
     Try: fulmar bag rerun runs/demo_x/policy --controller policy --policy runs/bundles/mine
     """
+    from fulmar_bringup.bags.calibration import calibrated_as
     from fulmar_bringup.bags.comparison import as_json as lines
     from fulmar_bringup.bags.comparison import first_difference, read_tolerances
     from fulmar_bringup.bags.contents import open_bag
@@ -92,24 +93,25 @@ def rerun(
     tolerances = read_tolerances(tolerance or [], FIELDS)
     opened = open_bag(bag)
     foreign = opened.info is None
-    course = course_of(
-        opened,
-        robot=robot,
-        task=task,
-        goal=read_pose(goal, "--goal"),
-        control_hz=control_hz,
-        odometry=odometry,
-    )
-    for warning in course.warnings:
-        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
-    name, folder = _chosen(opened, course, controller, policy)
-    if through == "node":
-        from fulmar_bringup.bags.live_node import rerun_through_node, without_repeats
+    with calibrated_as(opened):
+        course = course_of(
+            opened,
+            robot=robot,
+            task=task,
+            goal=read_pose(goal, "--goal"),
+            control_hz=control_hz,
+            odometry=odometry,
+        )
+        for warning in course.warnings:
+            console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+        name, folder = _chosen(opened, course, controller, policy)
+        if through == "node":
+            from fulmar_bringup.bags.live_node import rerun_through_node, without_repeats
 
-        course = without_repeats(course)
-        answers, sha256 = rerun_through_node(opened, course, name, folder)
-    else:
-        answers, sha256 = _answers(course, name, folder, "odometry" if foreign else source)
+            course = without_repeats(course)
+            answers, sha256 = rerun_through_node(opened, course, name, folder)
+        else:
+            answers, sha256 = _answers(course, name, folder, "odometry" if foreign else source)
     fields = judge_answers(course, answers, tolerances)
     first = first_difference(fields)
     recorded = controller_of(opened)
