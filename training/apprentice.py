@@ -18,7 +18,7 @@ from training.teacher import Teacher
 from training.vec_env import BatchVecEnv
 
 RATE = (1e-3, 1e-4)  # learning rate of the first and of the last lesson
-PASSES = 1.5  # through the samples, in each lesson
+PASSES = 6.0  # through the samples, in each lesson
 WEIGHT = 10.0  # of the squared error beside that of the value
 
 
