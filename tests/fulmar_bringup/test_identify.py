@@ -25,8 +25,8 @@ def judged(tmp_path_factory):
     """A platform that drove for a minute with and without ballast: what the benchmark says, and its bags."""
     home = tmp_path_factory.mktemp("bags")
     return run_trial(
-        Trial("floating_platform", 0, seed=2, duration_s=60.0, bags=home)
-    ), home / "floating_platform_00"
+        Trial("floating_platform", 1, seed=2, duration_s=60.0, bags=home)
+    ), home / "floating_platform_01"
 
 
 @pytest.fixture

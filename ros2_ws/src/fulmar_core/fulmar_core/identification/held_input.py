@@ -50,6 +50,8 @@ def late_events(switch_s: np.ndarray, command: np.ndarray, delay: float) -> tupl
 def followed(windows: Windows, delay: float, slew: tuple[float, ...]) -> np.ndarray:
     """What actuators do in each step, which follow late commands no faster than they can.
 
+    A slewed input is a ramp and has slopes by itself: a step gets what is reached at its end, as a simulator's step does.
+
     Args:
         windows: With the commands of their runs.
         delay: Until a command acts [s].
@@ -60,21 +62,41 @@ def followed(windows: Windows, delay: float, slew: tuple[float, ...]) -> np.ndar
     """
     parts: list[np.ndarray] = []
     for number, drive in enumerate(windows.drives):
-        mine = windows.begin_s[windows.drive == number]
-        if not len(mine):
+        begin_s = windows.begin_s[windows.drive == number]
+        if not len(begin_s):
             continue
-        first = float(drive.time_s[0])
-        begins = np.round((mine - first) / windows.dt).astype(int)
-        whole = int(begins.max()) + windows.steps
-        event_s, change = late_events(drive.switch_s, drive.command, delay)
-        wanted = mean_over_steps(event_s, change, np.array([first]), steps=whole, dt=windows.dt)[:, :, 0]
-        if slew:
-            most, now = np.array(slew) * windows.dt, np.zeros(wanted.shape[1])
-            for step in range(whole):
-                now = now + np.clip(wanted[step] - now, -most, most)
-                wanted[step] = now
-        parts.append(np.stack([wanted[begin : begin + windows.steps] for begin in begins], axis=2))
+        if not slew:
+            event_s, change = late_events(drive.switch_s, drive.command, delay)
+            parts.append(mean_over_steps(event_s, change, begin_s, steps=windows.steps, dt=windows.dt))
+            continue
+        ends = begin_s[None, :] + windows.dt * np.arange(1, windows.steps + 1)[:, None]
+        ramps = [
+            ramped(drive.switch_s, wanted, most) for wanted, most in zip(drive.command.T, slew, strict=True)
+        ]
+        parts.append(np.stack([np.interp(ends - delay, *ramp, left=0.0) for ramp in ramps], axis=1))
     return np.concatenate(parts, axis=2)
+
+
+def ramped(switch_s: np.ndarray, wanted: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of what an actuator does that follows steps as fast as it can, and begins at zero.
+
+    Args:
+        switch_s: When each step comes, increasing, shape (k,) [s].
+        wanted: What it is to, shape (k,).
+        most: Fastest change [per s].
+
+    Returns:
+        Times [s] and values of the corners, shapes (2 k,).
+    """
+    times, values = np.empty((2, len(switch_s))), np.empty((2, len(switch_s)))
+    now = 0.0
+    for k, (begin, target) in enumerate(zip(switch_s, wanted, strict=True)):
+        left = switch_s[k + 1] - begin if k + 1 < len(switch_s) else np.inf
+        takes = min(abs(target - now) / most, left)
+        times[:, k], values[0, k] = (begin, begin + takes), now
+        now = target if takes < left else now + np.copysign(most * takes, target - now)
+        values[1, k] = now
+    return times.T.ravel(), values.T.ravel()
 
 
 def for_each_copy(make: Callable[..., np.ndarray], *columns: np.ndarray) -> np.ndarray:
