@@ -50,7 +50,7 @@ def late_events(switch_s: np.ndarray, command: np.ndarray, delay: float) -> tupl
 def followed(windows: Windows, delay: float, slew: tuple[float, ...]) -> np.ndarray:
     """What actuators do in each step, which follow late commands no faster than they can.
 
-    A slewed input is a ramp and has slopes by itself: a step gets what is reached at its end, as a simulator's step does.
+    A slewed input is a ramp and has slopes by itself: a step gets what is reached at its end, as in a simulator.
 
     Args:
         windows: With the commands of their runs.
