@@ -33,12 +33,13 @@ class Excitation:
     near: int = 3  # candidates around the goal
     far: int = 24  # candidates at the end of the room and beyond
     room: float = 0.25  # radius to stay in, of the geofence's [-]
+    calm: float = 1.0  # how much turning counts against a candidate; water and wheels end it by themselves [-]
 
 
 # A platform's valves in the rhythm of its commands; propellers and wheels long enough to come up to speed, and to stop.
 EXCITATIONS = {
     "thrusters": Excitation(hold_s=0.6, foresight_s=2.0),
-    "propellers": Excitation(hold_s=3.0, foresight_s=2.0),
+    "propellers": Excitation(hold_s=6.0, foresight_s=2.0, calm=0.0),
     "differential_drive": Excitation(hold_s=1.5, foresight_s=1.0),
     "ackermann": Excitation(hold_s=1.5, foresight_s=1.0),
 }
@@ -112,7 +113,7 @@ class Excite(Law):
         ahead = how.foresight_s
         miss = np.hypot(after.x + ahead * after.vx, after.y + ahead * after.vy) / room
         spin = after.yaw_rate / self.robot.performance.yaw_rate
-        cost = (miss**2 + spin**2).reshape(how.far, count)
+        cost = (miss**2 + how.calm * spin**2).reshape(how.far, count)
         cost = np.where(np.arange(how.far)[:, None] < allowed, cost, np.inf)
         best = np.argmin(cost, axis=0)
         return np.asarray(candidates.reshape(how.far, count, -1)[best, np.arange(count)])

@@ -24,7 +24,7 @@ class BoatModel:
     """Unknowns: mass, yaw inertia, delay, linear and quadratic drag of surge, sway and yaw."""
 
     own = 9  # six of the state; a constant push along the world's x and y [m/s²] (wind) and in yaw [rad/s²]
-    spans_s: tuple[float, ...] = (5.0, 10.0, 20.0)
+    spans_s: tuple[float, ...] = (5.0, 10.0)
 
     def __init__(self, robot: Robot) -> None:
         """Prepare.
