@@ -131,6 +131,8 @@ class _Rerun:
             recorded = course.commands[step]
             self._answered_ns = stamp
             self._answer = commands[step] if np.isnan(recorded).any() else recorded
+        if not course.own and not self._mission.complete:  # in a bag of our own, it belongs to the run
+            raise self._goalless()
         return Answers(shown, names, actions, commands, acted, tuple(reasons))
 
     def _reason(self, step: int) -> str:
@@ -181,11 +183,13 @@ class _Rerun:
         if self._source == "observations":
             return np.asarray(self._course.observations[step])
         if not self._mission.complete:
-            raise BagError(
-                f"the bag holds no {self._mission.lacking} for '{self._course.task.name}'. Give --goal x,y,deg."
-            )
+            raise self._goalless()
         sample = int(self._course.sample[step])
         return self._mission.observe(self._states[sample], int(self._course.stamp_ns[step]), self._answer)
+
+    def _goalless(self) -> BagError:
+        what, task = self._mission.lacking, self._course.task.name
+        return BagError(f"the bag holds no {what} for '{task}'. Give --goal x,y,deg.")
 
     def _inform(self, step: int) -> None:
         """Tell the controller how its actuators do, if it wants to know."""

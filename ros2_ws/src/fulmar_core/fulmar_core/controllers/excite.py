@@ -33,7 +33,9 @@ class Excitation:
     near: int = 3  # candidates around the goal
     far: int = 24  # candidates at the end of the room and beyond
     room: float = 0.25  # radius to stay in, of the geofence's [-]
-    calm: float = 1.0  # how much turning counts against a candidate; water and wheels end it by themselves [-]
+    calm: float = (
+        1.0  # how much turning counts against a candidate; water and wheels end it by themselves [-]
+    )
 
 
 # A platform's valves in the rhythm of its commands; propellers and wheels long enough to come up to speed, and to stop.
