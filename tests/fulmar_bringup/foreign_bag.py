@@ -17,7 +17,7 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 def write_foreign(
     folder: Path, storage: StoragePlugin, *, count: int = 200, topic: str = "/base/odometry"
 ) -> Path:
-    """A circle at 50 Hz, in frames `map` and `base_footprint`, with a text beside it."""
+    """A circle of half a metre at 0.5 m/s and 50 Hz, in frames `map` and `base_footprint`, with a text beside it."""
     store = type_store()
     new = store.types
     with Writer(folder, version=9, storage_plugin=storage) as writer:
@@ -33,7 +33,9 @@ def write_foreign(
                 child_frame_id="base_footprint",
                 pose=new["geometry_msgs/msg/PoseWithCovariance"](
                     pose=new["geometry_msgs/msg/Pose"](
-                        position=new["geometry_msgs/msg/Point"](x=np.cos(angle), y=np.sin(angle), z=0.0),
+                        position=new["geometry_msgs/msg/Point"](
+                            x=0.5 * np.cos(angle), y=0.5 * np.sin(angle), z=0.0
+                        ),
                         orientation=new["geometry_msgs/msg/Quaternion"](
                             x=0.0, y=0.0, z=np.sin(angle / 2), w=np.cos(angle / 2)
                         ),
@@ -42,7 +44,7 @@ def write_foreign(
                 ),
                 twist=new["geometry_msgs/msg/TwistWithCovariance"](
                     twist=new["geometry_msgs/msg/Twist"](
-                        linear=new["geometry_msgs/msg/Vector3"](x=0.0, y=1.0, z=0.0),
+                        linear=new["geometry_msgs/msg/Vector3"](x=0.0, y=0.5, z=0.0),
                         angular=new["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=1.0),
                     ),
                     covariance=np.zeros(36),
