@@ -116,15 +116,17 @@ def _timeline(bag: Bag) -> Any:
     if stamps is None or not (np.diff(stamps) > 0).all():
         return int
     logs = list(topic.log_ns)
-    pace = (int(stamps[-1]) - int(stamps[0])) / max(1, logs[-1] - logs[0])
 
     def run_time(log_ns: int) -> int:
-        """Whole numbers throughout: nanoseconds since the epoch are too many for a float."""
+        """Whole numbers throughout: nanoseconds since the epoch are too many for a float.
+
+        The run is as long as its odometry: what came before, while nodes started, is told at its beginning.
+        """
         after = bisect.bisect_left(logs, log_ns)
         if after == 0:
-            return int(stamps[0]) - round(pace * (logs[0] - log_ns))
+            return int(stamps[0])
         if after == len(logs):
-            return int(stamps[-1]) + round(pace * (log_ns - logs[-1]))
+            return int(stamps[-1])
         low, high = logs[after - 1], logs[after]
         share = (log_ns - low) / (high - low) if high > low else 1.0
         return int(stamps[after - 1]) + round(share * int(stamps[after] - stamps[after - 1]))
