@@ -53,6 +53,7 @@ class DeployedNetwork(nn.Module):
     choice_commands: torch.Tensor
     choice_slope: torch.Tensor
     choice_offset: torch.Tensor
+    choice_gas: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
         """Build an untrained network."""
@@ -66,6 +67,7 @@ class DeployedNetwork(nn.Module):
             self.register_buffer("choice_commands", torch.zeros(count, valves))
             self.register_buffer("choice_slope", torch.zeros(WRENCH, count))
             self.register_buffer("choice_offset", torch.zeros(count))
+            self.register_buffer("choice_gas", torch.zeros(count))
         units = plan.memory // 2
         self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
         self.from_memory = nn.Linear(units, 4 * units) if units else None
@@ -113,13 +115,14 @@ class DeployedNetwork(nn.Module):
         self.choice_commands.copy_(torch.as_tensor(choice.commands))
         self.choice_slope.copy_(torch.as_tensor(choice.slope))
         self.choice_offset.copy_(torch.as_tensor(choice.offset))
+        self.choice_gas.copy_(torch.as_tensor(choice.gas))
 
     def _appraised(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
         """How much opening each valve is worth, where the last layer asks for a wrench; else what it put out."""
         if self.plan.decision != "choose":
             return raw
         choice = WrenchChoice(
-            self.choice_commands, self.choice_slope, self.choice_offset, torch.zeros(WRENCH)
+            self.choice_commands, self.choice_slope, self.choice_offset, self.choice_gas, torch.ones(WRENCH)
         )
         valves = len(self.plan.command_scale)
         dead = 1.0 - observation[:, -valves:] if self.plan.knows_dead else None

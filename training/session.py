@@ -147,7 +147,8 @@ class Session(BaseCallback):
         network = deployed_network(self.model, normaliser, self._command_scale)
         success, score = self._judge(network)
         check = Check(story.elapsed_s, self.num_timesteps, success, score)
-        if story.best is None or score > story.best[0].score:
+        # A refined run is meant to end otherwise than it was in between, so its last network is the one to keep.
+        if story.best is None or score > story.best[0].score or self._settings.refinement:
             story.best = check, network  # at once, since a person may interrupt anywhere
         story.checks.append(check)
         self._watcher.verdict(story.elapsed_s, success)

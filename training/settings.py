@@ -152,8 +152,9 @@ class TrainingSettings:
     stop_at_success: StopAtSuccess | None = None
     told: bool = False  # whether the network is told pushes and dead valves, of robots with on/off valves
     wrench: bool = (
-        False  # whether it asks for a wrench, for which on/off valves are then chosen, not for single valves
+        False  # whether it asks for a wrench that on/off valves are then chosen for, not for single valves
     )
+    gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
 
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""

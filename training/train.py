@@ -106,6 +106,7 @@ def train(
         strength=settings.strength(0.0),
         told=settings.told,
         wrench=settings.wrench,
+        gas=settings.gas,
     )
     story = Story()
     if resume:

@@ -45,6 +45,7 @@ class BatchVecEnv(VecEnv):
         staggered: bool = True,
         told: bool = False,
         wrench: bool = False,
+        gas: float = 1.0,
     ) -> None:
         """Build the worlds.
 
@@ -60,13 +61,14 @@ class BatchVecEnv(VecEnv):
             staggered: First episodes have random lengths.
             told: Observations also tell pushes and dead valves (`fulmar_core.controllers.told`).
             wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
+            gas: What a valve costs in that choice, as a multiple.
         """
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
         self._judged = robot  # with what its actuators cost now
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
-        self.choice = WrenchChoice.of(robot) if wrench else None
+        self.choice = WrenchChoice.of(robot, gas) if wrench else None
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)

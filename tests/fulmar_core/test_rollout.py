@@ -33,7 +33,7 @@ class Habit:
         self.control_hz = robot.timing.control_hz
         self._scale = robot.actuators.scale
         shape = (len(self.observation_names), len(self._scale))
-        self._weights = np.random.default_rng(8).normal(size=shape) * 0.3
+        self._weights = np.random.default_rng(8).normal(size=shape) * 0.15
 
     def reset(self):
         pass

@@ -48,6 +48,17 @@ def test_no_other_combination_comes_nearer_to_what_is_asked_for_its_gas():
     )  # the order in the table counts a little
 
 
+def test_cheaper_gas_comes_nearer_to_what_is_asked():
+    small = 0.2 * SHARES
+    misses = [
+        float(
+            np.mean(np.sum((wrench(WrenchChoice.of(ROBOT, gas).best(small)) - REACH * small) ** 2, axis=-1))
+        )
+        for gas in (0.2, 1.0)
+    ]
+    assert misses[0] < 0.9 * misses[1]
+
+
 def test_dead_valves_are_never_opened():
     assert (CHOICE.best(SHARES) * DEAD).any()
     assert not (CHOICE.best(SHARES, DEAD) * DEAD).any()

@@ -37,6 +37,7 @@ def test_the_table_names_every_policy_that_shall_ship():
         f"{robot}_{task}" for robot in ("floating_platform", "kingfisher", "turtlebot2") for task in FIVE
     }
     wanted |= {f"{robot}_go_to_position" for robot in ("modular_freeflyer", "jetbot", "leatherback")}
+    wanted |= {"floating_platform_drift_go_to_pose", "floating_platform_drift_track_velocities"}
     assert names == wanted
 
 

@@ -157,6 +157,20 @@ def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypa
     assert less == pytest.approx([before + share * (-0.004 - before) for share in (0.0, 0.25, 0.5, 0.75)])
 
 
+def test_a_refined_run_keeps_its_last_network(tmp_path, quick_judge):
+    quick_judge[:] = [0.9, 1.0, 0.8, 0.7]
+    settings = replace(small("differential_drive"), evaluate_every_s=1e-6)
+    kept = [
+        train(TURTLEBOT, TASK, each, seed=1, out=tmp_path / name, updates=3)["best"]["success_rate"]
+        for name, each in (
+            ("plain", settings),
+            ("refined", replace(settings, refinement=Refinement(0.0, 1.0, 1.0, 0.0))),
+        )
+    ]
+    assert kept[0] == 1.0
+    assert kept[1] < 0.9
+
+
 def test_a_run_folder_holds_settings_curves_and_a_checkpoint(tmp_path, quick_judge):
     settings = small("differential_drive")
     train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=2)

@@ -20,13 +20,10 @@ from fulmar_core.rotation import Array
 
 WRENCH = 3  # force ahead, to the left, and torque
 REACH = 1.5  # what a share of 1 asks for, in units: beyond one of them only the direction matters [-]
-TORQUE_WEIGHT = (
-    4.4  # of missing all torque, where missing all force weighs 1: about as in the tuned LQR's cost-to-go
-)
+# Of missing all torque, where missing all force weighs 1: about as in the tuned LQR's cost-to-go.
+TORQUE_WEIGHT = 4.4
 VALVE_COST = 0.045  # of an open valve, where missing all force costs 1; what is not worth a valve opens none
-HASTE_COST = (
-    2.5  # factor on that for each unit² asked for: who asks for much cares little how exactly it comes
-)
+HASTE_COST = 2.5  # factor on that for each unit² asked for: who asks for much cares less how exactly it comes
 DEAD_COST = 100.0  # of opening a dead valve; more than any wrench is worth
 ORDER_COST = 1e-5  # of each place further down the table, so that no two combinations are equally good
 
@@ -36,18 +33,23 @@ class WrenchChoice:
     """Table of all combinations of valves, with what each costs for a wanted wrench and some dead valves.
 
     In units of the strongest force, and of the strongest torque divided by the root of `TORQUE_WEIGHT`, combination k
-    brings up w_k with n_k valves. Where w is wanted, it costs |w_k - w|² + VALVE_COST n_k (1 + HASTE_COST |w|²), told
-    less |w|², which does not depend on k.
+    brings up w_k with gas g_k = VALVE_COST n_k. Where w is wanted, it costs |w_k - w|² + g_k (1 + HASTE_COST |w|²),
+    told less |w|², which does not depend on k.
     """
 
     commands: Array  # open (1) or closed (0), shape (k, n)
     slope: Array  # what a share of the wanted wrench makes each cheaper, shape (3, k)
     offset: Array  # cost where nothing is wanted, shape (k,)
+    gas: Array  # shape (k,)
     unit: Array  # shape (3,) [N, N, N·m]
 
     @classmethod
-    def of(cls, robot: Robot) -> WrenchChoice:
+    def of(cls, robot: Robot, gas: float = 1.0) -> WrenchChoice:
         """The table of a robot.
+
+        Args:
+            robot: The robot.
+            gas: Multiple of `VALVE_COST` that a valve costs: less is more exact, and uses more.
 
         Raises:
             ValueError: It has no on/off valves.
@@ -57,11 +59,13 @@ class WrenchChoice:
         _, wrench, _ = ValveAllocation(robot.actuators, weight=np.eye(WRENCH), valve_cost=0.0).every
         force, torque = np.max(np.hypot(wrench[:, 0], wrench[:, 1])), np.max(np.abs(wrench[:, 2]))
         unit = np.array([force, force, torque / math.sqrt(TORQUE_WEIGHT)])
-        table = ValveAllocation(robot.actuators, weight=np.diag(unit**-2.0), valve_cost=VALVE_COST)
+        cost = gas * VALVE_COST
+        table = ValveAllocation(robot.actuators, weight=np.diag(unit**-2.0), valve_cost=cost)
         commands, wrench, offset = table.every
         order = ORDER_COST * np.arange(len(commands))
         slope = 2.0 * REACH * (wrench / unit).T
-        return cls(*(np.asarray(part, dtype=np.float32) for part in (commands, slope, offset + order, unit)))
+        parts = commands, slope, offset + order, cost * commands.sum(axis=-1), unit
+        return cls(*(np.asarray(part, dtype=np.float32) for part in parts))
 
     def costs(self, shares: Array, dead: Array | None = None) -> Array:
         """Cost of every combination.
@@ -75,8 +79,8 @@ class WrenchChoice:
         """
         xp = array_namespace(shares)
         commands = xp.asarray(self.commands)
-        haste = VALVE_COST * HASTE_COST * REACH**2 * xp.sum(shares * shares, axis=-1, keepdims=True)
-        cost = xp.asarray(self.offset) + haste * xp.sum(commands, axis=-1) - shares @ xp.asarray(self.slope)
+        haste = HASTE_COST * REACH**2 * xp.sum(shares * shares, axis=-1, keepdims=True)
+        cost = xp.asarray(self.offset) + haste * xp.asarray(self.gas) - shares @ xp.asarray(self.slope)
         return cost if dead is None else cost + DEAD_COST * (dead @ commands.T)
 
     def shares_of(self, wrench: np.ndarray) -> np.ndarray:

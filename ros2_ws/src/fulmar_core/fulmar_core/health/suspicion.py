@@ -17,7 +17,7 @@ class Suspicion:
     model_torque: float = 0.035  # same [N·m]
     push_force: float = 0.3  # of a force from outside at the beginning [N]
     push_torque: float = 0.05  # same [N·m]
-    drift_force: float = 0.02  # of its change in one second; an uneven floor changes with the place [N]
+    drift_force: float = 0.06  # of its change in one second; an uneven floor changes with the place [N]
     drift_torque: float = 0.003  # same [N·m]
     failure: float = 0.02  # chance that an actuator is lost, before anything is seen [-]
     change: float = 1e-3  # chance that what is lost changes, in one second [-]

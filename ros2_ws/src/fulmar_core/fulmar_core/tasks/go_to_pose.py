@@ -42,10 +42,6 @@ class PoseReward:
     turn: float  # times radians come nearer
     fine: float = 0.0  # times exp(-d / 0.03 m - |e| / 0.03 rad): asks for a centimetre and a degree at once
     aligned: float = 0.0  # times exp(-|e| / 0.03 rad), wherever the robot is
-    close: float = 0.0  # times exp(-d / 0.05 m), whatever its heading
-    astray: float = (
-        0.0  # times -(1 - exp(-|e| / 0.25 rad)) (1 - exp(-d / 0.5 m)): turns on the way, not after it
-    )
 
 
 @dataclass(frozen=True)
@@ -121,8 +117,6 @@ class GoToPose:
             + w.turn * (xp.abs(old.heading) - e)
             + w.fine * xp.exp(-d / 0.03 - e / 0.03)
             + w.aligned * xp.exp(-e / 0.03)
-            + w.close * xp.exp(-d / 0.05)
-            - w.astray * (1.0 - xp.exp(-e / 0.25)) * (1.0 - xp.exp(-d / 0.5))
         )
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:

@@ -48,9 +48,7 @@ class TrackVelocities:
     fine_velocity: float  # where the magnified velocity error saturates [m/s]
     fine_yaw_rate: float  # same for the turn rate [rad/s]
     reward_weights: VelocityReward
-    turning: float = (
-        0.0  # how fast the direction of a target turns at most, by `STEP_S`; 0: not at all [rad/s]
-    )
+    turning: float = 0.0  # how fast a target's direction turns at most, of robots that go sideways [rad/s]
     spin: float = 1.0  # largest turn rate of targets, as a share of the robot's [-]
 
     goal_topic: ClassVar[str] = "goal_velocity"
@@ -74,7 +72,8 @@ class TrackVelocities:
         fastest = can.turning_acceleration / clip(speed, 1e-6, None)
         targets = xp.stack((ahead, left, clip(turn, -fastest, fastest)), axis=-1)
         if self.turning:
-            targets = self._turned(targets, draws.uniform(-self.turning, self.turning, count))
+            rate = self.turning if can.lateral_speed > 0.0 else 0.0  # others would have to turn with it
+            targets = self._turned(targets, draws.uniform(-rate, rate, count))
         zero = xp.zeros_like(yaw)
         return at_rest(zero, zero, yaw), Goal(
             targets, zero, no_obstacles(draws.worlds), targets[:, 0, :2] * 0.0
