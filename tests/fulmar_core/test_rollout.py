@@ -28,12 +28,12 @@ class Habit:
 
     name = "habit"
 
-    def __init__(self, robot, task):
+    def __init__(self, robot, task, *, boldness=0.3):
         self.observation_names = Observer(robot, task).names
         self.control_hz = robot.timing.control_hz
         self._scale = robot.actuators.scale
         shape = (len(self.observation_names), len(self._scale))
-        self._weights = np.random.default_rng(8).normal(size=shape) * 0.15
+        self._weights = np.random.default_rng(8).normal(size=shape) * boldness
 
     def reset(self):
         pass
@@ -100,7 +100,9 @@ def test_an_episode_shorter_than_a_control_step_is_refused_by_name():
 @pytest.mark.parametrize("robot", ["turtlebot2", "modular_freeflyer"])
 def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
     robot, task = load_robot(robot), replace(load_task(name), episode_s=8.0)
-    controller, block = Habit(robot, task), getattr(task, "block", None)
+    # Errors magnified as much as this task's make rounding grow past any tolerance at the usual boldness.
+    boldness = 0.15 if name == "drift_track_velocities" else 0.3
+    controller, block = Habit(robot, task, boldness=boldness), getattr(task, "block", None)
     batch = roll_out_in_batch(controller, robot, task, IDEAL, episodes=3, seed=5)
     alone = roll_out_in_backends(
         controller, lambda: MockBackend(robot, block=block), task, IDEAL, episodes=3, seed=5

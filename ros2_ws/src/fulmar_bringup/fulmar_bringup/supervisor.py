@@ -113,8 +113,8 @@ class Supervisor:
         """Goals to publish, with their stamps [ns]."""
         if not isinstance(self._task, TrackVelocities):
             return [(goal, time_ns)]
-        hold_ns = round(1e9 * self._task.hold_s)
-        return [(goal_at(tuple(target)), time_ns + i * hold_ns) for i, target in enumerate(goal.targets)]
+        step_ns = round(1e9 * self._task.step_s)
+        return [(goal_at(tuple(target)), time_ns + i * step_ns) for i, target in enumerate(goal.targets)]
 
     def start_plant(self, alive: Callable[[], None], last_words: Callable[[], str] = lambda: "") -> None:
         """Configure and activate the plant.
