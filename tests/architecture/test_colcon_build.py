@@ -23,6 +23,7 @@ PROGRAMS = {
     "hardware_drivers/driver_node": "hardware_drivers.driver_node",
     "policy_server/classical_node": "policy_server.classical_node",
     "policy_server/lqr_drift_node": "policy_server.lqr_drift_node",
+    "policy_server/excite_node": "policy_server.excite_node",
     "policy_server/lqr_node": "policy_server.lqr_node",
     "policy_server/mpc_node": "policy_server.mpc_node",
     "policy_server/policy_node": "policy_server.policy_node",

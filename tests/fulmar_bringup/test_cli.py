@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup import cli, provenance
+from fulmar_bringup import cli
 from fulmar_core import policy_bundle
 from fulmar_core.paths import config_directory
+from fulmar_ros import provenance
 from policy_server.shipped import shipped_policy
 
 SHIPPED = str(shipped_policy("floating_platform", "go_to_pose"))
@@ -76,7 +77,10 @@ RUN = ["run", "floating_platform"]
             "the targets of task 'race_waypoints' cannot be said in one --goal",
         ),
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
-        ([*RUN, "--controller", "pid"], "unknown controller 'pid'. Known: classical, lqr, lqr_drift, mpc, policy."),
+        (
+            [*RUN, "--controller", "pid"],
+            "unknown controller 'pid'. Known: classical, excite, lqr, lqr_drift, mpc, policy.",
+        ),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
         ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
@@ -289,7 +293,7 @@ def test_the_list_is_one_json_object(fulmar):
     assert (code, err) == (0, "")
     found = json.loads(out)
     assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals", "hardware"]
-    assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical"]
+    assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical", "excite"]
     tasks = json.loads(fulmar("list", "tasks", "--json")[1])["tasks"]
     assert {"go_to_pose", "go_to_position", "go_through_positions", "track_velocities"} <= set(tasks)
 

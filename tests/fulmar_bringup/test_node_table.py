@@ -128,7 +128,7 @@ def test_a_bundle_goes_to_the_policy_node_alone():
 
 def test_the_recorder_gets_only_what_was_said():
     assert recorder_spec(PLAN).parameters == {}
-    assert recorder_spec(PLAN, directory="d", run_info="{}").parameters == {
+    assert recorder_spec(PLAN, directory="d", info="{}").parameters == {
         "directory": "d",
         "run_info": "{}",
     }

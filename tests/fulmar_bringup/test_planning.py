@@ -10,6 +10,8 @@ import pytest
 
 from fulmar_bringup.planning import plan_run
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.paths import config_directory
+from fulmar_core.recording import Recording
 from policy_server.shipped import shipped_policy
 
 NAN = float("nan")
@@ -193,3 +195,22 @@ def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan
 def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
     with pytest.raises(ConfigError, match="robots with thrusters"):
         plan(robot="turtlebot2", controller="classical", guards=dict(fallback="lqr"))
+
+
+def test_the_recorder_keeps_everything_unless_asked_otherwise(plan):
+    assert plan().plan.recording.mode == "whole"
+    assert plan(recording="ring").plan.recording.mode == "ring"
+
+
+def test_an_unknown_way_to_record_is_refused_with_the_nearest(plan):
+    with pytest.raises(UnknownNameError, match="Did you mean 'ring'"):
+        plan(recording="rign")
+
+
+def test_the_system_file_says_how_to_record(plan, tmp_path, monkeypatch):
+    shutil.copytree(config_directory(), tmp_path / "configs")
+    with (tmp_path / "configs" / "systems" / "mujoco_lqr.yaml").open("a") as file:
+        file.write("recorder:\n  mode: ring\n  before_fault_s: 10.0\n")
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path / "configs"))
+    assert plan().plan.recording == Recording(mode="ring", before_fault_s=10.0)
+    assert plan(recording="whole").plan.recording == Recording(before_fault_s=10.0)

@@ -222,3 +222,24 @@ def test_places_of_a_file_are_visited_one_after_another(ros_domain: RosDomain, t
     summary = json_of(done.stdout)
     assert (summary["task"], summary["success"]) == ("go_to_position", True)
     assert summary["goals_progress"] == "2 of 2 targets reached"
+
+
+def test_a_ring_without_a_fault_is_a_run_without_a_bag_or_a_verdict(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """Nobody recorded whether the goal was met, so nobody says so."""
+    asked = (
+        "floating_platform",
+        "--controller",
+        "lqr",
+        "--lockstep",
+        "--duration",
+        "4",
+        "--recording",
+        "ring",
+    )
+    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    summary = json_of(done.stdout)
+    assert done.returncode == 0, done.stderr
+    assert (summary["success"], summary["bag"], summary["failure"]) == (None, None, None)
+    assert not (tmp_path / "bag").exists()

@@ -9,6 +9,7 @@ from types import FrameType
 
 import typer
 
+from fulmar_bringup.commands.bag import bag
 from fulmar_bringup.commands.benchmark import benchmark
 from fulmar_bringup.commands.bundle import bundle
 from fulmar_bringup.commands.demo import demo
@@ -19,6 +20,7 @@ from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
 from fulmar_bringup.commands.faults import faults
 from fulmar_bringup.commands.goals import goals
+from fulmar_bringup.commands.identify import identify
 from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
@@ -54,7 +56,9 @@ app.command()(export)
 app.command(epilog=MEANINGS)(evaluate)
 app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
+app.add_typer(bag, name="bag")
 app.command()(report)
+app.command()(identify)
 app.command()(demo)
 app.command()(doctor)
 

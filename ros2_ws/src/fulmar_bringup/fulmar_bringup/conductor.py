@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import signal
 import tempfile
 import time
@@ -14,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.emulation import emulation_of
@@ -30,18 +30,18 @@ from fulmar_bringup.node_table import (
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
-from fulmar_bringup.provenance import fulmar_version, git_revision
 from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
-from fulmar_core.paths import config_path
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from hardware_drivers.settings import load_hardware
 
+# A ring that no fault has written tells nothing of the goal.
+_UNJUDGED: dict[str, Any] = {"success": None, "bag": None, "failure": None}
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
@@ -57,8 +57,8 @@ class RunOutcome:
 
     @property
     def exit_code(self) -> int:
-        """0: ran to its end and met the goal; 1: not so."""
-        return 0 if self.summary.get("success") and not self.failure else 1
+        """0: ran to its end and met the goal, or nobody recorded whether it did; 1: not so."""
+        return 0 if self.summary.get("success") is not False and not self.failure else 1
 
 
 def conduct(request: RunRequest) -> RunOutcome:
@@ -75,13 +75,16 @@ def conduct(request: RunRequest) -> RunOutcome:
     """
     with claimed_domain():
         failure, plant_steps = _run(request)
+    ring = request.plan.recording.mode == "ring"
+    if ring and not failure and not request.record.exists():
+        return RunOutcome({**summarise(_nothing_recorded(request)), **_UNJUDGED}, "")
     try:
         record = read_run(request.record)
         summary = summarise(record)
     except FulmarError as error:
         failure, summary = failure or str(error), summarise(_nothing_recorded(request))
         summary["bag"] = str(request.record) if request.record.exists() else None
-    if not failure and plant_steps > summary["steps"]:
+    if not failure and not ring and plant_steps > summary["steps"]:
         failure = f"the bag lacks {plant_steps - summary['steps']} of {plant_steps} commands"
     return RunOutcome({**summary, "failure": failure or None}, failure)
 
@@ -237,26 +240,15 @@ def _with_plant_reaction(reason: str, overseer: Supervisor) -> str:
 
 def _recording(request: RunRequest) -> dict[str, str]:
     plan = request.plan
-    info = {
-        **{key: value for key, value in asdict(plan).items() if key not in ("start", "supervised")},
-        "start": list(plan.start),
+    more = {
         "goal": list(request.goal) if request.goal else None,
-        **_of_goals(plan),
-        "fulmar_version": fulmar_version(),
-        "git_revision": git_revision(),
         "command": request.command,
-    }
-    files = {
-        **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
-        **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
-        "robot.yaml": config_path("robots", plan.robot),
-        "task.yaml": config_path("tasks", plan.task),
-        "scenario.yaml": config_path("scenarios", plan.scenario),
+        **_of_goals(plan),
     }
     return {
         "directory": str(request.record),
-        "run_info": json.dumps(info),
-        "attachments": json.dumps({name: str(path.absolute()) for name, path in files.items()}),
+        "info": run_info(plan, more),
+        "files": attachments(plan),
     }
 
 

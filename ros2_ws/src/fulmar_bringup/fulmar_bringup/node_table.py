@@ -5,9 +5,10 @@ Both `fulmar run` and `launch/system.launch.py` start exactly what this lists.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
 from fulmar_bringup.system import (
@@ -21,6 +22,7 @@ from fulmar_bringup.system import (
     load_system,
 )
 from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
@@ -63,6 +65,7 @@ class RunPlan:
     supervised: bool = False  # somebody else activates the plant when all are ready
     hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
     emulated: bool = False  # an emulator stands in for the device
+    recording: Recording = Recording()
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
@@ -163,18 +166,25 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
     )
 
 
-def recorder_spec(
-    plan: RunPlan, *, directory: str = "", run_info: str = "", attachments: str = ""
-) -> NodeSpec:
-    """The node that records; without a directory it makes one under `runs/`."""
-    texts = {"directory": directory, "run_info": run_info, "attachments": attachments}
+def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: str = "") -> NodeSpec:
+    """The node that records.
+
+    Args:
+        plan: What to run.
+        directory: The bag folder; empty: the node makes one under `runs/`.
+        info: As `bag_origin.run_info` gives it.
+        files: As `bag_origin.attachments` gives it.
+    """
+    texts = {"directory": directory, "run_info": info, "attachments": files}
+    usual = asdict(Recording())
+    unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
     return NodeSpec(
         "recorder",
         "fulmar_ros",
         "recorder_node",
         "fulmar_ros.recorder_node",
         f"/{plan.robot}",
-        {key: text for key, text in texts.items() if text},
+        {key: text for key, text in texts.items() if text} | unusual,
     )
 
 
@@ -259,14 +269,15 @@ def list_nodes(
     as_written = chosen == (base.robot, base.task, base.controller, base.backend)
     hz = base.control_hz if as_written else default_control_hz(*chosen)
     load_robot(chosen[0]).timing.substeps(hz)
-    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "", guards=base.guards)
+    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "", guards=base.guards, recording=base.recorder)
     if plan.backend == "hardware":
         path = default_hardware(plan.robot, hardware)
         guards = (
             base.guards if base.backend == "hardware" else default_guards(plan.controller, "hardware", path)
         )
         plan = replace(plan, hardware=path, guards=guards)
-    nodes = recorder_spec(plan), plant_spec(plan), *guard_specs(plan)
+    recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan, system or "mujoco_policy"))
+    nodes = recorder, plant_spec(plan), *guard_specs(plan)
     if not goals:
         return *nodes, controller_spec(plan)
     checked_goals(goals, load_robot(plan.robot), load_task(plan.task))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from fulmar_bringup.system import (
     default_control_hz,
     default_guards,
     default_hardware,
+    system_of,
 )
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
@@ -32,6 +33,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, read_passport
+from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
@@ -74,6 +76,7 @@ def plan_run(
     hardware: str | None = None,
     emulate: bool = False,
     guards: Mapping[str, Any] = MappingProxyType({}),
+    recording: str | None = None,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -98,6 +101,7 @@ def plan_run(
         hardware: Hardware file, a name or a path that ends in `.yaml`; the robot's own by default.
         emulate: Whether an emulator stands in for the device.
         guards: What replaces the guards of the system file, by name.
+        recording: `whole` or `ring`; the system file's by default.
 
     Returns:
         The request.
@@ -154,6 +158,7 @@ def plan_run(
         hardware=hardware,
         emulated=emulate,
         guards=watched,
+        recording=chosen_recording(controller, backend, recording),
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
@@ -273,6 +278,21 @@ def checked_rate(robot: Robot, control_hz: float) -> float:
     except ValueError as error:
         raise ConfigError(f"robot '{robot.name}': {error}") from error
     return control_hz
+
+
+def chosen_recording(controller: str, backend: str, mode: str | None) -> Recording:
+    """What the system file says of the recorder, in another mode where one is given.
+
+    Raises:
+        ConfigError: There is no such mode.
+    """
+    system = system_of(controller, backend)
+    recording = system.recorder if system else Recording()
+    if mode is None:
+        return recording
+    if mode not in MODES:
+        raise UnknownNameError("recording", mode, MODES)
+    return replace(recording, mode=cast(Mode, mode))
 
 
 def check_beat(control_hz: float, rate: float) -> None:

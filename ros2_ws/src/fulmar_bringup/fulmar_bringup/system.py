@@ -9,8 +9,11 @@ from pathlib import Path
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
+from fulmar_core.controllers.excite import Excite
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.paths import config_names, config_path
+from fulmar_core.recording import Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.area import NO_AREA, check_area
 from fulmar_core.tasks import Task, load_task
@@ -39,6 +42,10 @@ def _load_classical(robot: Robot, task: Task, control_hz: float, _policy: str) -
     return load_classical(robot, task, control_hz=control_hz)
 
 
+def _load_excite(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
+    return Excite(robot, task, control_hz=control_hz)
+
+
 def _check_lqr(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr")
 
@@ -49,6 +56,14 @@ def _check_mpc(robot: Robot, task: Task) -> None:
 
 def _check_lqr_drift(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr_drift")
+
+
+def _check_excite(robot: Robot, task: Task) -> None:
+    if task.kind not in EXCITE_TASKS:
+        raise ConfigError(
+            f"controller 'excite' stays around one place, '{task.name}' has none. "
+            f"Use --task with one of: {', '.join(EXCITE_TASKS)}."
+        )
 
 
 def _any_pair(robot: Robot, task: Task) -> None:
@@ -64,6 +79,7 @@ class ControllerEntry:
     load: Callable[[Robot, Task, float, str], Controller]  # with the command rate and the folder of a bundle
     check: Callable[[Robot, Task], None]  # refuses a robot and a task that it has nothing for
     needs: tuple[str, ...] = ()  # modules that an extra brings
+    strives: bool = True  # whether it means to meet the goal
 
 
 _LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
@@ -83,6 +99,7 @@ CONTROLLERS = {
     "classical": ControllerEntry(
         f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
     ),
+    "excite": ControllerEntry(Excite.title, "excite_node", _load_excite, _check_excite, strives=False),
 }
 FALLBACKS = tuple(name for name in CONTROLLERS if name != "policy")
 SIMULATED = ("mujoco", "mock")
@@ -129,6 +146,7 @@ class System:
     backend: str
     control_hz: float  # [Hz]
     guards: Guards = NONE
+    recorder: Recording = Recording()
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at."""

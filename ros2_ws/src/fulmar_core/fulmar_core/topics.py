@@ -12,7 +12,7 @@ from typing import Literal
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 
-Source = Literal["plant", "controller", "operator", "every node"]
+Source = Literal["plant", "controller", "operator", "every node", "device"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
 # Services, all of std_srvs/Trigger.
@@ -142,7 +142,7 @@ DIAGNOSTICS = Wire(
     "every node",
     "stream",
     "on change and at least 1 Hz",
-    "health of each node: `<robot>: plant`, `<robot>: controller`",
+    "health of each node: `<robot>: plant`, `<robot>: controller`, `<robot>: recorder`",
 )
 GOAL_POSE = Wire(
     "goal_pose",
@@ -249,6 +249,14 @@ VELOCITY_COMMAND = Wire(
     "control rate",
     "for robots that take speed and turn rate: `linear.x` and `angular.z`, stamped as the observation it answers",
 )
+TRANSFORMS = Wire(
+    "/tf",
+    "tf2_msgs/msg/TFMessage",
+    "device",
+    "stream",
+    "as its publishers like",
+    "frames, recorded where tf2_msgs is installed; nothing that controls needs them",
+)
 
 WIRES: tuple[Wire, ...] = (
     ODOMETRY,
@@ -277,6 +285,7 @@ WIRES: tuple[Wire, ...] = (
     TELEOP,
     JOY,
     SWAP,
+    TRANSFORMS,
 )
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

@@ -31,9 +31,9 @@ from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
-from fulmar_ros.convert import measurement_of, stamp_ns
 from fulmar_ros.deadline import CONTROL_PRIORITY, Deadlines, Spread, take_priority
-from fulmar_ros.goal_messages import GoalMessage, goal_of, obstacles_of
+from fulmar_ros.goal_messages import GoalMessage
+from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
@@ -96,11 +96,7 @@ class ControllerNode(LifecycleNode):
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
-        # After so long without a command the actuators are in their safe state, and memories are of no use.
-        pause_s = (
-            1.75 / hz if self.settings.lockstep else default_timeout(1.0 / hz) * max(self.settings.rate, 1.0)
-        )
-        self._pause_ns = round(1e9 * pause_s)
+        self._pause_ns = self.settings.pause_ns(self.robot)
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
         self._inference_ms = Spread()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
 from fulmar_core.safety.area import NO_AREA, check_area
+from fulmar_core.safety.watchdog import default_timeout
 
 
 @dataclass(frozen=True)
@@ -47,3 +48,9 @@ class ControllerSettings:
     def control_rate(self, robot: Robot) -> float:
         """Command rate in the robot's own time [Hz]."""
         return self.control_hz or robot.timing.control_hz
+
+    def pause_ns(self, robot: Robot) -> int:
+        """After so long without a command the actuators are in their safe state, and memories are of no use [ns]."""
+        hz = self.control_rate(robot)
+        pause_s = 1.75 / hz if self.lockstep else default_timeout(1.0 / hz) * max(self.rate, 1.0)
+        return round(1e9 * pause_s)

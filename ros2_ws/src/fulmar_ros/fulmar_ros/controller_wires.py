@@ -17,8 +17,7 @@ from visualization_msgs.msg import MarkerArray
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
-from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import (
     ACTION,
@@ -42,11 +41,6 @@ from fulmar_ros.health import Health
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 FLUSH = Duration(seconds=0.3)
-
-
-def sees_obstacles(task: Task) -> bool:
-    """Whether a controller of this task must be told what stands about."""
-    return isinstance(task, GoToPositionWithObstacles)
 
 
 class ControllerWires:

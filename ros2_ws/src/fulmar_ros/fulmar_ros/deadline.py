@@ -30,11 +30,15 @@ class Spread:
         """Note one sample."""
         self._samples.append(value)
 
+    def values(self) -> np.ndarray:
+        """The newest samples, in their order."""
+        return np.fromiter(self._samples, dtype=float)
+
     def percentiles(self, name: str) -> dict[str, str]:
         """`<name>_p50`, `_p99` and `_max` as text for diagnostics; empty texts before the first sample."""
         if not self._samples:
             return {f"{name}_{key}": "" for key in ("p50", "p99", "max")}
-        values = np.fromiter(self._samples, dtype=float)
+        values = self.values()
         p50, p99 = np.percentile(values, (50, 99))
         return {
             f"{name}_p50": f"{p50:.4f}",

@@ -12,9 +12,8 @@ from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.schedule import Schedule
 from fulmar_core.state import RigidBodyState
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.push_block import PushBlock
-from fulmar_ros.controller_wires import sees_obstacles
 
 BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
 

@@ -35,8 +35,9 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     command_wire,
 )
-from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_ns, stamp_of
+from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
 from fulmar_ros.deadline import Spread
+from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 

@@ -7,6 +7,8 @@ import typer
 from fulmar_bringup.commands.benchmark_drift import drift
 from fulmar_bringup.commands.benchmark_estimator import estimator
 from fulmar_bringup.commands.benchmark_hardware import hardware
+from fulmar_bringup.commands.benchmark_identify import identify
+from fulmar_bringup.commands.benchmark_recorder import recorder
 from fulmar_bringup.commands.benchmark_roboran import roboran
 from fulmar_bringup.commands.benchmark_throughput import throughput
 from fulmar_bringup.commands.benchmark_training import training
@@ -19,6 +21,8 @@ benchmark = typer.Typer(
 benchmark.command()(drift)
 benchmark.command()(estimator)
 benchmark.command()(hardware)
+benchmark.command()(identify)
+benchmark.command()(recorder)
 benchmark.command()(roboran)
 benchmark.command()(throughput)
 benchmark.command()(training)
