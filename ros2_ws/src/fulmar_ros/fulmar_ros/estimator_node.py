@@ -21,9 +21,10 @@ from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
-from fulmar_ros.convert import OdometryWriter, stamp_ns
+from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.deadline import CONTROL_PRIORITY, take_priority
 from fulmar_ros.health import Health
+from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node

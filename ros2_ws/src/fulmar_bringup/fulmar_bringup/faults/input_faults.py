@@ -12,7 +12,8 @@ from fulmar_bringup.faults.finding import Finding, stopped
 from fulmar_bringup.faults.live_system import LiveSystem
 from fulmar_bringup.faults.spoiler import Spoil
 from fulmar_core.safety.input_gate import FROZEN_AFTER
-from fulmar_ros.convert import stamp_ns, stamp_of
+from fulmar_ros.convert import stamp_of
+from fulmar_ros.message_reader import stamp_ns
 
 BACK_NS = 1_000_000  # so little, with each message, that it is no jump of time
 
