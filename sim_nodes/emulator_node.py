@@ -17,11 +17,12 @@ from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.priority import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import DEVICE_STATE, MOCAP, TRUTH
 from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
-from fulmar_ros.deadline import PLANT_PRIORITY, Deadlines, take_priority
+from fulmar_ros.deadline import Deadlines
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.parameters import read_parameters

@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from fulmar_ros.deadline import CONTROL_PRIORITY, PLANT_PRIORITY, Deadlines, Spread, take_priority
+from fulmar_core.priority import CONTROL_PRIORITY, PLANT_PRIORITY, take_priority
+from fulmar_ros.deadline import Deadlines, Spread
 
 
 class FakeClock:

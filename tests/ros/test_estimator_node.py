@@ -110,9 +110,9 @@ def test_a_platform_reaches_its_pose_by_estimated_odometry_alone(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """The loop over the estimator, in real time: plant, motion capture and inertial unit, estimator, policy."""
-    asked = ("floating_platform", "--controller", "policy", "--start", "0.6,0.3,20", "--goal", "0,0,0")
+    asked = ("floating_platform", "--controller", "policy", "--start", "0.3,0.2,10", "--goal", "0,0,0")
     done = run_in_real_time(
-        *asked, "--duration", "25", "--estimator", "mocap_imu", env=ros_domain.env, cwd=tmp_path
+        *asked, "--duration", "9", "--estimator", "mocap_imu", env=ros_domain.env, cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
     summary = json_of(done.stdout)

@@ -10,6 +10,9 @@ import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from fulmar_bringup import robot_operator
+from fulmar_bringup.commands.estop import estop
+from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.plant_node import PlantNode
@@ -127,7 +130,7 @@ def test_the_command_stops_a_robot_that_has_no_e_stop_node(
     assert not drive(neighbour)
 
 
-def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain, tmp_path: Path) -> None:
-    done = fulmar("estop", env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == 1
-    assert "ROS_DOMAIN_ID" in done.stderr
+def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain, monkeypatch) -> None:
+    monkeypatch.setattr(robot_operator, "FIND_S", 0.2)
+    with pytest.raises(RunFailed, match="ROS_DOMAIN_ID"):
+        estop()

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
 
 import numpy as np
 import psutil
@@ -17,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray
 from std_srvs.srv import SetBool
 
+from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import RunPlan, emulator_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup
@@ -159,34 +163,55 @@ def test_the_bearing_has_a_service_and_a_state_of_its_own(rig: Rig) -> None:
         until(lambda on=on: states[-1] is on)
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
-@pytest.mark.parametrize(
-    ("robot", "task", "hardware"),
-    [
-        ("floating_platform", "go_to_pose", "zero_g_lab"),
-        ("turtlebot2", "go_to_position", "turtlebot2"),
-        ("kingfisher", "go_to_position", "kingfisher"),
-        ("kingfisher", "go_to_position", "kingfisher_ardupilot"),
-    ],
+RUNS = (
+    ("floating_platform", "go_to_pose", "zero_g_lab"),
+    ("turtlebot2", "go_to_position", "turtlebot2"),
+    ("kingfisher", "go_to_position", "kingfisher"),
+    ("kingfisher", "go_to_position", "kingfisher_ardupilot"),
 )
-def test_a_run_reaches_its_goal_through_the_protocol(
-    robot, task, hardware, ros_domain: RosDomain, tmp_path
-) -> None:
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Driver, protocol, controller and recorder as on the robot; judged by where the emulated robot really is."""
-    asked = ("run", robot, "--task", task, "--backend", "hardware", "--hardware", hardware, "--emulate")
-    more = ("--seed", "2", "--record", "bag", "--json")
-    done = fulmar(*asked, *more, env=ros_domain.env, cwd=tmp_path, timeout_s=150.0)
-    summary = json_of(done.stdout)
-    assert summary["failure"] is None, done.stderr
-    assert summary["success"]
-    file = next((tmp_path / "bag").glob("*.mcap"))
-    with file.open("rb") as stream:
-        reader = make_reader(stream)
-        topics = {channel.topic for channel in reader.get_summary().channels.values()}
-        attached = {attachment.name for attachment in reader.iter_attachments()}
-    assert {f"/{robot}/odom", f"/{robot}/actuators/state", f"/{robot}/emulator/actuators"} <= topics
-    assert "hardware.yaml" in attached
+    with reserved_domains(2) as domains, ThreadPoolExecutor(2) as pool:
+        free: SimpleQueue[int] = SimpleQueue()
+        for domain in domains:
+            free.put(domain)
+
+        def run(case: tuple[str, str, str]) -> subprocess.CompletedProcess[str]:
+            robot, task, hardware = case
+            domain = free.get()
+            env = {**ros_domain.env, "ROS_DOMAIN_ID": str(domain)}
+            asked = (
+                "run",
+                robot,
+                "--task",
+                task,
+                "--backend",
+                "hardware",
+                "--hardware",
+                hardware,
+                "--emulate",
+            )
+            more = ("--start", "0,0,0", "--goal", "0.5,0.1,10", "--duration", "11", "--record", hardware)
+            try:
+                return fulmar(*asked, *more, "--json", env=env, cwd=tmp_path)
+            finally:
+                free.put(domain)
+
+        done = list(pool.map(run, RUNS))
+    for (robot, _task, hardware), ended in zip(RUNS, done, strict=True):
+        summary = json_of(ended.stdout)
+        assert summary["failure"] is None, (hardware, ended.stderr)
+        assert summary["success"], hardware
+        with next((tmp_path / hardware).glob("*.mcap")).open("rb") as stream:
+            reader = make_reader(stream)
+            topics = {channel.topic for channel in reader.get_summary().channels.values()}
+            attached = {attachment.name for attachment in reader.iter_attachments()}
+        assert {f"/{robot}/odom", f"/{robot}/actuators/state", f"/{robot}/emulator/actuators"} <= topics
+        assert "hardware.yaml" in attached
 
 
 @pytest.fixture
@@ -229,10 +254,9 @@ def test_our_commands_reach_a_base_that_takes_plain_twists(neighbour, heard) -> 
         until(
             lambda: (
                 neighbour.drive.publish(neighbour.twist(0.3, -0.4))
-                or (bool(messages) and messages[-1].linear.x > 0.0)
+                or (bool(messages) and (messages[-1].linear.x, messages[-1].angular.z) == (0.3, -0.4))
             )
         )
-        assert (messages[-1].linear.x, messages[-1].angular.z) == (0.3, -0.4)
         until(lambda: messages[-1].linear.x == 0.0)
         node.stop()
 
@@ -242,8 +266,11 @@ def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> N
     messages = heard(Float32MultiArray, "/action")
     node, spin = running(DriverNode, "kingfisher", "robot:=kingfisher", "hardware:=kingfisher_action")
     with spin:
-        until(lambda: neighbour.command([0.5, -1.0]) or (bool(messages) and any(messages[-1].data)))
-        assert list(messages[-1].data) == [0.5, -1.0]
+        until(
+            lambda: (
+                neighbour.command([0.5, -1.0]) or (bool(messages) and list(messages[-1].data) == [0.5, -1.0])
+            )
+        )
         until(lambda: not any(messages[-1].data))
         node.stop()
 

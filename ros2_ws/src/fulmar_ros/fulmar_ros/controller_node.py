@@ -20,6 +20,7 @@ from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.area import outside
@@ -31,7 +32,7 @@ from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
-from fulmar_ros.deadline import CONTROL_PRIORITY, Deadlines, Spread, take_priority
+from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission

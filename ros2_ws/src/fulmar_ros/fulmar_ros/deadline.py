@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
@@ -14,9 +13,6 @@ KEPT = 20_000  # newest samples that percentiles are taken over
 NS = 1_000_000_000
 LONG_NS = NS // 2
 EARLY_NS = 300_000  # stay awake for the last of the wait; longer would keep callbacks from the interpreter
-# Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
-# other, and a controller that spins for ever must not keep the watchdog from closing the valves.
-CONTROL_PRIORITY, PLANT_PRIORITY = 10, 20
 
 
 class Spread:
@@ -45,22 +41,6 @@ class Spread:
             f"{name}_p99": f"{p99:.4f}",
             f"{name}_max": f"{values.max():.4f}",
         }
-
-
-def take_priority(priority: int) -> bool:
-    """Put the calling thread before every ordinary one (SCHED_FIFO), where this process may.
-
-    Args:
-        priority: Among such threads, 1 to 99; the higher interrupts the lower.
-
-    Returns:
-        Whether it could; without the right to it the thread keeps its place and is late when others are busy.
-    """
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (PermissionError, AttributeError):
-        return False
-    return True
 
 
 class Deadlines:

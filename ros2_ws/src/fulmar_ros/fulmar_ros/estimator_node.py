@@ -18,11 +18,11 @@ from sensor_msgs.msg import Imu
 
 from fulmar_core.estimation.estimator import Estimate, Estimator
 from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import OdometryWriter
-from fulmar_ros.deadline import CONTROL_PRIORITY, take_priority
 from fulmar_ros.health import Health
 from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.parameters import read_parameters
@@ -106,9 +106,8 @@ class EstimatorNode(Node):
     def _take(self, problem: str) -> None:
         """Publish what is believed now, if it is newer than what was; call with the lock held."""
         if not self._prior:
-            self._prior = (
-                take_priority(CONTROL_PRIORITY) or True
-            )  # the executor's thread: a controller waits for it
+            take_priority(CONTROL_PRIORITY)  # the executor's thread: a controller waits for it
+            self._prior = True
         if problem:
             self._refuse(problem)
             return

@@ -19,6 +19,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.topics import (
@@ -58,7 +59,7 @@ class PlantWires:
         simulated: bool,
         odometry: bool = True,
         mocap: MotionCapture | None = None,
-        by_hand: bool = True,
+        realtime: bool = True,
     ) -> None:
         """Create every endpoint.
 
@@ -69,9 +70,10 @@ class PlantWires:
             simulated: Whether truth and clock are published.
             odometry: Whether the plant says where it is; if not, somebody else does.
             mocap: Publish its poses, of which an estimator makes odometry.
-            by_hand: Whether a person may take the actuators.
+            realtime: By the clock: a person may take the actuators, and commands go before other work.
         """
         self._mocap = mocap
+        self._prior = not realtime  # whether the thread that hears commands has what priority it needs
         self.lock = threading.Condition()
         self.latency_ms = Spread()
         self._guard = guard
@@ -107,7 +109,7 @@ class PlantWires:
             else node.create_subscription(JointState, wire.name, self._on_command, qos)
         )
         self._operator = [node.create_subscription(Bool, ESTOP.name, self._on_estop, subscriber_qos(ESTOP))]
-        if by_hand:
+        if realtime:
             qos = subscriber_qos(TELEOP, reliable=True)
             self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, qos))
         self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
@@ -214,6 +216,10 @@ class PlantWires:
 
     def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
         now = time.monotonic_ns()
+        if not self._prior:
+            # The executor's thread. It shares the interpreter with the loop, which else waits while it is held up.
+            take_priority(CONTROL_PRIORITY)
+            self._prior = True
         with self.lock:
             taken = self._guard.offer(names, values, now, stamp_ns=stamp)
             sent = self._sent_ns.pop(stamp, None)

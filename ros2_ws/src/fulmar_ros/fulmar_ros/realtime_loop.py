@@ -8,8 +8,9 @@ import time
 import numpy as np
 
 from fulmar_core.backend import Backend, Sample
+from fulmar_core.priority import PLANT_PRIORITY, take_priority
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_ros.deadline import PLANT_PRIORITY, Deadlines, take_priority
+from fulmar_ros.deadline import Deadlines
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.simulated_time import SimulatedTime
 from fulmar_ros.wall_time import WallTime

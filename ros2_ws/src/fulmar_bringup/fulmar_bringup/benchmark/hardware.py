@@ -1,7 +1,8 @@
 """Closed loops through emulated devices: driver, protocol, controller, recorder and safety, in real time.
 
 Each episode is the very command that a person types, `fulmar run --backend hardware --emulate`, in a ROS domain of its
-own. A real protocol has no faster clock, so that many systems run beside each other instead.
+own. A real protocol has no faster clock, so that many systems run beside each other instead. An episode that came to
+its end is kept as a file, so that a campaign that was broken off goes on where it was.
 """
 
 from __future__ import annotations
@@ -61,30 +62,41 @@ class Episode:
     latency_p99_ms: float | None
 
 
-def cases_of(robots: Iterable[str] | None) -> list[Case]:
-    """The cases of some robots, or all.
+def cases_of(names: Iterable[str] | None) -> list[Case]:
+    """The cases of some hardware files, or all.
 
     Raises:
-        UnknownNameError: A robot has none.
+        UnknownNameError: A file has none.
     """
-    if robots is None:
+    if names is None:
         return list(CASES)
-    known = {case.robot for case in CASES}
-    for robot in robots:
-        if robot not in known:
-            raise UnknownNameError("emulated robot", robot, known)
-    return [case for case in CASES if case.robot in set(robots)]
+    known = {case.hardware: case for case in CASES}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("emulated device", name, known)
+    return [known[name] for name in names]
 
 
-def measure(
-    cases: list[Case], *, episodes: int, jobs: int, progress: Callable[[int], None]
-) -> list[dict[str, Any]]:
-    """Run every episode of every case.
+@dataclass(frozen=True)
+class Campaign:
+    """How episodes are run, and where they are kept."""
+
+    episodes: int  # of each case
+    seconds: float | None  # of each episode, at whose end the goal is held; None: the task's own [s]
+    jobs: int  # systems beside each other
+    out: Path | None = None  # folder of what came of each; None: nothing is kept
+
+    def seconds_of(self, case: Case) -> float:
+        """Length of a case's episodes [s]."""
+        return self.seconds or load_task(case.task).episode_s
+
+
+def measure(cases: list[Case], campaign: Campaign, progress: Callable[[int], None]) -> list[dict[str, Any]]:
+    """Run every episode of every case that is not kept already.
 
     Args:
         cases: What to run.
-        episodes: Of each case.
-        jobs: Systems beside each other.
+        campaign: How.
         progress: Told how many episodes are over.
 
     Returns:
@@ -94,42 +106,57 @@ def measure(
         ConfigError: There are not so many free ROS domains.
     """
     done: dict[Case, list[Episode]] = {case: [] for case in cases}
-    with reserved_domains(jobs) as domains, ThreadPoolExecutor(jobs) as pool:
+    with reserved_domains(campaign.jobs) as domains, ThreadPoolExecutor(campaign.jobs) as pool:
         free: queue.SimpleQueue[int] = queue.SimpleQueue()
         for domain in domains:
             free.put(domain)
-        seeds = range(FIRST_SEED, FIRST_SEED + episodes)
-        asked = {pool.submit(_run, case, seed, free): case for case in cases for seed in seeds}
+        seeds = range(FIRST_SEED, FIRST_SEED + campaign.episodes)
+        # Seed by seed, so that what is broken off has some of each.
+        asked = {pool.submit(_run, case, seed, campaign, free): case for seed in seeds for case in cases}
         try:
             for count, future in enumerate(as_completed(asked), 1):
                 done[asked[future]].append(future.result())
                 progress(count)
         finally:
             pool.shutdown(cancel_futures=True)
-    return [_figures(case, sorted(found, key=lambda episode: episode.seed)) for case, found in done.items()]
+    return [
+        _figures(case, campaign, sorted(found, key=lambda episode: episode.seed))
+        for case, found in done.items()
+    ]
 
 
-def _run(case: Case, seed: int, free: queue.SimpleQueue[int]) -> Episode:
+def _run(case: Case, seed: int, campaign: Campaign, free: queue.SimpleQueue[int]) -> Episode:
+    seconds = campaign.seconds_of(case)
+    kept = campaign.out / f"{case.hardware}_{seconds:g}s_{seed}.json" if campaign.out else None
+    if kept is not None and kept.exists():
+        return Episode(**json.loads(kept.read_text(encoding="utf-8")))
     domain = free.get()
     try:
         with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
-            return _episode(seed, *_output(case, seed, domain, Path(folder) / "bag"))
+            episode = _episode(seed, *_output(case, seed, seconds, domain, Path(folder) / "bag"))
     finally:
         free.put(domain)
+    if kept is not None:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = kept.with_suffix(".new")
+        unfinished.write_text(json.dumps(asdict(episode)), encoding="utf-8")
+        unfinished.replace(kept)
+    return episode
 
 
-def _output(case: Case, seed: int, domain: int, record: Path) -> tuple[str, str]:
+def _output(case: Case, seed: int, seconds: float, domain: int, record: Path) -> tuple[str, str]:
     """What the command prints: its JSON object, and what it says besides."""
     command = [sys.executable, "-m", "fulmar_bringup.cli", "run", case.robot, "--task", case.task]
     command += ["--backend", "hardware", "--hardware", case.hardware, "--emulate", "--seed", str(seed)]
+    command += ["--duration", str(seconds), "--record", str(record), "--json"]
     try:
         done = subprocess.run(
-            [*command, "--record", str(record), "--json"],
+            command,
             env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=load_task(case.task).episode_s + SLACK_S,
+            timeout=seconds + SLACK_S,
             check=False,
         )
     except subprocess.TimeoutExpired:
@@ -153,7 +180,7 @@ def _episode(seed: int, out: str, err: str) -> Episode:
     )
 
 
-def _figures(case: Case, episodes: list[Episode]) -> dict[str, Any]:
+def _figures(case: Case, campaign: Campaign, episodes: list[Episode]) -> dict[str, Any]:
     succeeded = sum(episode.success for episode in episodes)
     share = succeeded / len(episodes)
     return {
@@ -161,6 +188,7 @@ def _figures(case: Case, episodes: list[Episode]) -> dict[str, Any]:
         "robot": case.robot,
         "driver": load_hardware(case.hardware).driver.kind,
         "episodes": len(episodes),
+        "seconds": campaign.seconds_of(case),
         "succeeded": succeeded,
         "share": share,
         "required": REQUIRED,

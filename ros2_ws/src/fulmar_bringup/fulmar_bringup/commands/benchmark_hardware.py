@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -14,36 +15,50 @@ from fulmar_core.exit_codes import FAILED
 
 
 def hardware(
-    robots: Annotated[
+    only: Annotated[
         str | None,
-        typer.Option("--robot", metavar="R,...", help="Names with commas between; all by default."),
+        typer.Option(
+            "--hardware",
+            metavar="F,...",
+            help="Files of configs/hardware, with commas between; all by default.",
+        ),
     ] = None,
     episodes: Annotated[int, typer.Option(metavar="N", min=1, help="Episodes of each device.")] = 40,
+    seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=5.0, help="Length of an episode; the task's own by default."),
+    ] = None,
     jobs: Annotated[
         int,
         typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each."),
-    ] = 4,
+    ] = 3,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep what came of each episode, and do not repeat what is there."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Drive emulated devices to their goals, through driver and wire protocol, in real time, with the shipped policies.
 
     Each episode is `fulmar run --backend hardware --emulate` with a seed of its own. Success is that of `fulmar run`,
-    judged by where the emulated robot really is. The exit code is 1 where a device reaches its goal too rarely.
+    judged by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
+    With --out, a campaign that was broken off goes on where it was. The exit code is 1 where a device reaches its goal
+    too rarely.
 
     Try:
 
-    fulmar benchmark hardware --robot turtlebot2 --episodes 8
+    fulmar benchmark hardware --hardware turtlebot2 --episodes 8 --seconds 25
     """
-    from fulmar_bringup.benchmark.hardware import cases_of, measure
+    from fulmar_bringup.benchmark.hardware import Campaign, cases_of, measure
     from fulmar_bringup.extras import require
     from fulmar_bringup.system import modules_of
 
-    cases = cases_of([name.strip() for name in robots.split(",")] if robots else None)
+    cases = cases_of([name.strip() for name in only.split(",")] if only else None)
     for case in cases:
         require(*modules_of("policy", "hardware", hardware=case.hardware, emulated=True))
     total = len(cases) * episodes
     with work_bar("driving") as moved:
-        found = measure(cases, episodes=episodes, jobs=jobs, progress=lambda done: moved(done, total))
+        found = measure(cases, Campaign(episodes, seconds, jobs, out), lambda done: moved(done, total))
     if as_json:
         print_json({"cases": found, "jobs": jobs, "passed": all(case["passed"] for case in found)})
     else:

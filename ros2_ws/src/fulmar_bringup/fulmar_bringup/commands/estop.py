@@ -32,13 +32,13 @@ def estop(
 
     fulmar estop floating_platform --reset
     """
-    from fulmar_bringup.operator import FIND_S, operator
+    from fulmar_bringup.robot_operator import FIND_S, operator
     from fulmar_core.topics import ESTOP_RESET, ESTOP_TRIGGER
 
     service = ESTOP_RESET if reset else ESTOP_TRIGGER
     answers = []
     with operator() as person:
-        spaces = person.robots_with(service, robot)
+        spaces = person.robots_with(service, robot, wait_s=FIND_S)
         for space in spaces:
             done, words = person.ask(f"{space}/{service}")
             answers.append({"robot": space.strip("/"), "done": done, "said": words})

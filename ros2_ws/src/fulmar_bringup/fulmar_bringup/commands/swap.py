@@ -31,7 +31,7 @@ def swap(
 
     fulmar swap floating_platform runs/bundles/go_to_pose
     """
-    from fulmar_bringup.operator import operator
+    from fulmar_bringup.robot_operator import operator
 
     with operator() as person:
         sent = str(folder.absolute())

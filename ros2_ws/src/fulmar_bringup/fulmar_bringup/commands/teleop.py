@@ -45,10 +45,10 @@ def teleop(
 
     load_robot(robot)  # a wrong name is told in one line
     if give_back:
-        from fulmar_bringup.operator import operator
+        from fulmar_bringup.robot_operator import FIND_S, operator
 
         with operator() as person:
-            if not person.robots_with(GIVE_BACK, robot):
+            if not person.robots_with(GIVE_BACK, robot, wait_s=FIND_S):
                 raise RunFailed(f"no plant of '{robot}' is heard in this ROS domain.")
             done, words = person.ask(f"/{robot}/{GIVE_BACK}")
         output.print(words, markup=False)

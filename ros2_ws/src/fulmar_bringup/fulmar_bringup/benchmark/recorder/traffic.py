@@ -14,10 +14,11 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
 from fulmar_core.errors import RunFailed
+from fulmar_core.priority import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from fulmar_ros.convert import stamp_of
-from fulmar_ros.deadline import PLANT_PRIORITY, Deadlines, take_priority
+from fulmar_ros.deadline import Deadlines
 from fulmar_ros.qos import publisher_qos
 
 ODOMETRY_HZ, EVERY = 200.0, 4  # commands: every fourth

@@ -33,7 +33,7 @@ class Operator:
         """Ask through a node that spins already."""
         self._node = node
 
-    def robots_with(self, service: str, robot: str | None, *, wait_s: float = FIND_S) -> list[str]:
+    def robots_with(self, service: str, robot: str | None, *, wait_s: float) -> list[str]:
         """Namespaces that offer a service, as soon as one does; only that of one robot, if it is named."""
         return self._found(
             lambda: [
@@ -45,7 +45,7 @@ class Operator:
             wait_s,
         )
 
-    def plants(self, robot: str | None, *, wait_s: float = FIND_S) -> list[str]:
+    def plants(self, robot: str | None, *, wait_s: float) -> list[str]:
         """Namespaces in which a plant runs; arguments as of `robots_with`."""
         return self._found(
             lambda: [space for name, space in self._node.get_node_names_and_namespaces() if name == "plant"],
