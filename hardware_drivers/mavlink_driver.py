@@ -16,7 +16,6 @@ from pymavlink import mavutil
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
@@ -144,7 +143,6 @@ class MavlinkDriver:
             link.mav.rc_channels_override_send(link.target_system, link.target_component, *channels)
 
     def _run(self) -> None:
-        take_priority(PLANT_PRIORITY)  # the loop waits for what comes here
         beaten = 0.0
         while not self._over.is_set():
             now = time.monotonic()

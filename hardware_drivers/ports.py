@@ -13,7 +13,6 @@ from typing import Protocol
 import serial
 
 from fulmar_core.errors import ConfigError, DeviceError
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
 
 READ_S = 0.05  # how soon the reading thread hears that it shall end
 RETRY_S = 0.1
@@ -143,7 +142,6 @@ class Reader:
         self._thread.start()
 
     def _run(self) -> None:
-        take_priority(PLANT_PRIORITY)  # the loop waits for what comes here
         while not self._over.is_set():
             try:
                 data = self._port.read()

@@ -17,7 +17,7 @@ from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import FAILED
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
+from fulmar_core.priority import PLANT_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import DEVICE_STATE, MOCAP, TRUTH
@@ -106,6 +106,7 @@ class EmulatorNode(Node):
 
     def _run(self) -> None:
         take_priority(PLANT_PRIORITY)
+        take_priority_with_helpers(PLANT_PRIORITY)
         dt = self._backend.robot.timing.physics_dt
         deadlines, began_s, ticks = Deadlines(dt), time.monotonic(), 0
         while deadlines.wait(self._stop):

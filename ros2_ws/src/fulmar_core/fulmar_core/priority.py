@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 
 # Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
@@ -23,3 +24,22 @@ def take_priority(priority: int) -> bool:
     except (PermissionError, AttributeError):
         return False
     return True
+
+
+def take_priority_with_helpers(priority: int) -> None:
+    """The same for every other thread of this process that has none yet, but for the main one.
+
+    Messages pass through threads of the middleware. One of them that waits for the processor holds up, with the locks
+    that it holds, also who stands before every ordinary thread. The main thread only starts and ends a node.
+
+    Args:
+        priority: See `take_priority`.
+    """
+    try:
+        threads = [int(name) for name in os.listdir("/proc/self/task")]
+    except OSError:
+        return
+    for thread in threads:
+        with contextlib.suppress(OSError, AttributeError):  # it may have ended, or we may not
+            if thread != os.getpid() and os.sched_getscheduler(thread) == os.SCHED_OTHER:
+                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))

@@ -20,7 +20,7 @@ from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.area import outside
@@ -44,6 +44,9 @@ from fulmar_ros.standby import Standby, ready
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
+FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the one that was due
+PATIENCE = 0.25  # of a period, for a measurement that is late
+PATIENCE_AT_FIRST = 0.9  # the same while nobody knows yet when measurements come
 LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 SAFE_REPEATS = 5
 STATUS_PERIOD_S = 0.4  # at least 2 Hz
@@ -78,6 +81,7 @@ class ControllerNode(LifecycleNode):
         self._make_controller, self._request_exit, self._learned = make_controller, request_exit, learned
         self._lock = threading.Lock()
         self._stop = threading.Event()
+        self._arrived = threading.Event()  # a measurement, since a beat waits for one
         self._thread: threading.Thread | None = None
         hz = self.settings.control_rate(self.robot)
         timeout_s = self.settings.input_timeout_s or default_timeout(1.0 / hz) / min(self.settings.rate, 1.0)
@@ -97,6 +101,7 @@ class ControllerNode(LifecycleNode):
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
+        self._period_s = 1.0 / (hz * self.settings.rate)
         self._pause_ns = self.settings.pause_ns(self.robot)
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
@@ -380,14 +385,14 @@ class ControllerNode(LifecycleNode):
                 x, y = (float(value) for value in measurement.state.position_in_world[:2])
                 changes["outside"] = outside(x, y, self.settings.area)
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
+        self._arrived.set()
         if self.settings.lockstep:
             self._control(measurement)
 
     def _follow(self, measurement: Measurement, now_ns: int) -> None:
         """Let the beat follow the arrivals, in real time."""
         if self._newest is None:
-            # The executor's thread, which this is, shares the interpreter with the control loop.
-            take_priority(CONTROL_PRIORITY)
+            take_priority_with_helpers(CONTROL_PRIORITY)
         anchor = self._phase.anchor_ns(measurement.stamp_ns, now_ns)
         if anchor is not None:
             self._deadlines.align(anchor)
@@ -399,7 +404,15 @@ class ControllerNode(LifecycleNode):
         while deadlines.wait(self._stop):
             if limit and deadlines.late_in_a_row >= limit:
                 self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
+            self._wait_for_what_is_due()
             self._control(self._newest)
+
+    def _wait_for_what_is_due(self) -> None:
+        """Wait a moment for the measurement that comes with this beat: what is acted on is as young as it can be."""
+        self._arrived.clear()
+        last_ns = self._flags.last_input_ns
+        if last_ns is not None and time.monotonic_ns() - last_ns > FRESH_NS:
+            self._arrived.wait((PATIENCE if self._phase.known else PATIENCE_AT_FIRST) * self._period_s)
 
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""

@@ -104,9 +104,10 @@ class Deadlines:
             self.overruns += 1
         if self._anchor_ns is not None:
             self._next_ns = now + self._period_ns - (now - self._anchor_ns) % self._period_ns
-            # The step to the new beat is no error of the period; the rate counts from here.
+            # The step to the new beat is no error of the period; rate and errors count from here.
             self._anchor_ns = self._last_ns = self._first_ns = None
-            self.beats = 0
+            self.beats = self.overruns = 0
+            self.period_error_ms = Spread()
         return True
 
     @property

@@ -18,7 +18,7 @@ from sensor_msgs.msg import Imu
 
 from fulmar_core.estimation.estimator import Estimate, Estimator
 from fulmar_core.estimation.settings import load_estimator
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
@@ -106,7 +106,7 @@ class EstimatorNode(Node):
     def _take(self, problem: str) -> None:
         """Publish what is believed now, if it is newer than what was; call with the lock held."""
         if not self._prior:
-            take_priority(CONTROL_PRIORITY)  # the executor's thread: a controller waits for it
+            take_priority_with_helpers(CONTROL_PRIORITY)  # a controller waits for us
             self._prior = True
         if problem:
             self._refuse(problem)

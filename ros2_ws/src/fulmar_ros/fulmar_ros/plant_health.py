@@ -27,7 +27,7 @@ class PlantHealth:
     """Looks at a plant's loop from outside its thread, and publishes what it finds.
 
     Attributes:
-        mode: inactive, waiting, running, finished or fault.
+        mode: inactive, waiting, running, stopping, finished or fault.
         reason: Why it is in fault, or could not be configured.
         more: What a device has to tell by itself; see `Device.health`.
     """
@@ -123,6 +123,7 @@ class PlantHealth:
             "watchdog_trips": str(self._guard.watchdog.trips),
             "rejected_commands": str(self._guard.rejected),
             "commanded_by": "person" if self._guard.person else "controller",
+            "answers": str(self._wires.answers),
             **self._wires.latency_ms.percentiles("latency_ms"),
         }
         if self._realtime is not None:

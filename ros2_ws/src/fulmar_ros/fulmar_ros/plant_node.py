@@ -223,6 +223,9 @@ class PlantNode(LifecycleNode):
                 )
             else:
                 self._realtime.run(sample, self._count(self.robot.timing.physics_dt), self._stop)
+            self.health.mode = "stopping"  # from here on nobody has to command
+            with self.wires.lock:
+                self.guard.reset()
             self._make_safe()
             self.health.mode = "inactive" if self._stop.is_set() else "finished"
         except FulmarError as error:

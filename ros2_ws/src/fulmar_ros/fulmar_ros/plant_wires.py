@@ -19,7 +19,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.topics import (
@@ -73,9 +73,10 @@ class PlantWires:
             realtime: By the clock: a person may take the actuators, and commands go before other work.
         """
         self._mocap = mocap
-        self._prior = not realtime  # whether the thread that hears commands has what priority it needs
+        self._prior = not realtime  # whether the threads that commands pass have what priority they need
         self.lock = threading.Condition()
         self.latency_ms = Spread()
+        self.answers = 0  # states that a command has answered
         self._guard = guard
         self._sent_ns: OrderedDict[int, int] = OrderedDict()
         self._answered: int | None = None
@@ -217,14 +218,14 @@ class PlantWires:
     def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
         now = time.monotonic_ns()
         if not self._prior:
-            # The executor's thread. It shares the interpreter with the loop, which else waits while it is held up.
-            take_priority(CONTROL_PRIORITY)
+            take_priority_with_helpers(CONTROL_PRIORITY)
             self._prior = True
         with self.lock:
             taken = self._guard.offer(names, values, now, stamp_ns=stamp)
             sent = self._sent_ns.pop(stamp, None)
             if taken and sent is not None:
                 self.latency_ms.add((now - sent) / 1e6)
+                self.answers += 1
             if taken:
                 self._answered = stamp
             self.lock.notify_all()

@@ -32,6 +32,7 @@ from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
 SWITCH_INTERVAL_S = 0.0005
 
 SPIN_S = 60.0
+EXECUTOR = "FULMAR_EXECUTOR"  # environment variable: default, or events
 
 RequestExit = Callable[[int], None]
 """Ends the process in order, with an exit code; from any thread, returns at once, the first call counts."""
@@ -162,6 +163,11 @@ def _stop(node: Any) -> int:
 
 
 def _executor() -> Executor:
+    """The EventsExecutor; rclpy's default one where there is none, or where the environment asks for it."""
+    if os.environ.get(EXECUTOR) == "default":
+        from rclpy.executors import SingleThreadedExecutor
+
+        return SingleThreadedExecutor()
     try:
         from rclpy.experimental import EventsExecutor
     except ImportError:  # rclpy before Jazzy's 7.1.2
