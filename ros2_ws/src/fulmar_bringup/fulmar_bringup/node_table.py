@@ -42,6 +42,7 @@ class NodeSpec:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     quiet: bool = False  # says only what is wrong
     remappings: dict[str, str] = field(default_factory=dict)  # topics under other names
+    network: str = ""  # namespace of Linux that it runs in; empty: ours
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ class RunPlan:
     hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
     emulated: bool = False  # an emulator stands in for the device
     recording: Recording = Recording()
+    copies: int = 1  # of each command on the wire
+    controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
@@ -99,8 +102,16 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         parameters["area"] = list(guards.area)
     if guards.estop:
         parameters["estop"] = True
+    if plan.copies > 1:
+        parameters["copies"] = plan.copies
     return NodeSpec(
-        "controller", "policy_server", executable, f"policy_server.{executable}", f"/{plan.robot}", parameters
+        "controller",
+        "policy_server",
+        executable,
+        f"policy_server.{executable}",
+        f"/{plan.robot}",
+        parameters,
+        network=plan.controller_network,
     )
 
 

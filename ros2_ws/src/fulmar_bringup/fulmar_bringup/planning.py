@@ -77,6 +77,8 @@ def plan_run(
     emulate: bool = False,
     guards: Mapping[str, Any] = MappingProxyType({}),
     recording: str | None = None,
+    copies: int = 1,
+    controller_network: str = "",
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -102,6 +104,8 @@ def plan_run(
         emulate: Whether an emulator stands in for the device.
         guards: What replaces the guards of the system file, by name.
         recording: `whole` or `ring`; the system file's by default.
+        copies: How often each command is sent.
+        controller_network: Network namespace that the controller runs in; ours by default.
 
     Returns:
         The request.
@@ -159,6 +163,8 @@ def plan_run(
         emulated=emulate,
         guards=watched,
         recording=chosen_recording(controller, backend, recording),
+        copies=copies,
+        controller_network=controller_network,
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)

@@ -46,6 +46,7 @@ DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILU
 PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
 FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the one that was due
 PATIENCE = 0.25  # of a period, for a measurement that is late
+COPY_AFTER = 0.2  # of a period; the copies of a command are over before the next one
 PATIENCE_AT_FIRST = 0.9  # the same while nobody knows yet when measurements come
 LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 SAFE_REPEATS = 5
@@ -405,7 +406,11 @@ class ControllerNode(LifecycleNode):
             if limit and deadlines.late_in_a_row >= limit:
                 self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
             self._wait_for_what_is_due()
+            self.wires.forget_command()
             self._control(self._newest)
+            for _ in range(self.settings.copies - 1):
+                if not self._stop.wait(COPY_AFTER * self._period_s):
+                    self.wires.repeat_command()
 
     def _wait_for_what_is_due(self) -> None:
         """Wait a moment for the measurement that comes with this beat: what is acted on is as young as it can be."""

@@ -9,6 +9,8 @@ from fulmar_core.robot import Robot
 from fulmar_core.safety.area import NO_AREA, check_area
 from fulmar_core.safety.watchdog import default_timeout
 
+MOST_COPIES = 3
+
 
 @dataclass(frozen=True)
 class ControllerSettings:
@@ -31,6 +33,7 @@ class ControllerSettings:
     max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
     area: tuple[float, ...] = NO_AREA  # x_min, x_max, y_min, y_max that the robot must not leave [m]
     overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
+    copies: int = 1  # of each command, within its period; in real time only
     autostart: bool = True
 
     def __post_init__(self) -> None:
@@ -42,6 +45,8 @@ class ControllerSettings:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
         if self.overruns_to_stop < 0:
             raise ValueError(f"overruns_to_stop = {self.overruns_to_stop} must not be negative.")
+        if not 1 <= self.copies <= MOST_COPIES:
+            raise ValueError(f"copies = {self.copies} must be from 1 to {MOST_COPIES}.")
         if self.area != NO_AREA:
             check_area(self.area)
 

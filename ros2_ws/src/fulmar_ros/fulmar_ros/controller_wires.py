@@ -102,6 +102,7 @@ class ControllerWires:
             *([self._health] if self._health else []),
         )
         self._write_command = self._command_writer()
+        self._newest: TwistStamped | JointState | None = None
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_health = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(controller.observation_names, "position")
@@ -133,7 +134,17 @@ class ControllerWires:
 
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""
-        self._command.publish(self._write_command.write(command, stamp))
+        self._newest = self._write_command.write(command, stamp)
+        self._command.publish(self._newest)
+
+    def repeat_command(self) -> None:
+        """Publish the newest command once more, unless there is none since `forget_command`."""
+        if self._newest is not None:
+            self._command.publish(self._newest)
+
+    def forget_command(self) -> None:
+        """Have nothing to repeat."""
+        self._newest = None
 
     def publish_safe(self, stamp: int) -> None:
         """Publish the safe command; with a message of its own, so that any thread may."""

@@ -103,7 +103,9 @@ class PlantWires:
         self._node = node
         self._block: Publisher | None = None
         wire = command_wire(robot)
-        qos = subscriber_qos(wire, reliable=True)
+        # By the clock the newest command counts. A reliable reader would hold it back while one that a network lost is
+        # asked for again, which takes seconds.
+        qos = subscriber_qos(wire, reliable=not realtime)
         self._commands = (
             node.create_subscription(TwistStamped, wire.name, self._on_velocity, qos)
             if wire is VELOCITY_COMMAND

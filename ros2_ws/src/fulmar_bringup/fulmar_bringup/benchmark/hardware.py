@@ -1,68 +1,48 @@
-"""Closed loops through emulated devices: driver, protocol, controller, recorder and safety, in real time.
-
-Each episode is the very command that a person types, `fulmar run --backend hardware --emulate`, in a ROS domain of its
-own. A real protocol has no faster clock, so that many systems run beside each other instead. An episode that came to
-its end is kept as a file, so that a campaign that was broken off goes on where it was.
-"""
+"""Closed loops through emulated devices: driver, protocol, controller, recorder and safety, in real time."""
 
 from __future__ import annotations
 
-import json
-import os
-import queue
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
-from pathlib import Path
+import contextlib
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
-from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.benchmark.closed_loops import Command
 from fulmar_core.errors import UnknownNameError
-from fulmar_core.tasks import load_task
 from hardware_drivers.settings import load_hardware
-
-REQUIRED = 0.95  # share of episodes that reach their goal
-SLACK_S = 120.0  # what starting and stopping may take on a busy machine
-FIRST_SEED = 1
 
 
 @dataclass(frozen=True)
-class Case:
+class HardwareCase:
     """A device and what it is asked to do."""
 
-    hardware: str  # name of a file in configs/hardware
+    name: str  # of a file in configs/hardware
     task: str
 
     @property
     def robot(self) -> str:
         """Whose device it is."""
-        return load_hardware(self.hardware).robot
+        return load_hardware(self.name).robot
+
+    def prepared(self, _seed: int) -> contextlib.AbstractContextManager[Command]:
+        """An emulator stands in for the device."""
+        device = ("--backend", "hardware", "--hardware", self.name, "--emulate")
+        return contextlib.nullcontext(Command((), device, {}))
+
+    def about(self) -> dict[str, Any]:
+        """The device and what drives it."""
+        return {"hardware": self.name, "driver": load_hardware(self.name).driver.kind}
 
 
 CASES = (
-    Case("zero_g_lab", "go_to_pose"),
-    Case("turtlebot2", "go_to_position"),
-    Case("kingfisher", "go_to_position"),
-    Case("kingfisher_ardupilot", "go_to_position"),
+    HardwareCase("zero_g_lab", "go_to_pose"),
+    HardwareCase("turtlebot2", "go_to_position"),
+    HardwareCase("kingfisher", "go_to_position"),
+    HardwareCase("kingfisher_ardupilot", "go_to_position"),
 )
 
 
-@dataclass(frozen=True)
-class Episode:
-    """How one of them went."""
-
-    seed: int
-    success: bool
-    failure: str | None  # why it did not come to its end
-    final_position_error_m: float | None
-    watchdog_trips: int | None
-    latency_p99_ms: float | None
-
-
-def cases_of(names: Iterable[str] | None) -> list[Case]:
+def cases_of(names: Iterable[str] | None) -> list[HardwareCase]:
     """The cases of some hardware files, or all.
 
     Raises:
@@ -70,129 +50,8 @@ def cases_of(names: Iterable[str] | None) -> list[Case]:
     """
     if names is None:
         return list(CASES)
-    known = {case.hardware: case for case in CASES}
+    known = {case.name: case for case in CASES}
     for name in names:
         if name not in known:
             raise UnknownNameError("emulated device", name, known)
     return [known[name] for name in names]
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """How episodes are run, and where they are kept."""
-
-    episodes: int  # of each case
-    seconds: float | None  # of each episode, at whose end the goal is held; None: the task's own [s]
-    jobs: int  # systems beside each other
-    out: Path | None = None  # folder of what came of each; None: nothing is kept
-
-    def seconds_of(self, case: Case) -> float:
-        """Length of a case's episodes [s]."""
-        return self.seconds or load_task(case.task).episode_s
-
-
-def measure(cases: list[Case], campaign: Campaign, progress: Callable[[int], None]) -> list[dict[str, Any]]:
-    """Run every episode of every case that is not kept already.
-
-    Args:
-        cases: What to run.
-        campaign: How.
-        progress: Told how many episodes are over.
-
-    Returns:
-        Figures of each case, ready for JSON.
-
-    Raises:
-        ConfigError: There are not so many free ROS domains.
-    """
-    done: dict[Case, list[Episode]] = {case: [] for case in cases}
-    with reserved_domains(campaign.jobs) as domains, ThreadPoolExecutor(campaign.jobs) as pool:
-        free: queue.SimpleQueue[int] = queue.SimpleQueue()
-        for domain in domains:
-            free.put(domain)
-        seeds = range(FIRST_SEED, FIRST_SEED + campaign.episodes)
-        # Seed by seed, so that what is broken off has some of each.
-        asked = {pool.submit(_run, case, seed, campaign, free): case for seed in seeds for case in cases}
-        try:
-            for count, future in enumerate(as_completed(asked), 1):
-                done[asked[future]].append(future.result())
-                progress(count)
-        finally:
-            pool.shutdown(cancel_futures=True)
-    return [
-        _figures(case, campaign, sorted(found, key=lambda episode: episode.seed))
-        for case, found in done.items()
-    ]
-
-
-def _run(case: Case, seed: int, campaign: Campaign, free: queue.SimpleQueue[int]) -> Episode:
-    seconds = campaign.seconds_of(case)
-    kept = campaign.out / f"{case.hardware}_{seconds:g}s_{seed}.json" if campaign.out else None
-    if kept is not None and kept.exists():
-        return Episode(**json.loads(kept.read_text(encoding="utf-8")))
-    domain = free.get()
-    try:
-        with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
-            episode = _episode(seed, *_output(case, seed, seconds, domain, Path(folder) / "bag"))
-    finally:
-        free.put(domain)
-    if kept is not None:
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = kept.with_suffix(".new")
-        unfinished.write_text(json.dumps(asdict(episode)), encoding="utf-8")
-        unfinished.replace(kept)
-    return episode
-
-
-def _output(case: Case, seed: int, seconds: float, domain: int, record: Path) -> tuple[str, str]:
-    """What the command prints: its JSON object, and what it says besides."""
-    command = [sys.executable, "-m", "fulmar_bringup.cli", "run", case.robot, "--task", case.task]
-    command += ["--backend", "hardware", "--hardware", case.hardware, "--emulate", "--seed", str(seed)]
-    command += ["--duration", str(seconds), "--record", str(record), "--json"]
-    try:
-        done = subprocess.run(
-            command,
-            env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=seconds + SLACK_S,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return "", "it did not end in time"
-    return done.stdout, done.stderr
-
-
-def _episode(seed: int, out: str, err: str) -> Episode:
-    try:
-        summary = json.loads(out)
-    except ValueError:
-        last = err.strip().splitlines()[-1:] or ["it said nothing"]
-        return Episode(seed, False, last[0], None, None, None)
-    return Episode(
-        seed,
-        bool(summary["success"]) and not summary["failure"],
-        summary["failure"],
-        summary["final_position_error_m"],
-        summary["watchdog_trips"],
-        summary["latency_ms"]["p99"],
-    )
-
-
-def _figures(case: Case, campaign: Campaign, episodes: list[Episode]) -> dict[str, Any]:
-    succeeded = sum(episode.success for episode in episodes)
-    share = succeeded / len(episodes)
-    return {
-        **asdict(case),
-        "robot": case.robot,
-        "driver": load_hardware(case.hardware).driver.kind,
-        "episodes": len(episodes),
-        "seconds": campaign.seconds_of(case),
-        "succeeded": succeeded,
-        "share": share,
-        "required": REQUIRED,
-        "passed": share >= REQUIRED,
-        "watchdog_trips": sum(episode.watchdog_trips or 0 for episode in episodes),
-        "missed": [asdict(episode) for episode in episodes if not episode.success],
-    }

@@ -9,6 +9,7 @@ from fulmar_bringup.commands.benchmark_estimator import estimator
 from fulmar_bringup.commands.benchmark_hardware import hardware
 from fulmar_bringup.commands.benchmark_identify import identify
 from fulmar_bringup.commands.benchmark_latency import endurance, latency
+from fulmar_bringup.commands.benchmark_network import network
 from fulmar_bringup.commands.benchmark_recorder import recorder
 from fulmar_bringup.commands.benchmark_roboran import roboran
 from fulmar_bringup.commands.benchmark_throughput import throughput
@@ -25,6 +26,7 @@ benchmark.command()(estimator)
 benchmark.command()(hardware)
 benchmark.command()(identify)
 benchmark.command()(latency)
+benchmark.command()(network)
 benchmark.command()(recorder)
 benchmark.command()(roboran)
 benchmark.command()(throughput)

@@ -49,13 +49,14 @@ def hardware(
 
     fulmar benchmark hardware --hardware turtlebot2 --episodes 8 --seconds 25
     """
-    from fulmar_bringup.benchmark.hardware import Campaign, cases_of, measure
+    from fulmar_bringup.benchmark.closed_loops import Campaign, measure
+    from fulmar_bringup.benchmark.hardware import cases_of
     from fulmar_bringup.extras import require
     from fulmar_bringup.system import modules_of
 
     cases = cases_of([name.strip() for name in only.split(",")] if only else None)
     for case in cases:
-        require(*modules_of("policy", "hardware", hardware=case.hardware, emulated=True))
+        require(*modules_of("policy", "hardware", hardware=case.name, emulated=True))
     total = len(cases) * episodes
     with work_bar("driving") as moved:
         found = measure(cases, Campaign(episodes, seconds, jobs, out), lambda done: moved(done, total))

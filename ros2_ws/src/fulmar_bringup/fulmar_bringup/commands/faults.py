@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from fulmar_bringup.commands.arguments import JsonOption
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_core.exit_codes import FAILED
 
@@ -38,11 +38,15 @@ def faults(
     fulmar faults --robot turtlebot2 --only controller_killed,odometry_silent
     """
     from fulmar_bringup.extras import require
-    from fulmar_bringup.faults.suite import faults_of, run_faults
+    from fulmar_bringup.faults.suite import faults_of, run_faults, skipped_here
+    from fulmar_bringup.faults.two_hosts import why_not
     from fulmar_bringup.system import modules_of
 
     chosen = faults_of(robot, [name.strip() for name in only.split(",")] if only else None)
     require(*modules_of("policy", "mujoco"))
+    if skipped_here() and not only:
+        names = ", ".join(fault.__name__ for fault in skipped_here())
+        console.print(f"skipped: {names}: {why_not()}", markup=False)
     with work_bar("harming") as moved:
         findings = run_faults(robot, chosen, lambda done: moved(done, len(chosen)))
     if as_json:

@@ -112,6 +112,20 @@ def run(
             "no bag and no verdict on the goal, and the exit code is 0. The system file's `recorder:` by default.",
         ),
     ] = None,
+    copies: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, max=3, help="Send each command so often, where a network loses some."
+        ),
+    ] = 1,
+    controller_network: Annotated[
+        str,
+        typer.Option(
+            "--controller-in",
+            metavar="NETNS",
+            help="Network namespace of Linux that the controller runs in, as on another computer.",
+        ),
+    ] = "",
     as_json: JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
@@ -131,6 +145,7 @@ def run(
     fulmar run floating_platform --controller classical --goals circle
 
     fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
+
     fulmar run floating_platform --controller lqr --duration 3600 --recording ring
     """
     if lockstep and rate != 1.0:
@@ -164,6 +179,8 @@ def run(
         emulate=emulate,
         guards=asked_guards(estimator, estop, fallback, trusted_keys),
         recording=recording,
+        copies=copies,
+        controller_network=controller_network,
     )
     plan = request.plan
     require(  # the nodes would fail for want of them one by one

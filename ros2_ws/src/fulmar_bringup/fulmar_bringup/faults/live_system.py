@@ -12,6 +12,7 @@ from pathlib import Path
 import rclpy
 
 from fulmar_bringup.faults.spoiler import MEASURED, Spoiler
+from fulmar_bringup.faults.two_hosts import TwoHosts
 from fulmar_bringup.faults.witness import Witness, wait_for
 from fulmar_bringup.node_table import (
     NodeSpec,
@@ -29,6 +30,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ODOMETRY, SIMULATION_START_NS
+from fulmar_ros.controller_settings import MOST_COPIES
 from fulmar_ros.runtime import spinning
 
 MOVING_S = 20.0  # a robot that has far to go moves by then
@@ -38,10 +40,17 @@ class LiveSystem:
     """Recorder, plant, e-stop, controller, and a bystander who hears them."""
 
     def __init__(
-        self, plan: RunPlan, record: Path, group: ProcessGroup, witness: Witness, spoiler: Spoiler
+        self,
+        plan: RunPlan,
+        record: Path,
+        group: ProcessGroup,
+        witness: Witness,
+        spoiler: Spoiler,
+        hosts: TwoHosts | None,
     ) -> None:
         """Hold the parts together."""
         self.plan, self.record, self.group = plan, record, group
+        self._hosts = hosts
         self.witness, self.spoiler = witness, spoiler
         robot = load_robot(plan.robot)
         self.robot = robot
@@ -52,6 +61,12 @@ class LiveSystem:
         self.ramp_s = max(
             (most / rate for most, rate in zip(robot.actuators.scale, slew, strict=False)), default=0.0
         )
+
+    @property
+    def hosts(self) -> TwoHosts:
+        """The hosts that plant and controller are on; there must be two."""
+        assert self._hosts is not None
+        return self._hosts
 
     def until_it_moves(self) -> float:
         """Wait until actuators are on.
@@ -72,20 +87,26 @@ class LiveSystem:
 
 
 @contextlib.contextmanager
-def live_system(request: RunRequest) -> Iterator[LiveSystem]:
+def live_system(request: RunRequest, hosts: TwoHosts | None = None) -> Iterator[LiveSystem]:
     """A system on its way to its goal, with its odometry passing through a spoiler; ended at the end.
+
+    Args:
+        request: What to run.
+        hosts: The controller is on the other one, everything else on the robot's, which this thread has to be on.
 
     Raises:
         RunFailed: It does not come up.
     """
     plan = replace(request.plan, supervised=True)
+    if hosts is not None:
+        plan = replace(plan, controller_network=hosts.other, copies=MOST_COPIES)
     group = ProcessGroup()
     robot, task = load_robot(plan.robot), load_task(plan.task)
     with supervisor(plan.robot, task) as overseer:
         node = rclpy.create_node("bystander", namespace=f"/{plan.robot}")
         errors: list[Exception] = []
         with spinning(node, errors.append):
-            live = LiveSystem(plan, request.record, group, Witness(node, robot), Spoiler(node))
+            live = LiveSystem(plan, request.record, group, Witness(node, robot), Spoiler(node), hosts)
             try:
                 for spec in _specs(plan, request.record):
                     group.start(spec)

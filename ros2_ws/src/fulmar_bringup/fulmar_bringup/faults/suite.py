@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.environment import environment
 from fulmar_bringup.faults.command_faults import command_faults
 from fulmar_bringup.faults.finding import Finding
 from fulmar_bringup.faults.input_faults import INPUT_FAULTS
 from fulmar_bringup.faults.live_system import LiveSystem, live_system
+from fulmar_bringup.faults.network_faults import NETWORK_FAULTS
 from fulmar_bringup.faults.policy_faults import POLICY_FAULTS
 from fulmar_bringup.faults.process_faults import (
     controller_hangs,
@@ -21,8 +22,9 @@ from fulmar_bringup.faults.process_faults import (
     estop_killed,
     recorder_killed,
 )
+from fulmar_bringup.faults.two_hosts import ACROSS, inside, two_hosts, why_not
 from fulmar_bringup.planning import RunRequest, default_task, plan_run
-from fulmar_core.errors import RunFailed, UnknownNameError
+from fulmar_core.errors import ConfigError, RunFailed, UnknownNameError
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 
@@ -40,18 +42,35 @@ FAR_M = 6.0  # the robot is under way for seconds
 def faults_of(robot: str, names: list[str] | None = None) -> list[Fault]:
     """The faults that a robot can have, or some of them by name.
 
+    Returns:
+        Those asked for; by default every one that this machine can do.
+
     Raises:
         UnknownNameError: There is no such fault for it.
+        ConfigError: This machine cannot do it.
     """
     has_names = command_wire(load_robot(robot)) is not VELOCITY_COMMAND
     every = {
         fault.__name__: fault
-        for fault in (*PROCESS_FAULTS, *INPUT_FAULTS, *command_faults(has_names), *POLICY_FAULTS)
+        for fault in (
+            *PROCESS_FAULTS,
+            *INPUT_FAULTS,
+            *command_faults(has_names),
+            *POLICY_FAULTS,
+            *NETWORK_FAULTS,
+        )
     }
     for name in names or ():
         if name not in every:
             raise UnknownNameError("fault", name, every)
-    return [every[name] for name in names] if names else list(every.values())
+        if every[name] in skipped_here():
+            raise ConfigError(f"{name}: {why_not()}.")
+    return [every[name] for name in names or every if every[name] not in skipped_here()]
+
+
+def skipped_here() -> tuple[Fault, ...]:
+    """Faults that this machine cannot do; `why_not` says why."""
+    return NETWORK_FAULTS if why_not() else ()
 
 
 def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[Finding]:
@@ -63,25 +82,26 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
         progress: Told how many are over.
     """
     findings = []
-    before = os.environ.get("ROS_DOMAIN_ID")
-    with reserved_domains(1) as (domain,):
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
-        try:
-            for count, fault in enumerate(faults, 1):
-                with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
-                    findings.append(_run(robot, fault, Path(folder)))
-                progress(count)
-        finally:
-            if before is None:
-                del os.environ["ROS_DOMAIN_ID"]
-            else:
-                os.environ["ROS_DOMAIN_ID"] = before
+    with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
+        for count, fault in enumerate(faults, 1):
+            with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
+                findings.append(_run(robot, fault, Path(folder)))
+            progress(count)
     return findings
 
 
 def _run(robot: str, fault: Fault, folder: Path) -> Finding:
+    request = request_of(robot, folder / "bag")
     try:
-        with live_system(request_of(robot, folder / "bag")) as live:
+        if fault in NETWORK_FAULTS:
+            with (
+                environment(ACROSS),
+                two_hosts() as hosts,
+                inside(hosts.robot),
+                live_system(request, hosts) as live,
+            ):
+                return fault(live)
+        with live_system(request) as live:
             return fault(live)
     except RunFailed as error:
         return Finding(fault.__name__, "", str(error), None, None, False)
