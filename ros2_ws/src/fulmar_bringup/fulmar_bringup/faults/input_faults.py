@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import copy
 import math
+from collections import deque
 from collections.abc import Callable
 
 from nav_msgs.msg import Odometry
 
-from fulmar_bringup.faults.finding import Finding, stopped
+from fulmar_bringup.faults.finding import STAYS_S, Finding, stopped
 from fulmar_bringup.faults.live_system import LiveSystem
 from fulmar_bringup.faults.spoiler import Spoil
+from fulmar_bringup.faults.witness import wait_for
 from fulmar_core.safety.input_gate import FROZEN_AFTER
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.message_reader import stamp_ns
 
+MARGIN_S = 0.5  # beyond the time in which a robot is watched
+JUMP_NS = 1_000_000_000_000
+EPOCH_S = 6.0  # in which it is seen whether a robot goes on
 BACK_NS = 1_000_000  # so little, with each message, that it is no jump of time
 
 
@@ -89,11 +94,53 @@ def odometry_out_of_order(live: LiveSystem) -> Finding:
     return _spoilt(live, "odometry_out_of_order", _changed(change), live.tick_s)
 
 
+def odometry_late(live: LiveSystem) -> Finding:
+    """Everything comes later by the same time, longer than the robot may be blind; it is judged before that is over."""
+    limit_s = live.watchdog_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s
+    waiting: deque[Odometry] = deque()
+
+    def spoil(message: Odometry) -> Odometry | None:
+        waiting.append(message)
+        return waiting.popleft() if len(waiting) * live.tick_s > limit_s + STAYS_S + MARGIN_S else None
+
+    return _spoilt(live, "odometry_late", spoil, live.watchdog_s)
+
+
+def time_jump_forwards(live: LiveSystem) -> Finding:
+    """The clock of the measurements is set."""
+    return _jump(live, "time_jump_forwards", JUMP_NS)
+
+
+def time_jump_backwards(live: LiveSystem) -> Finding:
+    """The same, to before the run."""
+    return _jump(live, "time_jump_backwards", -JUMP_NS)
+
+
+def _jump(live: LiveSystem, name: str, by_ns: int) -> Finding:
+    """A new epoch begins, in words, and the robot goes on in it."""
+
+    def change(message: Odometry) -> None:
+        message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
+
+    since_s = live.until_it_moves()
+    live.spoiler.spoil = _changed(change)
+    wait_for(lambda: False, EPOCH_S)
+    words = [word for word in live.witness.words_since(since_s) if word.who == "controller"]
+    told = next((word for word in words if "epoch" in word.text), None)
+    goes_on = bool(words) and words[-1].values["mode"] == "active" and words[-1].values["epoch"] == "1"
+    moves = any(moved for heard_s, moved in live.witness.applied_since(since_s + EPOCH_S / 2.0))
+    said = told.text if told else ""
+    return Finding(name, "controller" if told else "", said, None, None, bool(told) and goes_on and moves)
+
+
 INPUT_FAULTS = (
     odometry_silent,
+    odometry_late,
     odometry_frozen,
     odometry_not_a_number,
     odometry_in_a_wrong_frame,
     odometry_with_a_wrong_quaternion,
     odometry_out_of_order,
+    time_jump_forwards,
+    time_jump_backwards,
 )

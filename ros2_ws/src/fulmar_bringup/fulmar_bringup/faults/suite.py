@@ -15,13 +15,7 @@ from fulmar_bringup.faults.input_faults import INPUT_FAULTS
 from fulmar_bringup.faults.live_system import LiveSystem, live_system
 from fulmar_bringup.faults.network_faults import NETWORK_FAULTS
 from fulmar_bringup.faults.policy_faults import POLICY_FAULTS
-from fulmar_bringup.faults.process_faults import (
-    controller_hangs,
-    controller_killed,
-    estop_hangs,
-    estop_killed,
-    recorder_killed,
-)
+from fulmar_bringup.faults.process_faults import PROCESS_FAULTS
 from fulmar_bringup.faults.two_hosts import ACROSS, inside, two_hosts, why_not
 from fulmar_bringup.planning import RunRequest, default_task, plan_run
 from fulmar_core.errors import ConfigError, RunFailed, UnknownNameError
@@ -29,13 +23,6 @@ from fulmar_core.robot import load_robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 
 Fault = Callable[[LiveSystem], Finding]
-PROCESS_FAULTS: tuple[Fault, ...] = (
-    controller_killed,
-    controller_hangs,
-    estop_killed,
-    estop_hangs,
-    recorder_killed,
-)
 FAR_M = 6.0  # the robot is under way for seconds
 
 
