@@ -12,7 +12,7 @@ import pytest
 
 from fulmar_bringup.faults.two_hosts import CUT, LOSSY, NETNS, Cable, Quality, inside, two_hosts, why_not
 
-COUNT = 300
+COUNT = 200
 Ends = tuple[socket.socket, socket.socket]
 
 
@@ -55,7 +55,7 @@ def test_a_bad_cable_loses_a_tenth_and_delays_the_rest(ends: tuple[Ends, Cable])
     (one, other), cable = ends
     cable.quality = LOSSY
     found = arrivals(one, other)
-    assert 0.84 < len(found) / COUNT < 0.96  # four standard deviations
+    assert 0.81 < len(found) / COUNT < 0.99  # four standard deviations
     late = sorted(late_s for _, late_s in found)
     assert late[0] >= 0.01
     assert 0.015 < late[len(late) // 2] < 0.03
@@ -71,11 +71,11 @@ def test_nothing_passes_a_cable_that_is_cut_and_it_can_be_mended(ends: tuple[End
 
 @pytest.mark.skipif(bool(why_not()), reason=why_not() or "never")
 def test_two_hosts_reach_each_other_by_the_cable_alone_and_are_gone_afterwards_also_on_errors() -> None:
-    class Broken(Exception):
+    class BrokenError(Exception):
         pass
 
     ours = os.readlink("/proc/thread-self/ns/net")
-    with pytest.raises(Broken), two_hosts() as hosts:
+    with pytest.raises(BrokenError), two_hosts() as hosts:
         names = (hosts.robot, hosts.other)
         with inside(hosts.robot):
             assert os.readlink("/proc/thread-self/ns/net") != ours
@@ -91,6 +91,6 @@ def test_two_hosts_reach_each_other_by_the_cable_alone_and_are_gone_afterwards_a
             sender.sendto(b"cut", receiver.getsockname())
             with pytest.raises(TimeoutError):
                 receiver.recv(10)
-        raise Broken
+        raise BrokenError
     assert os.readlink("/proc/thread-self/ns/net") == ours
     assert not any((NETNS / name).exists() for name in names)

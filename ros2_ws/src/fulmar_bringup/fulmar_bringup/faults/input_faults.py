@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import time
 from collections import deque
 from collections.abc import Callable
 
@@ -18,7 +19,8 @@ from fulmar_ros.convert import stamp_of
 from fulmar_ros.message_reader import stamp_ns
 
 MARGIN_S = 0.5  # beyond the time in which a robot is watched
-JUMP_NS = 1_000_000_000_000
+FORWARD_NS, BACKWARD_NS = 1_000_000_000_000, 2_500_000_000
+BEFORE_S = 3.0  # simulated clocks begin near zero; a jump back must not end before that
 EPOCH_S = 6.0  # in which it is seen whether a robot goes on
 BACK_NS = 1_000_000  # so little, with each message, that it is no jump of time
 
@@ -108,12 +110,12 @@ def odometry_late(live: LiveSystem) -> Finding:
 
 def time_jump_forwards(live: LiveSystem) -> Finding:
     """The clock of the measurements is set."""
-    return _jump(live, "time_jump_forwards", JUMP_NS)
+    return _jump(live, "time_jump_forwards", FORWARD_NS)
 
 
 def time_jump_backwards(live: LiveSystem) -> Finding:
-    """The same, to before the run."""
-    return _jump(live, "time_jump_backwards", -JUMP_NS)
+    """The same, back to where the run began."""
+    return _jump(live, "time_jump_backwards", -BACKWARD_NS)
 
 
 def _jump(live: LiveSystem, name: str, by_ns: int) -> Finding:
@@ -122,15 +124,19 @@ def _jump(live: LiveSystem, name: str, by_ns: int) -> Finding:
     def change(message: Odometry) -> None:
         message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
 
-    since_s = live.until_it_moves()
+    live.until_it_moves()
+    wait_for(lambda: False, BEFORE_S)
+    since_s = time.monotonic()
     live.spoiler.spoil = _changed(change)
     wait_for(lambda: False, EPOCH_S)
-    words = [word for word in live.witness.words_since(since_s) if word.who == "controller"]
-    told = next((word for word in words if "epoch" in word.text), None)
-    goes_on = bool(words) and words[-1].values["mode"] == "active" and words[-1].values["epoch"] == "1"
-    moves = any(moved for heard_s, moved in live.witness.applied_since(since_s + EPOCH_S / 2.0))
-    said = told.text if told else ""
-    return Finding(name, "controller" if told else "", said, None, None, bool(told) and goes_on and moves)
+    words = [word for word in live.witness.words_since(since_s) if "epoch" in word.values]
+    epoch, mode = (words[-1].values["epoch"], words[-1].values["mode"]) if words else ("", "silent")
+    told = epoch not in ("", "0")
+    goes_on = mode == "active" and any(
+        moved for _, moved in live.witness.applied_since(since_s + EPOCH_S / 2.0)
+    )
+    said = f"epoch {epoch} begins; {'goes on' if goes_on else mode}"
+    return Finding(name, "controller" if told else "", said, None, None, told and goes_on)
 
 
 INPUT_FAULTS = (
