@@ -119,6 +119,7 @@ class PlantNode(LifecycleNode):
         self._stop.clear()
         with self.wires.lock:
             self.guard.reset()
+        self.wires.listening = True
         self._make_loops(self._backend)
         self.health.mode = "waiting"
         settle_memory()
@@ -223,9 +224,8 @@ class PlantNode(LifecycleNode):
                 )
             else:
                 self._realtime.run(sample, self._count(self.robot.timing.physics_dt), self._stop)
-            self.health.mode = "stopping"  # from here on nobody has to command
-            with self.wires.lock:
-                self.guard.reset()
+            self.health.mode = "stopping"
+            self.wires.listening = False  # from here on nobody has to command
             self._make_safe()
             self.health.mode = "inactive" if self._stop.is_set() else "finished"
         except FulmarError as error:

@@ -77,6 +77,7 @@ class PlantWires:
         self.lock = threading.Condition()
         self.latency_ms = Spread()
         self.answers = 0  # states that a command has answered
+        self.listening = True  # whether commands of controllers are heard
         self._guard = guard
         self._sent_ns: OrderedDict[int, int] = OrderedDict()
         self._answered: int | None = None
@@ -219,6 +220,8 @@ class PlantWires:
 
     def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
         now = time.monotonic_ns()
+        if not self.listening:
+            return
         if not self._prior:
             take_priority_with_helpers(CONTROL_PRIORITY)
             self._prior = True

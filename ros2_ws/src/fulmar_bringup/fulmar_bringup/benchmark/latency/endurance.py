@@ -44,6 +44,7 @@ def endure(
             progress(rate * passed_s)
             system.wait(min(LOOK_S, seconds - passed_s))
         seen.append((time.monotonic() - began_s, system.memory_bytes()))
+        system.end_commands()
         plant, controller = system.said()
     growth = _growth_mb(seen, WARM_UP_SHARE * seconds)
     answered, recorded = int(plant["answers"]), _recorded(request.record)

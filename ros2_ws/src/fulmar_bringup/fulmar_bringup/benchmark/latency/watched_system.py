@@ -10,6 +10,7 @@ from pathlib import Path
 
 import psutil
 
+from fulmar_bringup.bag_origin import run_info
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec
 from fulmar_bringup.planning import RunRequest, plan_run
@@ -25,6 +26,7 @@ from policy_server.shipped import policies_directory
 ROBOT, TASK = "floating_platform", "go_to_pose"
 STEP_HZ = 50.0  # of the robot's own time: the plant's ticks, and a command for each
 NODES = ("plant", "controller", "recorder")
+SAID_S = 1.5  # until a plant has spoken of what has just been
 
 
 class WatchedSystem:
@@ -47,6 +49,11 @@ class WatchedSystem:
             if end is not None:
                 raise RunFailed(f"{end.text}: {self._group.last_words(end.name)}")
             time.sleep(min(0.1, max(0.0, until - time.monotonic())))
+
+    def end_commands(self) -> None:
+        """Stop the controller, and let the plant say what came of its commands."""
+        self._group.stop("controller")
+        time.sleep(SAID_S)
 
     def cpu_s(self) -> dict[str, float]:
         """Processor time that each node has used so far [s]."""
@@ -112,7 +119,7 @@ def watched_system(request: RunRequest, environment: Mapping[str, str]) -> Itera
     with own_domain():
         group = ProcessGroup(environment)
         try:
-            group.start(recorder_spec(plan, directory=str(request.record)))
+            group.start(recorder_spec(plan, directory=str(request.record), info=run_info(plan)))
             group.start(plant_spec(plan, subscribers=2))
             group.start(controller_spec(plan))
             with supervisor(plan.robot, load_task(plan.task)) as overseer:
