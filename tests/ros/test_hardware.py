@@ -163,11 +163,11 @@ def test_the_bearing_has_a_service_and_a_state_of_its_own(rig: Rig) -> None:
         until(lambda on=on: states[-1] is on)
 
 
-RUNS = (
-    ("floating_platform", "go_to_pose", "zero_g_lab"),
-    ("turtlebot2", "go_to_position", "turtlebot2"),
-    ("kingfisher", "go_to_position", "kingfisher"),
-    ("kingfisher", "go_to_position", "kingfisher_ardupilot"),
+RUNS = (  # with as many seconds as each needs to get there and stay for four
+    ("floating_platform", "go_to_pose", "zero_g_lab", "11"),
+    ("turtlebot2", "go_to_position", "turtlebot2", "9"),
+    ("kingfisher", "go_to_position", "kingfisher", "16"),
+    ("kingfisher", "go_to_position", "kingfisher_ardupilot", "16"),
 )
 
 
@@ -180,8 +180,8 @@ def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp
         for domain in domains:
             free.put(domain)
 
-        def run(case: tuple[str, str, str]) -> subprocess.CompletedProcess[str]:
-            robot, task, hardware = case
+        def run(case: tuple[str, str, str, str]) -> subprocess.CompletedProcess[str]:
+            robot, task, hardware, seconds = case
             domain = free.get()
             env = {**ros_domain.env, "ROS_DOMAIN_ID": str(domain)}
             asked = (
@@ -195,14 +195,14 @@ def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp
                 hardware,
                 "--emulate",
             )
-            more = ("--start", "0,0,0", "--goal", "0.5,0.1,10", "--duration", "11", "--record", hardware)
+            more = ("--start", "0,0,0", "--goal", "0.5,0.1,10", "--duration", seconds, "--record", hardware)
             try:
                 return fulmar(*asked, *more, "--json", env=env, cwd=tmp_path)
             finally:
                 free.put(domain)
 
         done = list(pool.map(run, RUNS))
-    for (robot, _task, hardware), ended in zip(RUNS, done, strict=True):
+    for (robot, _task, hardware, _seconds), ended in zip(RUNS, done, strict=True):
         summary = json_of(ended.stdout)
         assert summary["failure"] is None, (hardware, ended.stderr)
         assert summary["success"], hardware

@@ -44,10 +44,11 @@ def endure(
             progress(rate * passed_s)
             system.wait(min(LOOK_S, seconds - passed_s))
         seen.append((time.monotonic() - began_s, system.memory_bytes()))
-        system.end_commands()
         plant, controller = system.said()
+        system.end_commands()
+        answered = int(system.said()[0]["answers"])
     growth = _growth_mb(seen, WARM_UP_SHARE * seconds)
-    answered, recorded = int(plant["answers"]), _recorded(request.record)
+    recorded = _recorded(request.record)
     lost = max(0, answered - recorded)
     return {
         "simulated_s": simulated_s,
