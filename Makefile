@@ -92,6 +92,10 @@ train-demo: dev ## Train a policy, export it and judge it in MuJoCo
 policies: dev ## Make the shipped policies that are missing or out of date (under 90 minutes on two cores)
 	$(BIN)/fulmar policies
 
+.PHONY: replay-bags
+replay-bags: dev ## Record the reference bags of the tests anew, after an intended change of behaviour
+	$(BIN)/fulmar bag reference tests/replay/bags --update
+
 .PHONY: test
 test: dev ## Run every test
 	@if $(BIN)/python -m pytest $(PYTEST_ARGS); then echo; echo "All tests passed."; \

@@ -1,4 +1,4 @@
-"""Real devices behind the backend seam.
+"""Real devices behind the backend seam: one driver a device, one file a protocol.
 
 Only the modules that end in _node know ROS.
 """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import BundleError
 from fulmar_core.robot import Robot
@@ -23,12 +24,14 @@ def make_policy(robot: Robot, task: Task, settings: ControllerSettings) -> Contr
         raise BundleError(
             f"no policy is shipped for '{robot.name}' and '{task.name}'. Set the parameter 'policy'."
         )
+    if settings.trusted_keys:
+        verify_bundle(folder, Path(settings.trusted_keys))
     return Policy(folder, robot, task, control_hz=settings.control_rate(robot))
 
 
 def main() -> None:
     """Run the node until it is told to stop."""
-    sys.exit(run_node(lambda request_exit: ControllerNode(make_policy, request_exit)))
+    sys.exit(run_node(lambda request_exit: ControllerNode(make_policy, request_exit, learned=True)))
 
 
 if __name__ == "__main__":

@@ -56,7 +56,8 @@ class OneWorld:
         self.world = World(*(np.asarray(getattr(drawn, name), dtype=float)[..., None] for name in FIELDS))
         self.actuation = actuation_of(self._robot, self._safe)
         late = self.world.action_delay[0] + self.world.opening_delay[0]
-        self.latest_s = float(self._robot.actuators.response.delay_s + late)
+        response = self._robot.actuators.response
+        self.latest_s = float(response.delay_s + response.opening_delay_s + late)
         self.outside = tuple(np.zeros(1) for _ in range(3))
         self._blurred = bool(self.world.velocity_noise[0] or self.world.yaw_rate_noise[0])
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])

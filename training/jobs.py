@@ -9,11 +9,18 @@ from typing import Any
 
 from stable_baselines3.common.logger import KVWriter
 
+from fulmar_core.calibration import calibration_path
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.progress import ProgressFile, Watcher
-from training.run_folder import CHECKPOINT_FILE, PROGRESS_FILE, read_run_record, write_run_record
+from training.run_folder import (
+    CALIBRATION_FILE,
+    CHECKPOINT_FILE,
+    PROGRESS_FILE,
+    read_run_record,
+    write_run_record,
+)
 from training.settings import TrainingSettings
 from training.train import check_seed, train
 
@@ -89,6 +96,9 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
     """
     check_seed(job.seed)  # before anything is written
     job.out.mkdir(parents=True, exist_ok=True)
+    calibration = calibration_path()
+    if calibration is not None and calibration != (job.out / CALIBRATION_FILE).absolute():
+        (job.out / CALIBRATION_FILE).write_bytes(calibration.read_bytes())
     train(
         load_robot(job.robot),
         load_task(job.task),

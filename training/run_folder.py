@@ -6,6 +6,7 @@ run.json        what was done; written at the end
 network.pt      the best weights, as a robot would run them
 checkpoint.pkl  everything a run needs to go on exactly where it was
 tensorboard/    curves
+calibration.yaml what was measured on the robot it learns for, where that was given
 progress.json   how far it is, for whoever watches from outside
 """
 
@@ -23,6 +24,7 @@ RUN_FILE = "run.json"
 NETWORK_FILE = "network.pt"
 CHECKPOINT_FILE = "checkpoint.pkl"
 TENSORBOARD_FOLDER = "tensorboard"
+CALIBRATION_FILE = "calibration.yaml"
 PROGRESS_FILE = "progress.json"
 
 _NEEDED = (

@@ -14,13 +14,20 @@ import pytest
 PACKAGES = ["fulmar_bringup", "fulmar_core", "fulmar_ros", "hardware_drivers", "policy_server", "sim_nodes"]
 PROGRAMS = {
     "fulmar_bringup/fulmar": "fulmar_bringup.cli",
+    "fulmar_ros/estimator_node": "fulmar_ros.estimator_node",
+    "fulmar_ros/estop_node": "fulmar_ros.estop_node",
     "fulmar_ros/goal_node": "fulmar_ros.goal_node",
     "fulmar_ros/recorder_node": "fulmar_ros.recorder_node",
+    "fulmar_ros/teleop_node": "fulmar_ros.teleop_node",
+    "hardware_drivers/adapter_node": "hardware_drivers.adapter_node",
+    "hardware_drivers/driver_node": "hardware_drivers.driver_node",
     "policy_server/classical_node": "policy_server.classical_node",
     "policy_server/lqr_drift_node": "policy_server.lqr_drift_node",
+    "policy_server/excite_node": "policy_server.excite_node",
     "policy_server/lqr_node": "policy_server.lqr_node",
     "policy_server/mpc_node": "policy_server.mpc_node",
     "policy_server/policy_node": "policy_server.policy_node",
+    "sim_nodes/emulator_node": "sim_nodes.emulator_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",
 }
 SOURCES = ["configs", "hardware_drivers", "policy_server", "ros2_ws/src", "sim_nodes"]

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-ARGUMENTS = {"system", "robot", "task", "controller", "backend", "policy", "goals"}
+ARGUMENTS = {"system", "robot", "task", "controller", "backend", "hardware", "policy", "goals"}
 
 
 class Built:
@@ -41,6 +41,7 @@ class Row:
     module: str = "sim_nodes.sim_node"
     namespace: str = "platform"
     parameters: dict = field(default_factory=lambda: {"control_hz": 5.0, "lockstep": True, "seed": 7})
+    remappings: dict = field(default_factory=dict)
 
 
 STAND_INS = {

@@ -19,6 +19,7 @@ TARGETS = {
     "check",
     "format",
     "policies",
+    "replay-bags",
     "ros-build",
     "lock",
     "clean",

@@ -116,13 +116,20 @@ def test_the_programs_are_those_that_systems_start(packages):
     found = {(name, program) for name in PACKAGES for program, _ in programs(packages / name)}
     assert found == {
         ("fulmar_bringup", "fulmar"),
+        ("fulmar_ros", "estimator_node"),
+        ("fulmar_ros", "estop_node"),
         ("fulmar_ros", "goal_node"),
         ("fulmar_ros", "recorder_node"),
+        ("fulmar_ros", "teleop_node"),
+        ("hardware_drivers", "adapter_node"),
+        ("hardware_drivers", "driver_node"),
         ("policy_server", "classical_node"),
         ("policy_server", "lqr_drift_node"),
+        ("policy_server", "excite_node"),
         ("policy_server", "lqr_node"),
         ("policy_server", "mpc_node"),
         ("policy_server", "policy_node"),
+        ("sim_nodes", "emulator_node"),
         ("sim_nodes", "sim_node"),
     }
 

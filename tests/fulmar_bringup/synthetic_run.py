@@ -178,10 +178,10 @@ class _Messages:
     def _new(self, kind: str, **fields: Any) -> Any:
         return self._store.types[kind](**fields)
 
-    def _header(self, time_s: float) -> Any:
+    def _header(self, time_s: float, frame: str = "odom") -> Any:
         ns = round((time_s + 1.0) * NS)
         stamp = self._new("builtin_interfaces/msg/Time", sec=ns // NS, nanosec=ns % NS)
-        return self._new("std_msgs/msg/Header", stamp=stamp, frame_id="odom")
+        return self._new("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
 
     def _write(self, name: str, message: Any, log_ns: int) -> None:
         data = self._store.serialize_cdr(message, self._types[name])
@@ -202,7 +202,8 @@ class _Messages:
         self._write(name, self._new("std_msgs/msg/String", data=text), EPOCH_NS)
 
     def goal(self, name: str, goal: Goal, log_ns: int) -> None:
-        header, target = self._header(0.0), np.asarray(goal.current)
+        frame = "base_link" if name == "goal_velocity" else "odom"
+        header, target = self._header(0.0, frame), np.asarray(goal.current)
         if name == "goal_point":
             point = self._vector("Point", np.array([target[0], target[1], 0.0]))
             message = self._new("geometry_msgs/msg/PointStamped", header=header, point=point)

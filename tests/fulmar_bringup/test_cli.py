@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup import cli, provenance
+from fulmar_bringup import cli
 from fulmar_core import policy_bundle
 from fulmar_core.paths import config_directory
+from fulmar_ros import provenance
 from policy_server.shipped import shipped_policy
 
 SHIPPED = str(shipped_policy("floating_platform", "go_to_pose"))
@@ -76,9 +77,24 @@ RUN = ["run", "floating_platform"]
             "the targets of task 'race_waypoints' cannot be said in one --goal",
         ),
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
-        ([*RUN, "--controller", "pid"], "unknown controller 'pid'. Known: classical, lqr, lqr_drift, mpc, policy."),
+        (
+            [*RUN, "--controller", "pid"],
+            "unknown controller 'pid'. Known: classical, excite, lqr, lqr_drift, mpc, policy.",
+        ),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
-        ([*RUN, "--backend", "hardware"], "there is no hardware driver for 'floating_platform'"),
+        (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
+        ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
+        ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device neither waits nor hurries"),
+        ([*RUN, "--emulate"], "--hardware and --emulate go with --backend hardware, not with mujoco."),
+        (
+            [*RUN, "--backend", "hardware", "--hardware", "zero_g_lap"],
+            "unknown hardware 'zero_g_lap'. Did you mean 'zero_g_lab'?",
+        ),
+        ([*RUN, "--backend", "hardware", "--hardware", "turtlebot2"], "is the hardware of 'turtlebot2'"),
+        (
+            [*RUN, "--backend", "hardware", "--hardware", "zero_g_lab_valve_node", "--emulate"],
+            "there is no emulator for driver 'valve_topic'",
+        ),
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),
         ([*RUN, "--goal", "1,2"], "--goal = '1,2' must be three finite numbers"),
         ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),
@@ -231,9 +247,10 @@ def test_a_revision_is_only_given_for_a_file_that_the_repository_holds(monkeypat
     ):
         subprocess.run(["git", *words], cwd=tmp_path, check=True, capture_output=True)
     monkeypatch.setattr(provenance, "__file__", str(copy))
-    assert provenance.git_revision() == ""
+    revision = provenance.git_revision.__wrapped__  # without the memory of the checkout that the tests run in
+    assert revision() == ""
     subprocess.run(["git", "add", copy.name], cwd=tmp_path, check=True, capture_output=True)
-    assert provenance.git_revision().endswith("-dirty")
+    assert revision().endswith("-dirty")
 
 
 def test_without_a_command_the_help_is_shown_as_bad_usage(fulmar):
@@ -276,8 +293,8 @@ def test_the_list_is_one_json_object(fulmar):
     code, out, err = fulmar("list", "--json")
     assert (code, err) == (0, "")
     found = json.loads(out)
-    assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals"]
-    assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical"]
+    assert list(found) == ["robots", "tasks", "controllers", "systems", "policies", "goals", "hardware"]
+    assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical", "excite"]
     tasks = json.loads(fulmar("list", "tasks", "--json")[1])["tasks"]
     assert {"go_to_pose", "go_to_position", "go_through_positions", "track_velocities"} <= set(tasks)
 

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 import pytest
 
 from fulmar_bringup.node_table import RunPlan, controller_spec, list_nodes, plant_spec, recorder_spec
-from fulmar_bringup.system import default_control_hz, load_system
+from fulmar_bringup.system import Guards, default_control_hz, default_guards, load_system
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_names
 
@@ -21,9 +21,12 @@ def by_name(nodes):
 
 
 @SYSTEMS
-def test_every_system_is_recorder_plant_and_controller_in_one_namespace(system):
-    nodes = list_nodes(system=system)
-    assert [node.name for node in nodes] == ["recorder", "plant", "controller"]
+def test_every_system_is_recorder_plant_its_guards_and_controller_in_one_namespace(system):
+    nodes, guards = list_nodes(system=system), load_system(system).guards
+    asked = [
+        name for name, is_asked in (("estop", guards.estop), ("estimator", guards.estimator)) if is_asked
+    ]
+    assert [node.name for node in nodes] == ["recorder", "plant", *asked, "controller"]
     assert {node.namespace for node in nodes} == {f"/{load_system(system).robot}"}
 
 
@@ -82,8 +85,17 @@ def test_an_unknown_name_gets_the_nearest_one(choice, words):
 
 
 def test_hardware_without_a_driver_is_refused():
-    with pytest.raises(ConfigError, match="there is no hardware driver for 'floating_platform'"):
-        list_nodes(backend="hardware")
+    with pytest.raises(ConfigError, match="there is no hardware driver for 'jetbot'"):
+        list_nodes(robot="jetbot", controller="classical", backend="hardware")
+
+
+def test_on_hardware_the_driver_stands_where_the_simulator_stood():
+    nodes = by_name(list_nodes(backend="hardware"))
+    assert set(nodes) - {"estop", "estimator"} == set(by_name(list_nodes()))
+    assert nodes["plant"].module == "hardware_drivers.driver_node"
+    assert nodes["plant"].parameters["hardware"].endswith("zero_g_lab.yaml")
+    other = by_name(list_nodes(backend="hardware", hardware="zero_g_lab_valve_node"))
+    assert other["plant"].parameters["hardware"].endswith("zero_g_lab_valve_node.yaml")
 
 
 def test_the_plant_starts_by_itself_unless_somebody_supervises_it():
@@ -116,7 +128,7 @@ def test_a_bundle_goes_to_the_policy_node_alone():
 
 def test_the_recorder_gets_only_what_was_said():
     assert recorder_spec(PLAN).parameters == {}
-    assert recorder_spec(PLAN, directory="d", run_info="{}").parameters == {
+    assert recorder_spec(PLAN, directory="d", info="{}").parameters == {
         "directory": "d",
         "run_info": "{}",
     }
@@ -125,3 +137,50 @@ def test_the_recorder_gets_only_what_was_said():
 def test_a_system_file_with_a_rate_of_nothing_is_refused():
     with pytest.raises(ValueError, match="must be greater than 0"):
         replace(load_system("mujoco_lqr"), control_hz=0.0)
+
+
+def test_the_guards_of_a_system_reach_the_nodes_that_they_are_for():
+    nodes = by_name(list_nodes(system="mujoco_lab"))
+    assert nodes["plant"].parameters.items() >= {"estop": True, "estimated": True}.items()
+    expected = {"estop": True, "fallback": "lqr", "max_run_time_s": 300.0, "area": [-8.0, 8.0, -8.0, 8.0]}
+    assert nodes["controller"].parameters.items() >= expected.items()
+    assert nodes["estimator"].parameters["estimator"] == "mocap_imu"
+    assert nodes["estop"].parameters == {"robot": "floating_platform"}
+
+
+def test_a_system_without_guards_has_none_of_their_parameters():
+    nodes = by_name(list_nodes(system="mujoco_lqr"))
+    for name in ("estop", "estimated", "fallback", "trusted_keys", "area", "max_run_time_s"):
+        assert name not in {**nodes["plant"].parameters, **nodes["controller"].parameters}
+
+
+def test_hardware_has_an_e_stop_unless_a_system_file_says_otherwise():
+    assert default_guards("policy", "hardware", "turtlebot2").estop
+    assert not default_guards("policy", "mujoco").estop
+
+
+@pytest.mark.parametrize(
+    ("hardware", "estimator"),
+    [
+        ("zero_g_lab", "mocap_imu"),
+        ("zero_g_lab_valve_node", "mocap_imu"),
+        ("turtlebot2", None),
+        ("turtlebot2_kobuki_node", None),
+    ],
+)
+def test_a_robot_that_only_motion_capture_sees_gets_an_estimator(hardware, estimator):
+    assert default_guards("policy", "hardware", hardware).estimator == estimator
+
+
+@pytest.mark.parametrize(
+    ("guards", "words"),
+    [
+        ({"fallback": "lqq"}, "Did you mean 'lqr'"),
+        ({"fallback": "policy"}, "not known"),
+        ({"max_run_time_s": -1.0}, "max_run_time_s"),
+        ({"area": (1.0, 0.0, 0.0, 1.0)}, "x_min < x_max"),
+    ],
+)
+def test_guards_without_meaning_are_refused(guards, words):
+    with pytest.raises(ValueError, match=words):
+        Guards(**guards)

@@ -10,6 +10,8 @@ import pytest
 
 from fulmar_bringup.planning import plan_run
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.paths import config_directory
+from fulmar_core.recording import Recording
 from policy_server.shipped import shipped_policy
 
 NAN = float("nan")
@@ -98,7 +100,7 @@ def test_an_unknown_name_gets_the_nearest_one(plan, change, words):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"backend": "hardware"}, "there is no hardware driver for 'floating_platform'"),
+        ({"backend": "hardware"}, "a real robot goes nowhere by chance"),
         ({"goal": (NAN, 0.0, 0.0)}, "goal = (nan, 0.0, 0.0) must be finite"),
         ({"start": (0.0, 0.0, NAN)}, "start = (0.0, 0.0, nan) must be finite"),
         ({"duration_s": NAN}, "duration = nan must be finite"),
@@ -163,3 +165,52 @@ def test_commands_rarer_than_the_watchdog_allows_are_refused_in_real_time_alone(
 @pytest.mark.parametrize(("control_hz", "rate"), [(2.5, 1.0), (5.0, 0.1), (1.0, 3.0)])
 def test_commands_that_the_watchdog_allows_are_planned(plan, control_hz, rate):
     assert plan(control_hz=control_hz, rate=rate).plan.rate == rate
+
+
+def test_a_real_robot_begins_where_it_stands(plan):
+    request = plan(backend="hardware", goal=(2.0, 1.0, 90.0))
+    assert request.plan.start == (0.0, 0.0, 0.0)
+    assert request.plan.hardware.endswith("configs/hardware/zero_g_lab.yaml")
+    assert Path(request.plan.hardware).is_absolute()
+    assert not request.plan.emulated
+
+
+def test_an_emulated_one_begins_where_the_seed_says(plan):
+    assert plan(backend="hardware", emulate=True).plan.start == plan().plan.start
+
+
+def test_an_estimator_in_lock_step_is_refused(plan):
+    with pytest.raises(ConfigError, match="Leave --lockstep out"):
+        plan(guards=dict(estimator="mocap_imu"), lockstep=True)
+
+
+def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan):
+    other = shipped_policy("floating_platform", "go_to_position")
+    with pytest.raises(BundleError):
+        plan(controller="policy", policy=other, control_hz=5.0)
+    request = plan(controller="policy", policy=other, control_hz=5.0, guards=dict(fallback="lqr"))
+    assert request.plan.policy == str(other)
+
+
+def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
+    with pytest.raises(ConfigError, match="robots with thrusters"):
+        plan(robot="turtlebot2", controller="classical", guards=dict(fallback="lqr"))
+
+
+def test_the_recorder_keeps_everything_unless_asked_otherwise(plan):
+    assert plan().plan.recording.mode == "whole"
+    assert plan(recording="ring").plan.recording.mode == "ring"
+
+
+def test_an_unknown_way_to_record_is_refused_with_the_nearest(plan):
+    with pytest.raises(UnknownNameError, match="Did you mean 'ring'"):
+        plan(recording="rign")
+
+
+def test_the_system_file_says_how_to_record(plan, tmp_path, monkeypatch):
+    shutil.copytree(config_directory(), tmp_path / "configs")
+    with (tmp_path / "configs" / "systems" / "mujoco_lqr.yaml").open("a") as file:
+        file.write("recorder:\n  mode: ring\n  before_fault_s: 10.0\n")
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path / "configs"))
+    assert plan().plan.recording == Recording(mode="ring", before_fault_s=10.0)
+    assert plan(recording="whole").plan.recording == Recording(before_fault_s=10.0)

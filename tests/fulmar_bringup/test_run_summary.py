@@ -250,3 +250,20 @@ def test_what_a_task_does_not_ask_is_none(reached):
     summary = summarise(read_run(reached))
     assert [summary[name] for name in NEW] == [None] * 3
     assert summary["collided"] is False
+
+
+def test_a_run_on_hardware_is_judged_from_its_first_actuation_on_for_as_long_as_was_asked(reached):
+    """A robot is measured before and after its run, too: what it did then is nobody's success or failure."""
+    record = read_run(reached)
+    applied, first = record.applied, 250
+    later = dataclasses.replace(
+        applied,
+        stamp_s=applied.stamp_s[first:],
+        log_s=applied.log_s[first:],
+        effort=applied.effort[first:],
+    )
+    info = {**record.info, "backend": "hardware", "duration_s": 20.0}
+    motion = dataclasses.replace(record, info=info, applied=later).motion
+    assert motion.stamp_s[0] == pytest.approx(later.stamp_s[0], abs=0.03)
+    assert motion.stamp_s[-1] - motion.stamp_s[0] == pytest.approx(20.0, abs=0.03)
+    assert len(dataclasses.replace(record, applied=later).motion) == len(record.truth)

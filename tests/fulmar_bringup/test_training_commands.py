@@ -13,6 +13,7 @@ pytest.importorskip("stable_baselines3")
 from fulmar_bringup.commands.benchmark_training import training
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.train import train
+from fulmar_core.calibration import Calibration, Measured, calibration_path, save_calibration
 from fulmar_core.errors import ConfigError
 from training.jobs import Outcome
 from training.run_folder import write_start
@@ -129,6 +130,18 @@ def test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tm
     assert (same.robot, same.seed, same.settings, same.out) == ("turtlebot2", 5, settings, tmp_path)
     assert (same.time_limit_s, same.updates) == (90.0, None)
     assert (longer.time_limit_s, longer.updates) == (None, 9)
+
+
+def test_a_run_is_resumed_with_the_calibration_it_began_with_and_no_other(learned, tmp_path, monkeypatch):
+    monkeypatch.setenv("FULMAR_CALIBRATION", "")
+    kept = tmp_path / "calibration.yaml"
+    save_calibration(Calibration("turtlebot2", lag=Measured(0.2, 0.1, 0.3)), kept)
+    test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    assert calibration_path() == kept
+    with pytest.raises(ConfigError, match="leave --calibration out"):
+        call(train, "--resume", tmp_path, "--calibration", kept)
+    with pytest.raises(ConfigError, match="--executor ray does not carry it"):
+        call(train, *PLATFORM, "--calibration", kept, "--executor", "ray")
 
 
 def test_a_run_cannot_be_resumed_as_a_campaign(tmp_path, learned):

@@ -21,6 +21,11 @@ class Inner:
 
 
 @dataclass(frozen=True)
+class Bomb:
+    a: dict[str, dict[str, dict[str, dict[str, int]]]]
+
+
+@dataclass(frozen=True)
 class Round:
     kind: Literal["round"]
     radius: float
@@ -214,3 +219,23 @@ def test_every_number_that_python_prints_is_read_back_exactly(tmp_path, value):
     path = tmp_path / "number.yaml"
     path.write_text(f"number: {value!r}\n")
     assert math.isclose(load_config(Everything, path).number, value, rel_tol=0.0, abs_tol=0.0)
+
+
+def test_a_small_file_that_stands_for_billions_of_values_is_refused(tmp_path):
+    def level(n: int) -> str:
+        if n == 0:
+            return "{" + ", ".join(f"k{i}: 1" for i in range(30)) + "}"
+        again = ", ".join(f"k{i}: *x{n}" for i in range(1, 30))
+        return f"{{k0: &x{n} {level(n - 1)}, {again}}}"
+
+    path = tmp_path / "bomb.yaml"
+    path.write_text(f"a: {level(3)}\n")
+    with pytest.raises(ConfigError, match="more than"):
+        load_config(Bomb, path)
+
+
+def test_a_huge_file_is_not_read(tmp_path):
+    path = tmp_path / "huge.yaml"
+    path.write_text("# " + "x" * 1_000_001)
+    with pytest.raises(ConfigError, match="at most 1000000"):
+        load_config(dict, path)

@@ -77,6 +77,15 @@ def test_a_bag_is_whole_from_its_first_moment_to_its_last(tmp_path):
     assert_readable(folder, 150)
 
 
+def test_a_bag_whose_recorder_died_before_the_first_message_opens_with_its_types(tmp_path):
+    bag = open_bag(tmp_path / "bag")
+    bag.flush()
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert [(c.topic, c.msgtype) for c in reader.connections] == [(TOPIC, TYPE)]
+    with file_of(tmp_path / "bag").open("rb") as stream:
+        assert list(make_reader(stream).iter_messages()) == []
+
+
 def test_metadata_counts_what_is_in_the_bag_after_each_flush(tmp_path):
     folder = tmp_path / "bag"
     bag = open_bag(folder)
@@ -95,14 +104,14 @@ def test_metadata_counts_what_is_in_the_bag_after_each_flush(tmp_path):
     bag.close()
 
 
-def test_ticks_flush_once_a_second(tmp_path):
+def test_ticks_flush_twice_a_second(tmp_path):
     folder = tmp_path / "bag"
     bag = open_bag(folder)
     bag.tick(10.0)
     write_words(bag, 0, 3)
-    bag.tick(10.9)
+    bag.tick(10.4)
     assert words_by_mcap(folder) == []
-    bag.tick(11.0)
+    bag.tick(10.5)
     assert len(words_by_mcap(folder)) == 3
 
 

@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from fulmar_ros.deadline import CONTROL_PRIORITY, PLANT_PRIORITY, Deadlines, Spread, take_priority
+from fulmar_core.priority import CONTROL_PRIORITY, PLANT_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_ros.deadline import Deadlines, Spread
 
 
 class FakeClock:
@@ -93,3 +94,24 @@ def test_only_the_calling_thread_takes_priority():
     thread.join()
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
     assert found.get("own", (os.SCHED_FIFO, CONTROL_PRIORITY)) == (os.SCHED_FIFO, CONTROL_PRIORITY)
+
+
+def test_threads_that_messages_pass_take_priority_too_and_the_main_one_does_not():
+    over = threading.Event()
+    helper = threading.Thread(target=over.wait)
+    helper.start()
+    may: list[bool] = []
+
+    def lead() -> None:
+        may.append(take_priority(CONTROL_PRIORITY))
+        take_priority_with_helpers(CONTROL_PRIORITY)
+
+    thread = threading.Thread(target=lead)
+    thread.start()
+    thread.join()
+    assert helper.native_id is not None
+    policy = os.sched_getscheduler(helper.native_id)
+    over.set()
+    helper.join()
+    assert policy == (os.SCHED_FIFO if may[0] else os.SCHED_OTHER)
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER

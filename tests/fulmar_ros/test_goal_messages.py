@@ -7,15 +7,8 @@ import pytest
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_core.goal import goal_at
-from fulmar_ros.convert import stamp_ns
-from fulmar_ros.goal_messages import (
-    MOST_OBSTACLES,
-    MOST_WAYPOINTS,
-    goal_message,
-    goal_of,
-    obstacles_message,
-    obstacles_of,
-)
+from fulmar_ros.goal_messages import goal_message, obstacles_message
+from fulmar_ros.message_reader import MOST_OBSTACLES, MOST_WAYPOINTS, goal_of, obstacles_of, stamp_ns
 
 NAN = float("nan")
 COURSE = ((1.0, -2.0, 0.5), (0.0, 3.0, -3.0), (4.0, 4.0, 0.0))

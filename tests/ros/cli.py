@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+import yaml
 
 FULMAR = [sys.executable, "-m", "fulmar_bringup.cli"]
 WATCHDOG_TRIP = "plant: no command for"  # how a run begins to say that its watchdog tripped
@@ -77,16 +78,24 @@ def child_running(parent: psutil.Popen, module: str, timeout_s: float = 30.0) ->
     raise AssertionError(f"no child runs {module}")
 
 
-def under_way(run: psutil.Popen, bag: Path, size: int, timeout_s: float = 40.0) -> bool:
-    """Wait until a run's bag has grown to a size; false if the run has ended before."""
+def under_way(run: psutil.Popen, bag: Path, messages: int, timeout_s: float = 40.0) -> bool:
+    """Wait until a run's bag holds so many messages; false if the run has ended before."""
     until = time.monotonic() + timeout_s
     while time.monotonic() < until:
-        if sum(path.stat().st_size for path in bag.glob("*.mcap")) >= size:
+        if _messages_of(bag) >= messages:
             return True
         if run.poll() is not None:
             return False
         time.sleep(0.05)
-    raise AssertionError(f"{bag} did not grow to {size} bytes")
+    raise AssertionError(f"{bag} did not grow to {messages} messages")
+
+
+def _messages_of(bag: Path) -> int:
+    try:
+        told = yaml.safe_load((bag / "metadata.yaml").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return 0
+    return int(told["rosbag2_bagfile_information"]["message_count"])
 
 
 def json_of(output: str) -> dict[str, Any]:

@@ -85,6 +85,13 @@ class Neighbour:
         """Send one command."""
         self._command.publish(VectorWriter(names or self.robot.actuators.names).write(np.array(values), 0))
 
+    @staticmethod
+    def twist(speed: float, turn_rate: float) -> TwistStamped:
+        """A command of wheels."""
+        message = TwistStamped()
+        message.twist.linear.x, message.twist.angular.z = speed, turn_rate
+        return message
+
     def give_goal(self) -> None:
         """Ask for a pose far away, so that valves open."""
         self.goal_publisher.publish(goal_message(goal_at((4.0, 0.0, 0.0)), "goal_pose", 1))

@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+import itertools
+import sys
 import time
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
 
 from fulmar_core.controllers.lqr import Lqr
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.topics import (
+    COMMAND,
+    ESTOP,
     GOAL_POSE,
     IMU,
     ODOMETRY,
     STATUS,
+    SWAP,
     TRUTH,
 )
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.goal_messages import goal_message
+from fulmar_ros.message_reader import stamp_ns
+from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
@@ -91,7 +99,7 @@ def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
 ) -> None:
     """What a deployed controller may know."""
     heard = {subscription.topic_name for subscription in controller.subscriptions}
-    assert heard == {f"{NAMESPACE}/{ODOMETRY.name}", f"{NAMESPACE}/{GOAL_POSE.name}"}
+    assert heard == {f"{NAMESPACE}/{wire.name}" for wire in (ODOMETRY, GOAL_POSE, ESTOP, SWAP)}
     assert f"{NAMESPACE}/{TRUTH.name}" not in heard
     assert {STATUS.name, IMU.name}.isdisjoint(heard)
 
@@ -141,3 +149,30 @@ def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: Con
     count = len(stream.neighbour.commands)
     time.sleep(0.2)
     assert len(stream.neighbour.commands) == count
+
+
+def test_copies_of_a_command_come_within_its_period(neighbour: Neighbour, monkeypatch) -> None:
+    """Three of each, all with the stamp of the state that it answers."""
+    monkeypatch.setattr(sys, "argv", ["lqr_node"])
+    stamps: list[int] = []
+    qos = subscriber_qos(COMMAND, reliable=True, depth=50)
+    neighbour.node.create_subscription(
+        JointState, COMMAND.name, lambda message: stamps.append(stamp_ns(message.header.stamp)), qos
+    )
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=10.0", "-p", "copies:=3"]
+    node = ControllerNode(make_lqr, lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        neighbour.give_goal()
+        odometry = Stream(neighbour)
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        stamps.clear()
+        until(lambda: len(stamps) > 20)
+        odometry.stop()
+        node.stop()
+    whole = [len(list(same)) for _, same in itertools.groupby(stamps)][1:-1]
+    assert np.median(whole) == 3
+
+
+def test_more_copies_than_fit_into_a_period_are_refused() -> None:
+    with pytest.raises(ValueError, match="copies = 4 must be from 1 to 3"):
+        ControllerSettings(copies=4)

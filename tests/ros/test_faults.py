@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import signal
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 
 from fulmar_bringup.bag_reader import read_run
@@ -32,7 +34,7 @@ from tests.ros.cli import (
 
 FAR = ("--start", "4,0,0", "--goal", "0,0,0")  # valves stay open for seconds
 WATCHDOG_S, TICK_S = 0.4, 0.02
-UNDER_WAY = 30_000  # bytes of bag
+UNDER_WAY = 400  # messages in the bag
 
 
 def start_run(domain: RosDomain, folder: Path, *more: str) -> psutil.Popen:
@@ -295,3 +297,23 @@ def test_no_node_outlives_its_launcher(ros_domain: RosDomain, tmp_path: Path) ->
     run.wait()
     assert nothing_left(children)
     assert not read_run(tmp_path / "bag").warnings
+
+
+def test_a_ring_writes_the_run_of_a_controller_that_died(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """The watchdog trips; the goal, the way until then and the closed valves are in the bag."""
+    asked = ("run", "floating_platform", "--controller", "lqr", *FAR, "--recording", "ring")
+    run = start_fulmar(*asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    controller = child_running(run, "policy_server.lqr_node")
+    time.sleep(10.0)
+    controller.kill()
+    _, err = run.communicate(timeout=30.0)
+    assert run.returncode == 1, err
+    record = read_run(tmp_path / "bag")
+    assert len(record.goals) == 1
+    assert len(record.truth) > 50
+    assert not np.any(record.applied.effort[-1])
+    told = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert any(
+        fault["reason"].startswith("plant: no command")
+        for fault in json.loads(told["custom_data"]["fulmar_faults"])
+    )

@@ -15,9 +15,9 @@ from nav_msgs.msg import Path
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import GOAL_WIRES
-from fulmar_ros.convert import stamp_ns
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.goal_node import GoalNode
+from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain

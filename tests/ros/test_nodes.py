@@ -24,6 +24,14 @@ from tests.ros.neighbour import NAMESPACE, Neighbour, until
         ("sim_nodes.sim_node", "backend:='mujocco'", "Did you mean 'mujoco'?"),
         ("policy_server.policy_node", "policy:='nowhere'", "policy 'nowhere' has no passport.json"),
         ("policy_server.policy_node", "control_hz:=10.0", "was trained at 5 Hz, but would run at 10 Hz"),
+        ("hardware_drivers.driver_node", "hardware:='zero_g_lap'", "Did you mean 'zero_g_lab'?"),
+        ("hardware_drivers.driver_node", "rate:=2.0", "a real device neither waits nor hurries"),
+        (
+            "hardware_drivers.adapter_node",
+            "hardware:='turtlebot2'",
+            "'kobuki' is no message of another stack",
+        ),
+        ("sim_nodes.emulator_node", "device:='kobuky'", "Did you mean 'kobuki'?"),
         ("policy_server.lqr_node", "rate:=-1.0", "must be a finite number, at least 0"),
     ],
 )

@@ -8,8 +8,12 @@ import time
 import numpy as np
 import pytest
 from geometry_msgs.msg import TwistStamped
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
 
 from fulmar_core.backend import Sample
+from fulmar_core.topics import COMMAND
+from fulmar_ros.convert import VectorWriter
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import spinning
 from sim_nodes.mock_backend import MockBackend
@@ -118,12 +122,41 @@ def test_wheels_follow_cmd_vel_and_slow_down_within_a_second_when_it_falls_silen
 
     with spinning(node, lambda error: pytest.fail(repr(error))):
         until(lambda: drive() or (bool(neighbour.applied) and neighbour.applied[-1].any()))
-        assert neighbour.applied[-1] == pytest.approx([0.36, -0.9])
-        silent_since = time.monotonic()
+        until(lambda: drive() or neighbour.applied[-1] == pytest.approx([0.36, -0.9]))
+        silent_since, count = time.monotonic(), len(neighbour.applied)
         until(lambda: not neighbour.applied[-1].any())
         assert 0.5 < time.monotonic() - silent_since < 1.2
-        speeds = np.array([speed for speed, _ in neighbour.applied if 0.0 < speed < 0.36])
+        speeds = np.array([speed for speed, _ in neighbour.applied[count:] if 0.0 < speed < 0.36])
         assert len(speeds) > 5
         assert np.all(np.diff(speeds) < 0.0)
         until(lambda: "no command for" in neighbour.said["plant"][0])
+        node.stop()
+
+
+def test_in_real_time_the_newest_command_is_heard_from_best_effort_publishers_too(
+    neighbour: Neighbour, plant: PlantNode
+) -> None:
+    """A reader that asks for reliability holds newer commands back behind one that a network lost."""
+    qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    publisher = neighbour.node.create_publisher(JointState, COMMAND.name, qos)
+    message = VectorWriter(neighbour.robot.actuators.names).write(np.array(open_valves(neighbour.robot)), 0)
+    until(lambda: publisher.publish(message) or neighbour.applied[-1].any())
+
+
+def test_silence_after_the_last_tick_is_no_trip(neighbour: Neighbour) -> None:
+    """A controller that still speaks when the plant has finished, after a pause."""
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "backend:=mock", "-p", "duration_s:=1.0"]
+    node = PlantNode(make_backend, lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(
+            lambda: (
+                neighbour.command(open_valves(neighbour.robot))
+                or neighbour.said.get("plant", ("", {}))[1].get("mode") == "finished"
+            )
+        )
+        time.sleep(0.6)
+        for _ in range(5):
+            neighbour.command(open_valves(neighbour.robot))
+            time.sleep(0.02)
+        assert node.guard.watchdog.trips == 0
         node.stop()

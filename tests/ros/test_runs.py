@@ -167,6 +167,8 @@ def test_a_realtime_run_holds_its_rate_and_records_every_wire(ros_domain: RosDom
     assert summary["control_rate_hz"] == pytest.approx(5.0, rel=0.02)
     assert summary["period_error_ms"]["p99"] is not None
     assert summary["watchdog_trips"] == 0
+    # The state that comes with the beat is answered; without waiting for it, the one before, a tick of 20 ms older.
+    assert summary["latency_ms"]["p50"] < 12.0
     record = read_run(tmp_path / "bag")
     assert not record.warnings
     assert len(record.truth.stamp_s) == pytest.approx(401, abs=2)  # 8 s at 50 Hz and the first
@@ -222,3 +224,24 @@ def test_places_of_a_file_are_visited_one_after_another(ros_domain: RosDomain, t
     summary = json_of(done.stdout)
     assert (summary["task"], summary["success"]) == ("go_to_position", True)
     assert summary["goals_progress"] == "2 of 2 targets reached"
+
+
+def test_a_ring_without_a_fault_is_a_run_without_a_bag_or_a_verdict(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """Nobody recorded whether the goal was met, so nobody says so."""
+    asked = (
+        "floating_platform",
+        "--controller",
+        "lqr",
+        "--lockstep",
+        "--duration",
+        "4",
+        "--recording",
+        "ring",
+    )
+    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    summary = json_of(done.stdout)
+    assert done.returncode == 0, done.stderr
+    assert (summary["success"], summary["bag"], summary["failure"]) == (None, None, None)
+    assert not (tmp_path / "bag").exists()

@@ -19,4 +19,10 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
+    entry_points={
+        "console_scripts": [
+            "adapter_node = hardware_drivers.adapter_node:main",
+            "driver_node = hardware_drivers.driver_node:main",
+        ]
+    },
 )

@@ -26,6 +26,7 @@ setup(
             "lqr_node = policy_server.lqr_node:main",
             "mpc_node = policy_server.mpc_node:main",
             "lqr_drift_node = policy_server.lqr_drift_node:main",
+            "excite_node = policy_server.excite_node:main",
             "classical_node = policy_server.classical_node:main",
         ]
     },

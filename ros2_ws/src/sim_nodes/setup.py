@@ -19,5 +19,10 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    entry_points={"console_scripts": ["sim_node = sim_nodes.sim_node:main"]},
+    entry_points={
+        "console_scripts": [
+            "emulator_node = sim_nodes.emulator_node:main",
+            "sim_node = sim_nodes.sim_node:main",
+        ]
+    },
 )

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
 
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
@@ -143,3 +146,148 @@ def test_propellers_stop_at_once_when_commands_stop():
     guard = ActuatorGuard(propellers, Watchdog(200 * MS))
     guard.offer(propellers.names, [1.0, -0.5], 0)
     assert not guard.output(201 * MS).any()
+
+
+class TestEstop:
+    """The e-stop goes before everything."""
+
+    def test_it_closes_the_valves_at_once_and_takes_no_command(self, guard):
+        guard.estop.hear(False, 0)
+        guard.offer(NAMES, GOOD, 0)
+        assert guard.output(1).any()
+        guard.estop.hear(True, 2)
+        assert not guard.output(3).any()
+        guard.offer(NAMES, GOOD, 4)
+        assert not guard.output(5).any()
+
+    def test_its_silence_does_the_same(self, guard):
+        guard.estop.hear(False, 0)
+        for t in range(0, 1000, 50):
+            guard.offer(NAMES, GOOD, t * MS)
+        assert not guard.output(1000 * MS).any()
+
+    def test_after_a_release_only_a_new_command_opens_a_valve(self, guard):
+        guard.estop.hear(True, 0)
+        guard.offer(NAMES, GOOD, 1)
+        guard.estop.hear(False, 600 * MS)
+        assert not guard.output(601 * MS).any()
+        guard.offer(NAMES, GOOD, 602 * MS)
+        assert guard.output(603 * MS).tolist() == GOOD
+
+    def test_it_holds_in_lock_step_too(self, guard):
+        guard.offer(NAMES, GOOD, 0)
+        assert guard.answer(900 * MS).tolist() == GOOD  # time stands still there
+        guard.estop.hear(True, 900 * MS)
+        assert not guard.answer(901 * MS).any()
+
+    def test_a_person_is_stopped_like_a_controller(self, guard):
+        guard.offer_by_hand(NAMES, GOOD, 0)
+        guard.estop.hear(True, 1)
+        assert not guard.output(2).any()
+
+
+class TestHand:
+    """A person goes before the controller, until the person gives back."""
+
+    def test_a_hand_takes_the_actuators_from_the_controller(self, guard):
+        guard.offer(NAMES, GOOD, 0)
+        assert guard.offer_by_hand(NAMES, GOOD[::-1], 1)
+        assert not guard.offer(NAMES, GOOD, 2)
+        assert guard.output(3).tolist() == GOOD[::-1]
+
+    def test_a_hand_that_falls_silent_closes_the_valves_and_the_controller_stays_out(self, guard):
+        guard.offer_by_hand(NAMES, GOOD, 0)
+        for t in range(0, 500, 20):
+            guard.offer(NAMES, GOOD, t * MS)
+        assert not guard.output(500 * MS).any()
+
+    def test_it_is_given_back_only_when_the_hand_has_let_go(self, guard):
+        guard.offer_by_hand(NAMES, GOOD, 0)
+        assert "still moves" in guard.give_back(1)
+        guard.offer_by_hand(NAMES, [0.0] * 8, 2)
+        assert guard.give_back(3) == ""
+        assert guard.offer(NAMES, GOOD, 4)
+        assert guard.output(5).tolist() == GOOD
+
+    def test_a_senseless_hand_takes_nothing(self, guard):
+        assert not guard.offer_by_hand(NAMES, [float("nan")] * 8, 0)
+        assert not guard.person
+
+    def test_nobody_gives_back_what_nobody_has(self, guard):
+        assert guard.give_back(0)
+
+
+BASE = load_robot("turtlebot2").actuators
+
+
+@pytest.fixture
+def base():
+    return ActuatorGuard(BASE, Watchdog(400 * MS), control_dt=0.1)
+
+
+class TestSlew:
+    """Commands that actuators cannot follow are brought nearer to the one before."""
+
+    def test_a_step_is_cut_to_what_one_control_period_allows(self, base):
+        base.offer(BASE.names, [0.45, 0.0], 0, stamp_ns=100 * MS)
+        assert base.output(1)[0] == pytest.approx(0.09)
+
+    def test_who_sends_faster_gets_no_more_in_the_same_time(self, base):
+        base.offer(BASE.names, [0.0, 0.0], 0)
+        for t in range(1, 101):
+            base.offer(BASE.names, [0.45, 0.0], t * MS)
+        assert base.output(101 * MS)[0] == pytest.approx(0.09, rel=1e-3)
+
+    def test_a_command_within_the_limit_stays_as_it_is_to_the_last_bit(self, base):
+        values = [0.1 * 0.9 / 1.7, 0.1 * 1.8 / 3.3]
+        base.offer(BASE.names, values, 0, stamp_ns=100 * MS)
+        assert base.output(1).tolist() == values
+
+    def test_after_an_e_stop_wheels_begin_anew_from_where_they_slowed_down_to(self, base):
+        for k in range(6):
+            base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
+        assert base.output(501 * MS)[0] == pytest.approx(0.45)
+        base.estop.hear(True, 510 * MS)
+        assert base.output(520 * MS)[0] > 0.4
+        assert base.output(620 * MS)[0] == pytest.approx(0.45 - 0.09, abs=0.02)
+        assert base.output(1200 * MS)[0] == 0.0
+
+    def test_valves_have_no_slew(self, guard):
+        guard.offer(NAMES, GOOD, 0)
+        assert guard.output(1).tolist() == GOOD
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["offer", "hand", "press", "release", "back", "wait"]),
+            st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=10),
+            st.integers(0, 300),
+        ),
+        max_size=30,
+    )
+)
+@hypothesis_settings(max_examples=150, deadline=None)
+def test_whatever_comes_the_output_is_a_command_within_limits_and_safe_under_the_e_stop(steps):
+    guard = ActuatorGuard(THRUSTERS, Watchdog(200 * MS), control_dt=0.2)
+    now = 0
+    for what, values, ms in steps:
+        now += ms * MS
+        if what == "offer":
+            guard.offer(NAMES, values, now)
+        elif what == "hand":
+            guard.offer_by_hand(NAMES, values, now)
+        elif what in ("press", "release"):
+            guard.estop.hear(what == "press", now)
+        elif what == "back":
+            guard.give_back(now)
+        output = guard.output(now)
+        assert output.shape == (8,)
+        assert set(output.tolist()) <= {0.0, 1.0}
+        if guard.estop.reason(now) or guard.watchdog.expired(now):
+            assert not output.any()
+
+
+def test_a_command_of_a_million_values_is_refused_without_being_read(guard):
+    assert not guard.offer(NAMES, range(1_000_000), 0)
+    assert "1000000 values" in guard.last_rejection

@@ -1,20 +1,26 @@
-"""Reads a recorded run without ROS, as much of it as can be read."""
+"""One recorded run as arrays, without ROS, as much of it as can be read."""
 
 from __future__ import annotations
 
-import json
-from collections import Counter
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
-from mcap.records import Channel, Message, Metadata, Schema
 
+from fulmar_bringup.bags.contents import Bag, json_object, open_bag
+from fulmar_bringup.bags.decode import (
+    NS,
+    Odometries,
+    Vectors,
+    joint_vectors,
+    messages,
+    odometries,
+    stamp_of,
+    twist_vectors,
+)
 from fulmar_bringup.run_record import Actuation, GivenGoal, HealthSample, Motion, Places, RunRecord
 from fulmar_core.errors import BagError
-from fulmar_core.rotation import rotate, yaw_of
+from fulmar_core.rotation import rotate
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     BLOCK,
@@ -29,33 +35,17 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     Wire,
 )
-from fulmar_ros.bag_metadata import METADATA_FILE
-from fulmar_ros.bag_records import bag_file, read_records
-from fulmar_ros.bag_types import type_store
-from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
+from fulmar_ros.bag_writer import RUN_RECORD
+from fulmar_ros.message_reader import goal_of, obstacles_of
 
-READ = (
-    TRUTH,
-    ODOMETRY,
-    ACTUATORS_STATE,
-    COMMAND,
-    VELOCITY_COMMAND,
-    *GOAL_WIRES.values(),
-    OBSTACLES,
-    BLOCK,
-    METADATA,
-    STATUS,
-    DIAGNOSTICS,
-)
-ADD = 0  # action of a marker that is there
-Decoded = list[tuple[float, Any]]  # when it was recorded [s], and the message
+Decoded = list[tuple[int, Any]]  # when it was recorded [ns], and the message
 
 
 def read_run(path: Path) -> RunRecord:
     """Read one run.
 
     Args:
-        path: Bag folder, or the MCAP file in it.
+        path: Bag folder, or a file in it.
 
     Returns:
         The run. What is damaged or missing is left out and named in `warnings`.
@@ -63,183 +53,122 @@ def read_run(path: Path) -> RunRecord:
     Raises:
         BagError: There is no bag, it is empty, or Fulmar did not record it.
     """
-    path = Path(path)
-    file = bag_file(path)
-    warnings: list[str] = []
-    channels: dict[int, tuple[str, str]] = {}  # topic and type
-    schemas: dict[int, str] = {}
-    messages: list[Message] = []
-    info: dict[str, Any] | None = None
-    for record in read_records(file, warnings):
-        if isinstance(record, Message):
-            messages.append(record)
-        elif isinstance(record, Schema):
-            schemas[record.id] = record.name
-        elif isinstance(record, Channel):
-            channels[record.id] = (record.topic, schemas.get(record.schema_id, ""))
-        elif isinstance(record, Metadata) and record.name == RUN_RECORD:
-            info = _json_object(record.metadata.get(RUN_KEY, ""))
-    info = info or _info_beside(file)
-    if info is None:
-        found = ", ".join(sorted(topic for topic, _ in channels.values())[:3]) or "none"
+    bag = open_bag(Path(path))
+    if bag.info is None:
+        found = ", ".join(list(bag.topics)[:3]) or "none"
         raise BagError(
-            f"{file}: no recording of Fulmar: lacks '{RUN_RECORD}', topics: {found}. Give a bag of a run."
+            f"{bag.files[0]}: no recording of Fulmar: lacks '{RUN_RECORD}', topics: {found}. Give a bag of a run."
         )
-    decoded = _decode(str(info.get("robot", "")), channels, messages, warnings)
-    if not messages:
-        warnings.append(f"{file.name}: holds no message.")
-    return _record(path, info, decoded, warnings)
+    return _Reader(bag).record(bag.info)
 
 
-def _info_beside(file: Path) -> dict[str, Any] | None:
-    """Run information of the `metadata.yaml` next to a damaged file."""
-    try:
-        document = yaml.safe_load((file.parent / METADATA_FILE).read_text())
-        return _json_object(document["rosbag2_bagfile_information"]["custom_data"][RUN_RECORD])
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError):
-        return None
+class _Reader:
+    """Reads wire after wire, and gathers what cannot be read."""
+
+    def __init__(self, bag: Bag) -> None:
+        self._bag, self._warnings = bag, list(bag.warnings)
+        if not any(len(topic) for topic in bag.topics.values()):
+            self._warnings.append(f"{bag.files[0].name}: holds no message.")
+
+    def record(self, info: dict[str, Any]) -> RunRecord:
+        texts = [json_object(message.data) for _, message in self._messages(METADATA)]
+        return RunRecord(
+            path=self._bag.path,
+            info=info,
+            truth=_motion(self._odometries(TRUTH)),
+            odom=_motion(self._odometries(ODOMETRY)),
+            applied=_actuation(self._vectors(ACTUATORS_STATE)),
+            commanded=_actuation(self._commands()),
+            goals=tuple(sorted(self._goals(), key=lambda goal: goal.log_s)),
+            obstacles=self._obstacles(),
+            block=_places(self._messages(BLOCK)),
+            controller=next((text for text in reversed(texts) if text), {}),
+            health=_health(self._messages(STATUS) + self._messages(DIAGNOSTICS)),
+            warnings=tuple(self._warnings),
+        )
+
+    def _lost(self, wire: Wire, count: int, why: str = "cannot be read") -> None:
+        topic = self._bag.topic_name(wire)
+        others = sum(len(t) for t in self._bag.topics.values() if t.name == topic and t.type != wire.type)
+        if count + others:
+            self._warnings.append(f"{count + others} messages of {topic} {why}.")
+
+    def _messages(self, wire: Wire) -> Decoded:
+        topic = self._bag.of(wire)
+        found = messages(topic)
+        self._lost(wire, len(topic) - len(found))
+        return found
+
+    def _odometries(self, wire: Wire) -> Odometries:
+        found = odometries(self._bag.of(wire))
+        self._lost(wire, found.left_out)
+        return found
+
+    def _vectors(self, wire: Wire) -> Vectors:
+        found = joint_vectors(self._bag.of(wire), "effort")
+        self._lost(wire, found.left_out, "have other names or lengths than the first, or cannot be read")
+        return found
+
+    def _commands(self) -> Vectors:
+        if not len(self._bag.of(VELOCITY_COMMAND)):
+            return self._vectors(COMMAND)
+        found = twist_vectors(self._bag.of(VELOCITY_COMMAND))
+        self._lost(VELOCITY_COMMAND, found.left_out)
+        return found
+
+    def _goals(self) -> list[GivenGoal]:
+        goals = []
+        for wire in GOAL_WIRES.values():
+            for log_ns, message in self._messages(wire):
+                goal, problem = goal_of(message)
+                if goal is None:
+                    self._warnings.append(f"a message of {self._bag.topic_name(wire)} is no goal: {problem}.")
+                    continue
+                goals.append(GivenGoal(stamp_of(message) / NS, log_ns / NS, goal.targets))
+        return goals
+
+    def _obstacles(self) -> np.ndarray:
+        """Obstacles of the last message, shape (m, 3)."""
+        nothing = np.zeros((0, 3))
+        found = self._messages(OBSTACLES)
+        if not found:
+            return nothing
+        discs, problem = obstacles_of(found[-1][1])
+        if discs is None:
+            self._warnings.append(f"the obstacles cannot be used: {problem}.")
+        return nothing if discs is None else discs
 
 
-def _json_object(text: str) -> dict[str, Any] | None:
-    try:
-        value = json.loads(text)
-    except ValueError:
-        return None
-    return value if isinstance(value, dict) else None
-
-
-def _decode(
-    robot: str, channels: dict[int, tuple[str, str]], messages: Sequence[Message], warnings: list[str]
-) -> dict[Wire, Decoded]:
-    wires = {wire.name if wire.name.startswith("/") else f"/{robot}/{wire.name}": wire for wire in READ}
-    decoded: dict[Wire, Decoded] = {wire: [] for wire in READ}
-    bad: Counter[str] = Counter()
-    for message in messages:
-        topic, kind = channels.get(message.channel_id, ("", ""))
-        wire = wires.get(topic)
-        if wire is None:
-            bad["a damaged part of the file"] += not topic
-            continue
-        try:
-            if kind != wire.type:
-                raise ValueError(kind)
-            decoded[wire].append((message.log_time / 1e9, type_store().deserialize_cdr(message.data, kind)))
-        except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; they are counted
-            bad[topic] += 1
-    warnings += [f"{count} messages of {topic} cannot be read." for topic, count in bad.items() if count]
-    return decoded
-
-
-def _record(path: Path, info: dict[str, Any], decoded: dict[Wire, Decoded], warnings: list[str]) -> RunRecord:
-    texts = [_json_object(message.data) for _, message in decoded[METADATA]]
-    goals = [
-        GivenGoal(_stamp_s(message.header), log_s, _targets(message, name))
-        for name, wire in GOAL_WIRES.items()
-        for log_s, message in decoded[wire]
-    ]
-    return RunRecord(
-        path=path,
-        info=info,
-        truth=_motion(decoded[TRUTH]),
-        odom=_motion(decoded[ODOMETRY]),
-        applied=_actuation(decoded[ACTUATORS_STATE], ACTUATORS_STATE, warnings),
-        commanded=_velocity_commands(decoded[VELOCITY_COMMAND])
-        if decoded[VELOCITY_COMMAND]
-        else _actuation(decoded[COMMAND], COMMAND, warnings),
-        goals=tuple(sorted(goals, key=lambda goal: goal.log_s)),
-        obstacles=_discs(decoded[OBSTACLES]),
-        block=_places(decoded[BLOCK]),
-        controller=next((text for text in reversed(texts) if text), {}),
-        health=_health(decoded[STATUS] + decoded[DIAGNOSTICS]),
-        warnings=tuple(warnings),
-    )
-
-
-def _stamp_s(header: Any) -> float:
-    return float(header.stamp.sec + header.stamp.nanosec / 1e9)
-
-
-def _motion(messages: Decoded) -> Motion:
-    def column(read: Callable[[Any], list[float]], width: int) -> np.ndarray:
-        return np.array([read(message) for _, message in messages], dtype=float).reshape(-1, width)
-
-    def vector(v: Any) -> list[float]:
-        return [v.x, v.y, v.z]
-
-    quat = column(lambda m: [*vector(m.pose.pose.orientation), m.pose.pose.orientation.w], 4)
+def _motion(found: Odometries) -> Motion:
+    quat = found.pose[:, 3:]
     return Motion(
-        stamp_s=np.array([_stamp_s(message.header) for _, message in messages]),
-        log_s=np.array([log_s for log_s, _ in messages]),
-        position=column(lambda m: vector(m.pose.pose.position), 3),
+        stamp_s=found.stamp_ns / NS,
+        log_s=found.log_ns / NS,
+        position=found.pose[:, :3],
         quat_xyzw=quat,
-        velocity_in_world=rotate(quat, column(lambda m: vector(m.twist.twist.linear), 3)),
-        yaw_rate=column(lambda m: [m.twist.twist.angular.z], 1)[:, 0],
+        velocity_in_world=rotate(quat, found.twist[:, :3]),
+        yaw_rate=found.twist[:, 5],
     )
 
 
-def _actuation(messages: Decoded, wire: Wire, warnings: list[str]) -> Actuation:
-    names = tuple(messages[0][1].name) if messages else ()
-    alike = [(t, m) for t, m in messages if tuple(m.name) == names and len(m.effort) == len(names)]
-    if len(alike) < len(messages):
-        warnings.append(f"{len(messages) - len(alike)} messages of {wire.name} have other names or lengths.")
-    effort = [message.effort for _, message in alike]
-    return Actuation(
-        stamp_s=np.array([_stamp_s(message.header) for _, message in alike]),
-        log_s=np.array([log_s for log_s, _ in alike]),
-        names=names,
-        effort=np.array(effort, dtype=float).reshape(len(alike), len(names)),
-    )
+def _actuation(found: Vectors) -> Actuation:
+    return Actuation(found.stamp_ns / NS, found.log_ns / NS, found.names, found.values)
 
 
-def _velocity_commands(messages: Decoded) -> Actuation:
-    effort = [(message.twist.linear.x, message.twist.angular.z) for _, message in messages]
-    return Actuation(
-        stamp_s=np.array([_stamp_s(message.header) for _, message in messages]),
-        log_s=np.array([log_s for log_s, _ in messages]),
-        names=("speed", "yaw_rate"),
-        effort=np.array(effort, dtype=float).reshape(-1, 2),
-    )
-
-
-def _targets(message: Any, topic: str) -> np.ndarray:
-    """Targets of a goal message, shape (k, 3)."""
-    if topic == "goal_velocity":
-        twist = message.twist
-        targets = [(twist.linear.x, twist.linear.y, twist.angular.z)]
-    elif topic == "goal_point":
-        targets = [(message.point.x, message.point.y, 0.0)]
-    else:
-        poses = message.poses if topic == "goal_path" else [message]
-        targets = [(*_xy(each.pose), _yaw(each.pose.orientation)) for each in poses]
-    return np.array(targets, dtype=float).reshape(-1, 3)
-
-
-def _xy(pose: Any) -> tuple[float, float]:
-    return pose.position.x, pose.position.y
-
-
-def _yaw(q: Any) -> float:
-    return float(yaw_of(np.array([q.x, q.y, q.z, q.w])))
-
-
-def _discs(messages: Decoded) -> np.ndarray:
-    """Obstacles of the last message, shape (m, 3)."""
-    markers = messages[-1][1].markers if messages else []
-    discs = [(*_xy(marker.pose), 0.5 * marker.scale.x) for marker in markers if marker.action == ADD]
-    return np.array(discs, dtype=float).reshape(-1, 3)
-
-
-def _places(messages: Decoded) -> Places:
+def _places(found: Decoded) -> Places:
+    xy = [(message.pose.position.x, message.pose.position.y) for _, message in found]
     return Places(
-        stamp_s=np.array([_stamp_s(message.header) for _, message in messages]),
-        xy=np.array([_xy(message.pose) for _, message in messages], dtype=float).reshape(-1, 2),
+        stamp_s=np.array([stamp_of(message) / NS for _, message in found]),
+        xy=np.array(xy, dtype=float).reshape(-1, 2),
     )
 
 
-def _health(messages: Decoded) -> tuple[HealthSample, ...]:
+def _health(found: Decoded) -> tuple[HealthSample, ...]:
     samples = [
-        HealthSample(log_s, s.name, int(s.level), s.message, {pair.key: pair.value for pair in s.values})
-        for log_s, message in messages
+        HealthSample(
+            log_ns / NS, s.name, int(s.level), s.message, {pair.key: pair.value for pair in s.values}
+        )
+        for log_ns, message in found
         for s in message.status
     ]
     return tuple(sorted(samples, key=lambda sample: sample.log_s))

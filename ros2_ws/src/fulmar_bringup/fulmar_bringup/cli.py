@@ -9,18 +9,24 @@ from types import FrameType
 
 import typer
 
+from fulmar_bringup.commands.bag import bag
 from fulmar_bringup.commands.benchmark import benchmark
 from fulmar_bringup.commands.bundle import bundle
 from fulmar_bringup.commands.demo import demo
 from fulmar_bringup.commands.doctor import doctor
+from fulmar_bringup.commands.estop import estop
 from fulmar_bringup.commands.evaluate import EPILOG as MEANINGS
 from fulmar_bringup.commands.evaluate import evaluate
 from fulmar_bringup.commands.export import export
+from fulmar_bringup.commands.faults import faults
 from fulmar_bringup.commands.goals import goals
+from fulmar_bringup.commands.identify import identify
 from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
 from fulmar_bringup.commands.run import run
+from fulmar_bringup.commands.swap import swap
+from fulmar_bringup.commands.teleop import teleop
 from fulmar_bringup.commands.train import train
 from fulmar_bringup.console import console
 from fulmar_bringup.extras import advice_for
@@ -40,13 +46,19 @@ app = typer.Typer(
 app.command("list")(list_names)
 app.command()(run)
 app.command()(goals)
+app.command()(teleop)
+app.command()(estop)
+app.command()(swap)
+app.command()(faults)
 app.command()(train)
 app.command()(policies)
 app.command()(export)
 app.command(epilog=MEANINGS)(evaluate)
 app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
+app.add_typer(bag, name="bag")
 app.command()(report)
+app.command()(identify)
 app.command()(demo)
 app.command()(doctor)
 

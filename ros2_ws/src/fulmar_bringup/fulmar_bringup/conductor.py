@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import contextlib
 import signal
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -12,23 +13,35 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
+from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.goal_plan import is_endless, shown_path
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec, run_goals_spec
+from fulmar_bringup.node_table import (
+    RunPlan,
+    controller_spec,
+    emulator_spec,
+    guard_specs,
+    plant_spec,
+    recorder_spec,
+    run_goals_spec,
+)
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
-from fulmar_bringup.provenance import fulmar_version, git_revision
 from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
-from fulmar_core.paths import config_path
+from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
+from hardware_drivers.settings import load_hardware
 
+# A ring that no fault has written tells nothing of the goal.
+_UNJUDGED: dict[str, Any] = {"success": None, "bag": None, "failure": None}
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
@@ -44,8 +57,8 @@ class RunOutcome:
 
     @property
     def exit_code(self) -> int:
-        """0: ran to its end and met the goal; 1: not so."""
-        return 0 if self.summary.get("success") and not self.failure else 1
+        """0: ran to its end and met the goal, or nobody recorded whether it did; 1: not so."""
+        return 0 if self.summary.get("success") is not False and not self.failure else 1
 
 
 def conduct(request: RunRequest) -> RunOutcome:
@@ -62,13 +75,16 @@ def conduct(request: RunRequest) -> RunOutcome:
     """
     with claimed_domain():
         failure, plant_steps = _run(request)
+    ring = request.plan.recording.mode == "ring"
+    if ring and not failure and not request.record.exists():
+        return RunOutcome({**summarise(_nothing_recorded(request)), **_UNJUDGED}, "")
     try:
         record = read_run(request.record)
         summary = summarise(record)
     except FulmarError as error:
         failure, summary = failure or str(error), summarise(_nothing_recorded(request))
         summary["bag"] = str(request.record) if request.record.exists() else None
-    if not failure and plant_steps > summary["steps"]:
+    if not failure and not ring and plant_steps > summary["steps"]:
         failure = f"the bag lacks {plant_steps - summary['steps']} of {plant_steps} commands"
     return RunOutcome({**summary, "failure": failure or None}, failure)
 
@@ -82,9 +98,19 @@ def _run(request: RunRequest) -> tuple[str, int]:
     plan = replace(request.plan, supervised=True)
     group = ProcessGroup()
     failure, plant, ends = "", Report(), list[Ended]()
+    folders = contextlib.ExitStack()
     try:
         group.start(recorder_spec(plan, **_recording(request)))
-        group.start(plant_spec(plan, subscribers=3 if plan.goals else 2))  # controller, recorder, goals
+        port = ""
+        if plan.emulated:
+            emulation = emulation_of(
+                load_hardware(plan.hardware), Path(folders.enter_context(_wires_folder()))
+            )
+            group.start(emulator_spec(plan, emulation))
+            port = emulation.port
+        group.start(plant_spec(plan, subscribers=_listeners(plan), port=port))
+        for spec in guard_specs(plan):
+            group.start(spec)
         group.start(controller_spec(plan, subscribers=2))  # plant and recorder
         if plan.goals:
             group.start(run_goals_spec(plan))
@@ -98,7 +124,22 @@ def _run(request: RunRequest) -> tuple[str, int]:
         failure = str(stop) or "stopped by the user"
     finally:
         ends += group.stop_all()
+        folders.close()
     return _with_ends(failure, ends), int(plant.values.get("steps", 0))
+
+
+def _wires_folder() -> tempfile.TemporaryDirectory[str]:
+    """A folder for the wires of an emulator that are files."""
+    return tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
+
+
+def _listeners(plan: RunPlan) -> int:
+    """Subscriptions that a plant waits for: of odometry, of poses in its place, or of what its actuators do."""
+    if plan.hardware and (plan.guards.estimator or not load_hardware(plan.hardware).measures_odometry):
+        return 1  # the recorder
+    if plan.guards.estimator:
+        return 2  # of the poses: estimator, recorder
+    return 3 if plan.goals else 2  # controller, recorder, goals
 
 
 def _with_ends(failure: str, ends: list[Ended]) -> str:
@@ -127,7 +168,8 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
         if plan.goals:
             overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
         else:
-            overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=starting)
+            now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
+            overseer.give_goal(request.mission, time_ns=now_ns, alive=starting)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)
@@ -146,9 +188,7 @@ def _wait_for_end(
 
     def running() -> None:
         _raise_if_ended(group)
-        moved(
-            max(0.0, float(overseer.plant.values.get("sim_time_s", 0.0) or 0.0) - SIMULATION_START_NS / 1e9)
-        )
+        moved(_passed_s(plan, overseer.plant))
         if overseer.plant.level == "error":
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":
@@ -163,6 +203,13 @@ def _wait_for_end(
 
     overseer.wait_until(finished, running)
     running()
+
+
+def _passed_s(plan: RunPlan, plant: Report) -> float:
+    """How much of a run is over [s]."""
+    if plan.hardware:
+        return float(plant.values.get("ticks") or 0.0) * load_robot(plan.robot).timing.physics_dt
+    return max(0.0, float(plant.values.get("sim_time_s") or 0.0) - SIMULATION_START_NS / 1e9)
 
 
 def _silence_limits_s(plan: RunPlan) -> tuple[float, float]:
@@ -193,25 +240,15 @@ def _with_plant_reaction(reason: str, overseer: Supervisor) -> str:
 
 def _recording(request: RunRequest) -> dict[str, str]:
     plan = request.plan
-    info = {
-        **{key: value for key, value in asdict(plan).items() if key not in ("start", "supervised")},
-        "start": list(plan.start),
+    more = {
         "goal": list(request.goal) if request.goal else None,
-        **_of_goals(plan),
-        "fulmar_version": fulmar_version(),
-        "git_revision": git_revision(),
         "command": request.command,
-    }
-    files = {
-        **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
-        "robot.yaml": config_path("robots", plan.robot),
-        "task.yaml": config_path("tasks", plan.task),
-        "scenario.yaml": config_path("scenarios", plan.scenario),
+        **_of_goals(plan),
     }
     return {
         "directory": str(request.record),
-        "run_info": json.dumps(info),
-        "attachments": json.dumps({name: str(path.absolute()) for name, path in files.items()}),
+        "info": run_info(plan, more),
+        "files": attachments(plan),
     }
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from fulmar_bringup.environment import environment
 from fulmar_core.errors import ConfigError
 
 LARGEST = 232  # of DDS
@@ -71,6 +72,22 @@ def claimed_domain() -> Iterator[int]:
                 "Wait for it to end, or set ROS_DOMAIN_ID to another number."
             )
         yield domain
+
+
+@contextlib.contextmanager
+def own_domain() -> Iterator[dict[str, str]]:
+    """A domain that nobody else uses, for this process and its children, until the context ends.
+
+    Yields:
+        The environment of the children, which is ours meanwhile.
+
+    Raises:
+        ConfigError: If none is free.
+    """
+    with reserved_domains(1) as (number,):
+        own = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        with environment(own):
+            yield own
 
 
 def _lock_folder() -> Path:

@@ -5,14 +5,29 @@ Both `fulmar run` and `launch/system.launch.py` start exactly what this lists.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 
+from fulmar_bringup.bag_origin import attachments, run_info
+from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
-from fulmar_bringup.system import CONTROLLERS, check_names, default_control_hz, load_system
+from fulmar_bringup.system import (
+    CONTROLLERS,
+    NONE,
+    Guards,
+    check_names,
+    default_control_hz,
+    default_guards,
+    default_hardware,
+    load_system,
+)
+from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
 
-Parameter = bool | int | float | str | list[float]
+Parameter = bool | int | float | str | list[float] | list[int]
 
 
 @dataclass(frozen=True)
@@ -26,6 +41,8 @@ class NodeSpec:
     namespace: str
     parameters: dict[str, Parameter] = field(default_factory=dict)
     quiet: bool = False  # says only what is wrong
+    remappings: dict[str, str] = field(default_factory=dict)  # topics under other names
+    network: str = ""  # namespace of Linux that it runs in; empty: ours
 
 
 @dataclass(frozen=True)
@@ -45,7 +62,13 @@ class RunPlan:
     lockstep: bool = False
     rate: float = 1.0  # simulated seconds a wall-clock second
     goals: str = ""  # goal file that a node of its own tells; empty: somebody else gives the goal
+    guards: Guards = NONE
     supervised: bool = False  # somebody else activates the plant when all are ready
+    hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
+    emulated: bool = False  # an emulator stands in for the device
+    recording: Recording = Recording()
+    copies: int = 1  # of each command on the wire
+    controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
@@ -65,19 +88,40 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "goals_streamed": bool(plan.goals),
         "wait_for_subscribers": subscribers,
     }
-    if plan.controller == "policy" and plan.policy:
-        parameters["policy"] = plan.policy
+    guards = plan.guards
+    if plan.controller == "policy":
+        texts = {
+            "policy": plan.policy,
+            "fallback": guards.fallback or "",
+            "trusted_keys": str(Path(guards.trusted_keys).absolute()) if guards.trusted_keys else "",
+        }
+        parameters |= {key: text for key, text in texts.items() if text}
+    if guards.max_run_time_s:
+        parameters["max_run_time_s"] = guards.max_run_time_s
+    if guards.area != NO_AREA:
+        parameters["area"] = list(guards.area)
+    if guards.estop:
+        parameters["estop"] = True
+    if plan.copies > 1:
+        parameters["copies"] = plan.copies
     return NodeSpec(
-        "controller", "policy_server", executable, f"policy_server.{executable}", f"/{plan.robot}", parameters
+        "controller",
+        "policy_server",
+        executable,
+        f"policy_server.{executable}",
+        f"/{plan.robot}",
+        parameters,
+        network=plan.controller_network,
     )
 
 
-def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
-    """The node that simulates.
+def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSpec:
+    """The node that simulates, or that drives a device.
 
     Args:
         plan: What to run.
         subscribers: Subscriptions of the odometry to wait for before the first step.
+        port: Where the device is, in the place of what the hardware file says.
     """
     parameters: dict[str, Parameter] = {
         "robot": plan.robot,
@@ -93,21 +137,65 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "wait_for_subscribers": subscribers,
         "autostart": not plan.supervised,
     }
+    if plan.guards.estop:
+        parameters["estop"] = True
+    if plan.guards.estimator:
+        parameters["estimated"] = True
+    if plan.backend == "hardware":
+        parameters["hardware"] = plan.hardware
+        if port:
+            parameters["port"] = port
+        return NodeSpec(
+            "plant",
+            "hardware_drivers",
+            "driver_node",
+            "hardware_drivers.driver_node",
+            f"/{plan.robot}",
+            parameters,
+        )
+    if plan.guards.estimator:
+        parameters["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
     return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", f"/{plan.robot}", parameters)
 
 
-def recorder_spec(
-    plan: RunPlan, *, directory: str = "", run_info: str = "", attachments: str = ""
-) -> NodeSpec:
-    """The node that records; without a directory it makes one under `runs/`."""
-    texts = {"directory": directory, "run_info": run_info, "attachments": attachments}
+def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
+    """The node that stands in for a device."""
+    parameters: dict[str, Parameter] = {
+        "robot": plan.robot,
+        "task": plan.task,
+        "scenario": plan.scenario,
+        "seed": plan.seed,
+        "start": list(plan.start),
+        "device": emulation.device,
+        "link": emulation.link,
+        **emulation.more,
+    }
+    if plan.guards.estimator:
+        parameters["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
+    return NodeSpec(
+        "emulator", "sim_nodes", "emulator_node", "sim_nodes.emulator_node", f"/{plan.robot}", parameters
+    )
+
+
+def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: str = "") -> NodeSpec:
+    """The node that records.
+
+    Args:
+        plan: What to run.
+        directory: The bag folder; empty: the node makes one under `runs/`.
+        info: As `bag_origin.run_info` gives it.
+        files: As `bag_origin.attachments` gives it.
+    """
+    texts = {"directory": directory, "run_info": info, "attachments": files}
+    usual = asdict(Recording())
+    unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
     return NodeSpec(
         "recorder",
         "fulmar_ros",
         "recorder_node",
         "fulmar_ros.recorder_node",
         f"/{plan.robot}",
-        {key: text for key, text in texts.items() if text},
+        {key: text for key, text in texts.items() if text} | unusual,
     )
 
 
@@ -141,6 +229,22 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
     return replace(spec, parameters=spec.parameters | more)
 
 
+def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
+    """The nodes that a plan's guards ask for."""
+    space, parameters = f"/{plan.robot}", {"robot": plan.robot}
+    nodes = []
+    if plan.guards.estop:
+        nodes.append(
+            NodeSpec("estop", "fulmar_ros", "estop_node", "fulmar_ros.estop_node", space, dict(parameters))
+        )
+    if plan.guards.estimator:
+        chosen: dict[str, Parameter] = {**parameters, "estimator": plan.guards.estimator}
+        nodes.append(
+            NodeSpec("estimator", "fulmar_ros", "estimator_node", "fulmar_ros.estimator_node", space, chosen)
+        )
+    return tuple(nodes)
+
+
 def list_nodes(
     *,
     system: str | None = None,
@@ -150,6 +254,7 @@ def list_nodes(
     backend: str | None = None,
     policy: str | None = None,
     goals: str | None = None,
+    hardware: str | None = None,
 ) -> tuple[NodeSpec, ...]:
     """Nodes of a system, each of its choices replaced by what is given.
 
@@ -161,6 +266,7 @@ def list_nodes(
         backend: Another backend.
         policy: Folder of a bundle; the shipped one by default.
         goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it somebody else gives goals.
+        hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
 
     Returns:
         Recorder, plant, controller and, with `goals`, the node that tells them.
@@ -174,10 +280,17 @@ def list_nodes(
     as_written = chosen == (base.robot, base.task, base.controller, base.backend)
     hz = base.control_hz if as_written else default_control_hz(*chosen)
     load_robot(chosen[0]).timing.substeps(hz)
-    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "")
-    nodes = recorder_spec(plan), plant_spec(plan), controller_spec(plan)
+    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "", guards=base.guards, recording=base.recorder)
+    if plan.backend == "hardware":
+        path = default_hardware(plan.robot, hardware)
+        guards = (
+            base.guards if base.backend == "hardware" else default_guards(plan.controller, "hardware", path)
+        )
+        plan = replace(plan, hardware=path, guards=guards)
+    recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan, system or "mujoco_policy"))
+    nodes = recorder, plant_spec(plan), *guard_specs(plan)
     if not goals:
-        return nodes
+        return *nodes, controller_spec(plan)
     checked_goals(goals, load_robot(plan.robot), load_task(plan.task))
     plan = replace(plan, goals=str(goal_path(goals)))
-    return *nodes[:2], controller_spec(plan), run_goals_spec(plan)
+    return *nodes, controller_spec(plan), run_goals_spec(plan)

@@ -4,24 +4,40 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, cast
 
 import numpy as np
 
+from fulmar_bringup.emulation import check_emulation
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.system import check_names, default_control_hz
+from fulmar_bringup.system import (
+    CONTROLLERS,
+    FALLBACKS,
+    Guards,
+    check_names,
+    default_control_hz,
+    default_guards,
+    default_hardware,
+    system_of,
+)
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, read_passport
+from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
+from hardware_drivers.settings import load_hardware
 from policy_server.shipped import shipped_policy
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
@@ -57,6 +73,12 @@ def plan_run(
     record: Path,
     command: str,
     goals: str | None = None,
+    hardware: str | None = None,
+    emulate: bool = False,
+    guards: Mapping[str, Any] = MappingProxyType({}),
+    recording: str | None = None,
+    copies: int = 1,
+    controller_network: str = "",
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -78,6 +100,12 @@ def plan_run(
         record: Folder of the bag; must not exist.
         command: Command line.
         goals: Goal file, a name or a path that ends in `.yaml`; its goals come one after another.
+        hardware: Hardware file, a name or a path that ends in `.yaml`; the robot's own by default.
+        emulate: Whether an emulator stands in for the device.
+        guards: What replaces the guards of the system file, by name.
+        recording: `whole` or `ring`; the system file's by default.
+        copies: How often each command is sent.
+        controller_network: Network namespace that the controller runs in; ours by default.
 
     Returns:
         The request.
@@ -87,18 +115,26 @@ def plan_run(
         BundleError: The policy is damaged or made for something else.
     """
     check_names(robot, task, controller, backend)
+    hardware = _checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)
     _check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
     the_robot, the_task = load_robot(robot), load_task(task)
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
     if not lockstep:
         check_beat(hz, rate)
-    policy = chosen_policy(controller, policy, the_robot, the_task, hz)
+    watched = _checked_guards(
+        default_guards(controller, backend, hardware), guards, the_robot, the_task, lockstep=lockstep
+    )
+    policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=watched.fallback)
     if record.exists():
         raise ConfigError(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
         )
     episode = draw_episode(the_robot, the_task, load_scenario(scenario), seed=seed, number=0)
     mission, drawn_start = episode.goal, _pose_of_state(episode.start)
+    if hardware and not emulate:
+        start = start or (0.0, 0.0, 0.0)  # where a robot stands is where its odometry begins
+        if goal is None and goals is None:
+            raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None:
         if goal is not None:
             raise ConfigError("--goals brings its own goals; it takes no --goal.")
@@ -123,9 +159,59 @@ def plan_run(
         lockstep=lockstep,
         rate=rate,
         goals=str(goal_path(goals)) if goals else "",
+        hardware=hardware,
+        emulated=emulate,
+        guards=watched,
+        recording=chosen_recording(controller, backend, recording),
+        copies=copies,
+        controller_network=controller_network,
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
+
+
+def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: bool, hurried: bool) -> str:
+    """Path of the hardware file, empty for simulators.
+
+    Raises:
+        ConfigError: The options do not go together, or the file is wrong.
+    """
+    if backend != "hardware":
+        if asked is not None or emulate:
+            raise ConfigError(f"--hardware and --emulate go with --backend hardware, not with {backend}.")
+        return ""
+    if hurried:
+        raise ConfigError(
+            "a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate."
+        )
+    path = default_hardware(robot, asked)
+    if emulate:
+        check_emulation(load_hardware(path))
+    return path
+
+
+def _checked_guards(
+    usual: Guards, asked: Mapping[str, Any], robot: Robot, task: Task, *, lockstep: bool
+) -> Guards:
+    """The usual guards with what was asked for, if they can do what they are for.
+
+    Raises:
+        ConfigError: A fallback that has nothing for the pair, no such estimator, or an estimator in lock step.
+    """
+    fallback = asked.get("fallback")
+    if fallback is not None and fallback not in FALLBACKS:
+        raise UnknownNameError("fallback", fallback, FALLBACKS)
+    guards = replace(usual, **asked)
+    if guards.fallback:
+        CONTROLLERS[guards.fallback].check(robot, task)
+    if guards.estimator:
+        load_estimator(guards.estimator)
+        if lockstep:
+            raise ConfigError(
+                "an estimator needs every measurement in between, and lock step has one a command. "
+                "Leave --lockstep out; --rate makes a run faster."
+            )
+    return guards
 
 
 def default_task(robot: str) -> str:
@@ -200,6 +286,21 @@ def checked_rate(robot: Robot, control_hz: float) -> float:
     return control_hz
 
 
+def chosen_recording(controller: str, backend: str, mode: str | None) -> Recording:
+    """What the system file says of the recorder, in another mode where one is given.
+
+    Raises:
+        ConfigError: There is no such mode.
+    """
+    system = system_of(controller, backend)
+    recording = system.recorder if system else Recording()
+    if mode is None:
+        return recording
+    if mode not in MODES:
+        raise UnknownNameError("recording", mode, MODES)
+    return replace(recording, mode=cast(Mode, mode))
+
+
 def check_beat(control_hz: float, rate: float) -> None:
     """Refuse commands so rare that the plant's watchdog would trip between any two of them, in real time.
 
@@ -220,16 +321,29 @@ def check_beat(control_hz: float, rate: float) -> None:
 
 
 def chosen_policy(
-    controller: str, policy: Path | None, robot: Robot, task: Task, control_hz: float
+    controller: str,
+    policy: Path | None,
+    robot: Robot,
+    task: Task,
+    control_hz: float,
+    *,
+    fallback: str | None = None,
 ) -> Path | None:
     """The bundle that a controller will run, checked; None for one that runs none.
+
+    With a fallback a bundle that is refused stops nothing: the node refuses it too, and says why.
 
     Raises:
         ConfigError: A bundle was given to a controller that runs none.
         BundleError: None is shipped, or the bundle is damaged or made for something else.
     """
     if controller == "policy":
-        return checked_policy(policy, robot, task, control_hz)
+        try:
+            return checked_policy(policy, robot, task, control_hz)
+        except BundleError:
+            if fallback is None or policy is None:
+                raise
+            return policy
     if policy is not None:
         raise ConfigError(
             f"controller '{controller}' runs no policy bundle. Leave --policy out, or use --controller policy."

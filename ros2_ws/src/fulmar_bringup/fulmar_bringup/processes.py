@@ -69,6 +69,10 @@ class ProcessGroup:
         self._relays[spec.name] = _Relay(spec.name, child.stdout)
         self._relays[spec.name].start()
 
+    def process(self, name: str) -> psutil.Popen:
+        """A child that was started."""
+        return self._children[name]
+
     def ended(self) -> Ended | None:
         """The first child found to have ended, or None."""
         for name, child in self._children.items():
@@ -113,12 +117,15 @@ class ProcessGroup:
 
 
 def command_line(spec: NodeSpec) -> list[str]:
-    """Command that starts a node as a module of this interpreter."""
+    """Command that starts a node as a module of this interpreter, in its network namespace."""
     arguments = ["-r", f"__ns:={spec.namespace}", "-r", f"__node:={spec.name}"]
     for key, value in spec.parameters.items():
         arguments += ["-p", f"{key}:={_yaml(value)}"]
+    for topic, other in spec.remappings.items():
+        arguments += ["-r", f"{topic}:={other}"]
     arguments += ["--log-level", "warn"] if spec.quiet else []
-    return [sys.executable, "-m", spec.module, "--ros-args", *arguments]
+    elsewhere = ["ip", "netns", "exec", spec.network] if spec.network else []
+    return [*elsewhere, sys.executable, "-m", spec.module, "--ros-args", *arguments]
 
 
 def child_environment() -> dict[str, str]:

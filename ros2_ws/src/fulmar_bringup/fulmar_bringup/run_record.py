@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,11 @@ class Motion:
     def __len__(self) -> int:
         """Number of samples."""
         return len(self.stamp_s)
+
+    def between(self, begin_s: float, end_s: float) -> Motion:
+        """The samples of a span of time, both ends included [s]."""
+        inside = (self.stamp_s >= begin_s) & (self.stamp_s <= end_s)
+        return Motion(*(getattr(self, column.name)[inside] for column in fields(self)))
 
     @property
     def states(self) -> RigidBodyState:
@@ -99,8 +104,15 @@ class RunRecord:
 
     @property
     def motion(self) -> Motion:
-        """The truth where there is one, else the odometry."""
-        return self.truth if len(self.truth) else self.odom
+        """The truth where there is one, else the odometry.
+
+        A real robot is measured before and after its run, too; only what lies within belongs to it.
+        """
+        motion = self.truth if len(self.truth) else self.odom
+        if self.info.get("backend") != "hardware" or not len(self.applied):
+            return motion
+        began_s = float(self.applied.stamp_s[0])
+        return motion.between(began_s, began_s + float(self.info.get("duration_s") or np.inf))
 
     def last_health(self, part: str) -> HealthSample | None:
         """Newest status of `plant` or `controller`, None if there is none."""

@@ -100,9 +100,9 @@ def _own_rate_hz(record: RunRecord, wall_hz: float | None) -> float | None:
 
 
 def _wall_rate_hz(record: RunRecord) -> float | None:
-    """Answers a second of wall-clock time, from when they were recorded."""
-    commanded = record.commanded
-    times = np.unique(commanded.log_s[np.isin(commanded.stamp_s, record.odom.stamp_s)])
+    """Answers a second of wall-clock time, from when the first of each was recorded."""
+    stamps, first = np.unique(record.commanded.stamp_s, return_index=True)
+    times = np.unique(record.commanded.log_s[first[np.isin(stamps, record.odom.stamp_s)]])
     return float((len(times) - 1) / (times[-1] - times[0])) if len(times) > 1 else None
 
 

@@ -23,10 +23,9 @@ from visualization_msgs.msg import MarkerArray
 from fulmar_bringup.processes import child_environment
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
-from fulmar_ros.controller_wires import sees_obstacles
 from fulmar_ros.goal_messages import TYPES, goal_message, obstacles_message
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning

@@ -9,10 +9,15 @@ from pathlib import Path
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
+from fulmar_core.controllers.excite import Excite
+from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.paths import config_names, config_path
+from fulmar_core.recording import Recording
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.safety.area import NO_AREA, check_area
 from fulmar_core.tasks import Task, load_task
+from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
 
 
 def _load_policy(robot: Robot, task: Task, control_hz: float, policy: str) -> Controller:
@@ -37,6 +42,10 @@ def _load_classical(robot: Robot, task: Task, control_hz: float, _policy: str) -
     return load_classical(robot, task, control_hz=control_hz)
 
 
+def _load_excite(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
+    return Excite(robot, task, control_hz=control_hz)
+
+
 def _check_lqr(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr")
 
@@ -47,6 +56,14 @@ def _check_mpc(robot: Robot, task: Task) -> None:
 
 def _check_lqr_drift(robot: Robot, task: Task) -> None:
     check_pair(robot, task, law="lqr_drift")
+
+
+def _check_excite(robot: Robot, task: Task) -> None:
+    if task.kind not in EXCITE_TASKS:
+        raise ConfigError(
+            f"controller 'excite' stays around one place, '{task.name}' has none. "
+            f"Use --task with one of: {', '.join(EXCITE_TASKS)}."
+        )
 
 
 def _any_pair(robot: Robot, task: Task) -> None:
@@ -62,6 +79,7 @@ class ControllerEntry:
     load: Callable[[Robot, Task, float, str], Controller]  # with the command rate and the folder of a bundle
     check: Callable[[Robot, Task], None]  # refuses a robot and a task that it has nothing for
     needs: tuple[str, ...] = ()  # modules that an extra brings
+    strives: bool = True  # whether it means to meet the goal
 
 
 _LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
@@ -81,10 +99,40 @@ CONTROLLERS = {
     "classical": ControllerEntry(
         f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
     ),
+    "excite": ControllerEntry(Excite.title, "excite_node", _load_excite, _check_excite, strives=False),
 }
+FALLBACKS = tuple(name for name in CONTROLLERS if name != "policy")
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")
-DRIVERS: dict[str, str] = {}  # robot and module in hardware_drivers
+
+
+@dataclass(frozen=True)
+class Guards:
+    """What watches over a system, and what feeds it, beside what every system has."""
+
+    estimator: str | None = (
+        None  # file of configs/estimators: odometry comes from poses and inertial readings
+    )
+    estop: bool = False  # an e-stop node runs, and nothing moves without it
+    fallback: str | None = None  # classical controller that takes over from a policy that is refused
+    trusted_keys: str | None = None  # file or folder of public keys: only bundles that one of them has signed
+    max_run_time_s: float = 0.0  # 0: none [s]
+    area: tuple[float, float, float, float] = NO_AREA  # x_min, x_max, y_min, y_max [m]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        if self.fallback is not None and self.fallback not in FALLBACKS:
+            raise ValueError(
+                f"'fallback' = '{self.fallback}' is not known.{did_you_mean(self.fallback, FALLBACKS)}"
+            )
+        if self.max_run_time_s < 0.0:
+            raise ValueError(f"'max_run_time_s' = {self.max_run_time_s:g} must not be negative.")
+        if self.area != NO_AREA:
+            check_area(self.area)
+
+
+NONE = Guards()
+DEFAULT_ESTIMATOR = "mocap_imu"
 
 
 @dataclass(frozen=True)
@@ -97,6 +145,8 @@ class System:
     controller: str
     backend: str
     control_hz: float  # [Hz]
+    guards: Guards = NONE
+    recorder: Recording = Recording()
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at."""
@@ -115,9 +165,14 @@ def load_system(name: str) -> System:
     return system
 
 
-def modules_of(controller: str, backend: str) -> tuple[str, ...]:
-    """Modules of extras that the nodes of a controller and a backend import."""
-    return (*CONTROLLERS[controller].needs, *(("mujoco",) if backend == "mujoco" else ()))
+def modules_of(
+    controller: str, backend: str, *, guards: Guards = NONE, hardware: str = "", emulated: bool = False
+) -> tuple[str, ...]:
+    """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
+    simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
+    driven = load_hardware(hardware).needs if hardware else ()
+    estimated = ("filterpy",) if guards.estimator else ()
+    return (*CONTROLLERS[controller].needs, *simulated, *driven, *estimated)
 
 
 def system_of(controller: str, backend: str) -> System | None:
@@ -138,11 +193,32 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
     CONTROLLERS[controller].check(the_robot, the_task)
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
-    if backend == "hardware" and robot not in DRIVERS:
-        known = ", ".join(sorted(DRIVERS)) or "no robot"
+    if backend == "hardware":
+        default_hardware(robot)
+
+
+def default_hardware(robot: str, asked: str | None = None) -> str:
+    """The hardware file to use, as a path.
+
+    Args:
+        robot: The robot.
+        asked: A name of `configs/hardware`, or a path that ends in `.yaml`; by default the robot's own file.
+
+    Raises:
+        ConfigError: There is none, it has a mistake, or it is of another robot.
+    """
+    if asked is not None:
+        found = load_hardware(asked).robot
+        if found != robot:
+            raise ConfigError(f"{asked} is the hardware of '{found}', and the robot is '{robot}'.")
+        return str(hardware_path(asked).absolute())
+    mine = hardware_of(robot)
+    if not mine:
+        known = ", ".join(sorted({load_hardware(name).robot for name in config_names("hardware")}))
         raise ConfigError(
             f"there is no hardware driver for '{robot}' (there is one for: {known}). Use --backend mujoco or mock."
         )
+    return str(hardware_path(mine[0]).absolute())
 
 
 def default_control_hz(robot: str, task: str, controller: str, backend: str) -> float:
@@ -151,3 +227,22 @@ def default_control_hz(robot: str, task: str, controller: str, backend: str) -> 
     if system is not None and (system.robot, system.task) == (robot, task):
         return system.control_hz
     return load_robot(robot).timing.control_hz
+
+
+def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:
+    """Guards of the matching system file; where there is none, nothing in simulation, and on hardware an e-stop.
+
+    Where motion capture alone knows where a robot is, an estimator makes odometry of it.
+
+    Args:
+        controller: Name of the controller.
+        backend: Name of the backend.
+        hardware: Hardware file, where the backend is hardware.
+    """
+    system = system_of(controller, backend)
+    if system is not None:
+        return system.guards
+    if backend != "hardware":
+        return NONE
+    seen = load_hardware(hardware).seen_from_outside
+    return Guards(estop=True, estimator=DEFAULT_ESTIMATOR if seen else None)

@@ -17,6 +17,7 @@ ARGUMENTS = {
     "task": "a file of configs/tasks, without .yaml",
     "controller": "policy, or a classical controller such as lqr",
     "backend": "mujoco, mock or hardware",
+    "hardware": "a file of configs/hardware, without .yaml, or a path to one",
     "policy": "folder of a policy bundle",
     "goals": "a file of configs/goals, without .yaml, that a node of its own tells",
 }
@@ -35,6 +36,7 @@ def to_node(spec: NodeSpec) -> Node:
         name=spec.name,
         namespace=spec.namespace,
         parameters=[parameters] if parameters else [],
+        remappings=list(spec.remappings.items()),
         output="screen",
         on_exit=Shutdown(reason=f"{spec.name} ended"),
     )

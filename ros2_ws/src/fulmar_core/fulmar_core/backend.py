@@ -6,7 +6,7 @@ The same node runs on any backend; only the constructor argument differs.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -20,10 +20,19 @@ from fulmar_core.state import RigidBodyState
 class Sample:
     """What a backend reports at one instant."""
 
-    odometry: RigidBodyState  # measured, without a batch axis
+    odometry: RigidBodyState | None  # measured, without a batch axis; None: somebody else measures it
     imu: ImuSample | None  # None: the robot has no inertial unit
     truth: RigidBodyState | None  # None: not a simulator
     block: np.ndarray | None = None  # (2,) where the thing to push is, in the world; None: there is none [m]
+    stamp_ns: int | None = None  # when it was captured; None: just now, by the clock of who asked [ns]
+    applied: np.ndarray | None = None  # (n,) what the actuators were told; None: the very command
+
+    @property
+    def measured(self) -> RigidBodyState:
+        """The odometry of a backend that measures it, such as every simulator."""
+        if self.odometry is None:
+            raise ValueError("this backend does not measure where it is.")
+        return self.odometry
 
 
 class Backend(Protocol):
@@ -65,4 +74,26 @@ class Backend(Protocol):
 
     def close(self) -> None:
         """Bring the actuators to their safe state and let go."""
+        ...
+
+
+class Device(Backend, Protocol):
+    """A backend that is a machine: it has a state of its own to tell."""
+
+    def health(self) -> dict[str, str]:
+        """What people should know, by name: battery, bumpers, lost bytes; `warning` holds what is wrong, or nothing."""
+        ...
+
+
+@runtime_checkable
+class AirBearing(Protocol):
+    """What keeps a platform afloat: supervised apart from thrust, and never dropped by a command's absence."""
+
+    @property
+    def bearing_on(self) -> bool:
+        """Whether air flows through it."""
+        ...
+
+    def set_bearing(self, on: bool) -> str:
+        """Switch it; returns why that was refused, or nothing. From any thread."""
         ...

@@ -21,6 +21,7 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from fulmar_core.errors import ConfigError, did_you_mean
 
 T = TypeVar("T")
+MOST_BYTES, MOST_VALUES = 1_000_000, 100_000  # of a file; anything beyond is no configuration
 
 
 def load_config(cls: type[T], path: Path) -> T:
@@ -44,6 +45,8 @@ def load_config(cls: type[T], path: Path) -> T:
 
 def _compose(path: Path) -> Node:
     try:
+        if path.stat().st_size > MOST_BYTES:
+            raise ConfigError(f"{path}: {path.stat().st_size} bytes, at most {MOST_BYTES} are read.")
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror or error}).") from error
@@ -68,12 +71,16 @@ class _Builder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._built = 0
 
     def fail(self, node: Node, message: str) -> typing.NoReturn:
         raise ConfigError(f"{self.path}:{node.start_mark.line + 1}: {message}")
 
     def build(self, kind: Any, node: Node, where: str) -> Any:
         """Dispatch on the declared type of one field."""
+        self._built += 1
+        if self._built > MOST_VALUES:  # aliases let a small file stand for billions
+            self.fail(node, f"the file stands for more than {MOST_VALUES} values.")
         origin = typing.get_origin(kind)
         if dataclasses.is_dataclass(kind) and isinstance(kind, type):
             return self._dataclass(kind, node, where)

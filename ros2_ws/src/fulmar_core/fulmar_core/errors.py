@@ -41,6 +41,10 @@ class RunFailed(FulmarError):  # noqa: N818 - it is an outcome, not a mistake of
     """A run did not come to its planned end."""
 
 
+class DeviceError(FulmarError):
+    """A real device is not there, or does not answer."""
+
+
 class BagError(FulmarError):
     """A bag cannot be read, or lacks what was asked of it."""
 

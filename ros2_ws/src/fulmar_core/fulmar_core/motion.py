@@ -32,12 +32,15 @@ def actuation_of(robot: Robot, safe: Array) -> ActuationState:
 def longest_delay(robot: Robot, scenario: Scenario) -> float:
     """Until the latest command of any world acts [s]."""
     actuation = scenario.actuation
-    return robot.actuators.response.delay_s + actuation.delay_s + actuation.opening_delay_s[1]
+    response = robot.actuators.response
+    own = response.delay_s + response.opening_delay_s
+    return own + actuation.delay_s + actuation.opening_delay_s[1]
 
 
 def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:
     """Whether the centre of mass is beside the body's origin in any world."""
-    return scenario.body == "uncertain" and robot.uncertainty.center_of_mass > 0.0
+    uncertain = scenario.body == "uncertain" and robot.uncertainty.center_of_mass > 0.0
+    return uncertain or any(robot.body.center_of_mass)
 
 
 def control_step(
@@ -91,7 +94,7 @@ def move(
             state = rolling_step(state, target, actuation.gain, outside, world, robot.actuators, dt)
         return state
     if off_centre:
-        state = _moved(state, world, 1.0)
+        state = to_center(state, world)
     push: Wrench | None = None
     doing: Array = None
     for _ in range(substeps):
@@ -103,10 +106,10 @@ def move(
                 ahead, left, moment = push
                 push = ahead, left, moment - (world.com_x * left - world.com_y * ahead)
         state = free_body_step(state, push, outside, world, robot.hydrodynamics, dt)
-    return _moved(state, world, -1.0) if off_centre else state
+    return to_center(state, world, -1.0) if off_centre else state
 
 
-def _moved(state: PlanarState, world: World, sign: float) -> PlanarState:
+def to_center(state: PlanarState, world: World, sign: float = 1.0) -> PlanarState:
     """State of the centre of mass from that of the origin (+1), or back (-1)."""
     xp = array_namespace(state.x)
     c, s = xp.cos(state.yaw), xp.sin(state.yaw)

@@ -4,6 +4,7 @@
                     `memory` and gives `next_memory`
     golden.npz      observations, and what the network gave for them when it was exported
     passport.json   robot, task, rate, names, hashes of the two files, and how it was made
+    signature.json  of the passport, if somebody has signed it: `fulmar_core.bundle_signature`
 
 Knows files and hashes, not how to run a network.
 """
@@ -29,6 +30,7 @@ FORMAT = 2
 NETWORK = "policy.onnx"
 GOLDEN = "golden.npz"
 PASSPORT = "passport.json"
+SIGNATURE = "signature.json"
 MAX_BYTES = 50_000_000  # a file beyond this is no policy of ours, and is not read
 
 Action = Literal["on_off", "continuous"]
@@ -97,6 +99,7 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
         "sha256": "",
     }
     sealed = _passport_of(values, folder / PASSPORT).sealed()
+    (folder / SIGNATURE).unlink(missing_ok=True)  # it was for what was here before
     (folder / PASSPORT).write_text(json.dumps(asdict(sealed), indent=2) + "\n", encoding="utf-8")
     return sealed
 

@@ -8,6 +8,7 @@ from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.calibration import calibrated, calibration_in_use
 from fulmar_core.config import load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError
@@ -32,11 +33,14 @@ class Body:
     planar: bool  # True: only x, y and yaw move
     footprint: tuple[float, float] | None = None  # length and width of a box; None: a disc of `radius` [m]
     footprint_x: float = 0.0  # of the box's centre, ahead of the body's origin [m]
+    center_of_mass: tuple[float, float] = (0.0, 0.0)  # ahead of the body's origin and to its left [m]
 
     def __post_init__(self) -> None:
         """Refuse bodies that cannot exist."""
         if min(self.mass, self.radius, self.height, *self.inertia) <= 0.0:
             raise ValueError("mass, inertia, radius and height must be greater than 0.")
+        if self.center_of_mass[0] ** 2 + self.center_of_mass[1] ** 2 > self.radius**2:
+            raise ValueError(f"'center_of_mass' = {list(self.center_of_mass)} lies outside of the outline.")
         if 2.0 * max(self.inertia) > sum(self.inertia) * (1.0 + 1e-9):
             raise ValueError(
                 f"'inertia' = {list(self.inertia)}: no body has a moment beyond the sum of the two others."
@@ -178,16 +182,19 @@ class Robot:
         """Refuse wheels that swim."""
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
+        gains = self.actuators.response.gain
+        if gains and len(gains) != len(self.actuators.names):
+            raise ValueError(f"'gain' needs {len(self.actuators.names)} values, one for each actuator.")
 
 
 def load_robot(name: str) -> Robot:
-    """Read `configs/robots/<name>.yaml`.
+    """Read `configs/robots/<name>.yaml`, and what `fulmar_core.calibration` says instead of it.
 
     Args:
         name: A name that `fulmar list robots` shows.
 
     Returns:
-        The robot.
+        The robot, as calibrated where a calibration of it is in use.
 
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
@@ -198,4 +205,5 @@ def load_robot(name: str) -> Robot:
         raise ConfigError(
             f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
         )
-    return robot
+    calibration = calibration_in_use()
+    return robot if calibration is None or calibration.robot != name else calibrated(robot, calibration)

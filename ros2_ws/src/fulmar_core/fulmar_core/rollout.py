@@ -156,7 +156,7 @@ def _side_by_side(
     goal, command = drawn.goal, np.tile(robot.actuators.safe_command, (count, 1))
     log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, drawn.goal, control_dt)
     for step in range(episode_steps(task, control_dt)):
-        measured, block = stack_planar([planar_of(sample.odometry) for sample in samples]), _blocks(samples)
+        measured, block = stack_planar([planar_of(sample.measured) for sample in samples]), _blocks(samples)
         if block is not None:
             goal = dataclasses.replace(goal, block=block)
         goal = task.advance(goal, measured, np.asarray(step * control_dt)) if step else goal

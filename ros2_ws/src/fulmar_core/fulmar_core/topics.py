@@ -12,8 +12,11 @@ from typing import Literal
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 
-Source = Literal["plant", "controller", "operator", "every node"]
+Source = Literal["plant", "controller", "operator", "every node", "device"]
 Delivery = Literal["stream", "latched", "best_effort"]
+
+# Services, all of std_srvs/Trigger.
+ESTOP_TRIGGER, ESTOP_RESET, GIVE_BACK = "estop/trigger", "estop/reset", "teleop/give_back"
 
 # Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
 SIMULATION_START_NS = 1_000_000_000
@@ -52,6 +55,14 @@ IMU = Wire(
     "stream",
     "every plant tick",
     "specific force (+g at rest) and turn rate; no orientation",
+)
+MOCAP = Wire(
+    "mocap/pose",
+    "geometry_msgs/msg/PoseStamped",
+    "plant",
+    "best_effort",
+    "every capture, where an estimator runs",
+    "pose as motion capture reports it, Z up, stamped at capture or a constant time after",
 )
 TRUTH = Wire(
     "ground_truth/odom",
@@ -131,7 +142,7 @@ DIAGNOSTICS = Wire(
     "every node",
     "stream",
     "on change and at least 1 Hz",
-    "health of each node: `<robot>: plant`, `<robot>: controller`",
+    "health of each node: `<robot>: plant`, `<robot>: controller`, `<robot>: recorder`",
 )
 GOAL_POSE = Wire(
     "goal_pose",
@@ -182,6 +193,54 @@ BLOCK = Wire(
     "with each odometry, where there is a block",
     "place of the thing to push, stamped as the odometry",
 )
+AIR_BEARING = Wire(
+    "air_bearing/state",
+    "std_msgs/msg/Bool",
+    "plant",
+    "latched",
+    "on change and at 1 Hz, where there is an air bearing",
+    "whether air flows through the bearing; the service `air_bearing/enable` switches it",
+)
+DEVICE_STATE = Wire(
+    "emulator/actuators",
+    "sensor_msgs/msg/JointState",
+    "plant",
+    "stream",
+    "every physics step of an emulated device",
+    "what an emulated device does by itself, whoever is dead; `effort` by actuator name",
+)
+ESTOP = Wire(
+    "estop",
+    "std_msgs/msg/Bool",
+    "operator",
+    "latched",
+    "10 Hz, where there is one",
+    "true: nothing may move; so does its silence, once it was heard or where it is required",
+)
+TELEOP = Wire(
+    "teleop/command",
+    "sensor_msgs/msg/JointState",
+    "operator",
+    "stream",
+    "20 Hz while a person has the robot",
+    "a person's command, `effort` by actuator name; goes before the controller's until it is given back",
+)
+JOY = Wire(
+    "joy",
+    "sensor_msgs/msg/Joy",
+    "operator",
+    "stream",
+    "10 Hz and more, where there is a gamepad",
+    "axes and buttons of a gamepad, for teleoperation",
+)
+SWAP = Wire(
+    "controller/swap",
+    "std_msgs/msg/String",
+    "operator",
+    "stream",
+    "on demand",
+    "folder of the policy bundle to go on with; `controller/status` tells what came of it",
+)
 VELOCITY_COMMAND = Wire(
     "cmd_vel",
     "geometry_msgs/msg/TwistStamped",
@@ -190,10 +249,19 @@ VELOCITY_COMMAND = Wire(
     "control rate",
     "for robots that take speed and turn rate: `linear.x` and `angular.z`, stamped as the observation it answers",
 )
+TRANSFORMS = Wire(
+    "/tf",
+    "tf2_msgs/msg/TFMessage",
+    "device",
+    "stream",
+    "as its publishers like",
+    "frames, recorded where tf2_msgs is installed; nothing that controls needs them",
+)
 
 WIRES: tuple[Wire, ...] = (
     ODOMETRY,
     IMU,
+    MOCAP,
     TRUTH,
     ACTUATORS_STATE,
     ACTUATORS_HEALTH,
@@ -211,6 +279,13 @@ WIRES: tuple[Wire, ...] = (
     GOAL_VELOCITY,
     OBSTACLES,
     BLOCK,
+    AIR_BEARING,
+    DEVICE_STATE,
+    ESTOP,
+    TELEOP,
+    JOY,
+    SWAP,
+    TRANSFORMS,
 )
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

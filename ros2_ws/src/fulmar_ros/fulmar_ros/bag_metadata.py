@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,8 @@ from typing import Any
 import yaml
 
 METADATA_FILE = "metadata.yaml"
+# Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.
+_DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class TopicCount:
 
 @dataclass(frozen=True)
 class BagSpan:
-    """How much a bag holds, and when."""
+    """How much a bag, or one file of it, holds, and when."""
 
     messages: int
     start_ns: int
@@ -35,28 +37,25 @@ class BagSpan:
 
 
 def write_metadata(
-    directory: Path, file: str, span: BagSpan, topics: Sequence[TopicCount], custom: Mapping[str, str]
+    directory: Path, files: Mapping[str, BagSpan], topics: Sequence[TopicCount], custom: Mapping[str, str]
 ) -> None:
     """Write or replace `metadata.yaml`; a reader sees the old one or the new one, never half of one.
 
     Args:
         directory: The bag.
-        file: Name of the MCAP file in it.
-        span: Counts of all topics together.
+        files: Names of the MCAP files in it, in their order, and what each holds of all topics together.
         topics: Counts by topic.
         custom: Text by name, for `custom_data`.
 
     Raises:
         OSError: The disk refuses; what was there stays.
     """
-    start = {"nanoseconds_since_epoch": span.start_ns}
-    duration = {"nanoseconds": span.end_ns - span.start_ns}
+    whole = _together(files.values())
     information = {
         "version": 9,
         "storage_identifier": "mcap",
-        "duration": duration,
-        "starting_time": start,
-        "message_count": span.messages,
+        **_times(whole),
+        "message_count": whole.messages,
         "topics_with_message_count": [
             {
                 "topic_metadata": {
@@ -72,16 +71,34 @@ def write_metadata(
         ],
         "compression_format": "",  # of the rosbag2 kind; MCAP compresses its own chunks
         "compression_mode": "",
-        "relative_file_paths": [file],
+        "relative_file_paths": list(files),
         "files": [
-            {"path": file, "starting_time": start, "duration": duration, "message_count": span.messages}
+            {"path": name, **_times(span), "message_count": span.messages} for name, span in files.items()
         ],
         "custom_data": dict(custom),
         "ros_distro": "jazzy",
     }
     # A deep copy of its own for each place, because other YAML readers need not know aliases.
     document = {"rosbag2_bagfile_information": _without_sharing(information)}
-    replace_file(directory / METADATA_FILE, yaml.safe_dump(document, sort_keys=False, width=10**6).encode())
+    text = yaml.dump(document, Dumper=_DUMPER, sort_keys=False, width=10**6)
+    replace_file(directory / METADATA_FILE, text.encode())
+
+
+def _times(span: BagSpan) -> dict[str, dict[str, int]]:
+    return {
+        "duration": {"nanoseconds": span.end_ns - span.start_ns},
+        "starting_time": {"nanoseconds_since_epoch": span.start_ns},
+    }
+
+
+def _together(spans: Iterable[BagSpan]) -> BagSpan:
+    """One span over several; those without messages have no times."""
+    some = [span for span in spans if span.messages]
+    return BagSpan(
+        messages=sum(span.messages for span in some),
+        start_ns=min((span.start_ns for span in some), default=0),
+        end_ns=max((span.end_ns for span in some), default=0),
+    )
 
 
 def replace_file(path: Path, data: bytes) -> None:

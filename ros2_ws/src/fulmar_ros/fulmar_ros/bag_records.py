@@ -32,23 +32,29 @@ _READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
 }
 
 
-def bag_file(bag: Path) -> Path:
-    """The MCAP file of a bag.
+def bag_files(bag: Path) -> list[Path]:
+    """The MCAP files of a bag, in the order in which they were written.
 
     Args:
-        bag: Bag folder, or the file itself.
+        bag: Bag folder, or one of the files itself.
 
     Raises:
-        BagError: There is none, or more than one.
+        BagError: There is none.
     """
     if bag.is_file():
-        return bag
+        return [bag]
     if not bag.is_dir():
         raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
-    files = sorted(bag.glob("*.mcap"))
-    if len(files) != 1:
-        raise BagError(f"{bag}: {len(files)} .mcap files where a bag folder has one. Give a bag folder.")
-    return files[0]
+    files = sorted(bag.glob("*.mcap"), key=place_in_bag)
+    if not files:
+        raise BagError(f"{bag}: 0 .mcap files where a bag folder has one or more. Give a bag folder.")
+    return files
+
+
+def place_in_bag(path: Path) -> tuple[str, int]:
+    """What files of a bag are sorted by: `run_10.mcap` comes after `run_9.mcap`."""
+    stem, _, number = path.stem.rpartition("_")
+    return (stem, int(number)) if number.isdecimal() else (path.stem, 0)
 
 
 def read_records(path: Path, damage: list[str]) -> Iterator[Record]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
@@ -14,14 +15,14 @@ from mcap.writer import Writer
 from fulmar_core.errors import BagError
 from fulmar_ros.bag_file import BagFile
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
-from fulmar_ros.bag_records import bag_file, read_records
+from fulmar_ros.bag_records import bag_files, read_records
 
 
 def recover(directory: Path) -> tuple[str, ...]:
-    """Rewrite the MCAP file of a bag and its `metadata.yaml` with everything that can still be read.
+    """Rewrite the MCAP files of a bag and its `metadata.yaml` with everything that can still be read.
 
-    The new file replaces the old one in one step. Where something could not be read, the old file stays
-    beside it as `<name>.damaged`.
+    Each new file replaces the old one in one step. Where something could not be read, the old file stays
+    beside it as `<name>.damaged`; one that holds nothing at all goes.
 
     Args:
         directory: The bag.
@@ -30,27 +31,58 @@ def recover(directory: Path) -> tuple[str, ...]:
         One line for each part that could not be read; empty if the bag was whole.
 
     Raises:
-        BagError: There is no MCAP file, it is none at all, or the disk refuses the new one.
+        BagError: There is no MCAP file, none can be read at all, or the disk refuses a new one.
     """
-    path = bag_file(directory)
     damage: list[str] = []
+    copies: dict[str, _Copy] = {}
+    paths = bag_files(directory)
+    for path in paths:
+        try:
+            copies[path.name] = _rewritten(path, damage)
+        except BagError as error:  # a disk that failed while a file was begun
+            if len(paths) == 1:
+                raise
+            damage.append(str(error))
+            path.replace(path.with_name(f"{path.name}.damaged"))
+        except OSError as error:
+            raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
+    if not copies:
+        raise BagError(f"{directory}: nothing can be read. {damage[0]}")
+    custom = {name: text for copy in copies.values() for name, text in copy.custom.items()}
+    try:
+        spans = {name: copy.span() for name, copy in copies.items()}
+        write_metadata(directory, spans, _all_topics(list(copies.values())), custom)
+    except OSError as error:
+        raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
+    return tuple(damage)
+
+
+def _rewritten(path: Path, damage: list[str]) -> _Copy:
+    """Replace one file by what can be read of it."""
+    already = len(damage)
     new = path.with_name(f".{path.name}.new")
     new.unlink(missing_ok=True)
-    copy = _Copy(new)
     try:
+        copy = _Copy(new)
         for record in read_records(path, damage):
             copy.add(record)
         copy.finish()
-        if damage:
+        if len(damage) > already:
             path.with_name(f"{path.name}.damaged").unlink(missing_ok=True)
             os.link(path, path.with_name(f"{path.name}.damaged"))
         new.replace(path)
-        write_metadata(directory, path.name, copy.span(), copy.topics(), copy.custom)
-    except OSError as error:
-        raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
     finally:
         new.unlink(missing_ok=True)
-    return tuple(damage)
+    return copy
+
+
+def _all_topics(copies: list[_Copy]) -> list[TopicCount]:
+    """Topics of all files, each once, with its messages in all of them."""
+    together: dict[str, TopicCount] = {}
+    for topic in (topic for copy in copies for topic in copy.topics()):
+        before = together[topic.name].messages if topic.name in together else 0
+        together[topic.name] = replace(topic, messages=before + topic.messages)
+    return list(together.values())
 
 
 class _Copy:

@@ -1,59 +1,102 @@
-"""A bounded queue and a thread that empties it into a bag, so that receiving never waits for the disk."""
+"""A bounded queue and a thread that empties it into a bag, so that receiving never waits for the disk.
+
+When the disk is full or slow, messages wait in memory. When that is full too, further ones are dropped and counted by
+topic; what waits is written as soon as the disk takes it.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import json
+import os
 import queue
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Protocol
 
-from fulmar_ros.bag_writer import BagWriter
+from fulmar_core.errors import BagError
 
 MAX_QUEUED = 100_000  # messages that may wait for the thread
-MAX_WAITING = 64 << 20  # bytes that may wait for a disk that refuses them
+MAX_WAITING = 64 << 20  # bytes that may wait for the thread, and as many for a disk that refuses them
 EMPTY_EVERY_S = 0.05  # longer batches wake the processor less often, shorter ones lose nothing less
+SLOW_S = 1.0  # a disk that takes longer for half a second of messages is a slow one
+NICE = 10  # compression and disk give way to everything that controls
+RECORDING = "fulmar_recording"  # entry of `custom_data`: JSON of `Account`
+
+
+class Bag(Protocol):
+    """What the thread writes to: a `BagWriter` or a `BagRing`."""
+
+    @property
+    def messages(self) -> int: ...  # noqa: D102 - as BagWriter's, all of them
+    @property
+    def messages_on_disk(self) -> int: ...  # noqa: D102
+    @property
+    def size(self) -> int: ...  # noqa: D102
+    @property
+    def files(self) -> int: ...  # noqa: D102
+    @property
+    def waiting(self) -> int: ...  # noqa: D102
+    def write(self, topic: str, data: bytes, *, log_ns: int) -> None: ...  # noqa: D102
+    def attach(self, name: str, data: bytes) -> None: ...  # noqa: D102
+    def note(self, name: str, text: str) -> None: ...  # noqa: D102
+    def tick(self, now: float) -> None: ...  # noqa: D102
+    def close(self) -> None: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How a recording went."""
+class Account:
+    """What became of the messages so far."""
 
     received: int  # messages offered
-    recorded: int  # messages in the bag
-    size: int  # of the bag's MCAP file [bytes]
+    recorded: int  # messages in the bag, where a reader finds them
+    waiting: int  # bytes in memory
+    size: int  # of the bag's MCAP files [bytes]
+    files: int  # MCAP files
+    dropped: dict[str, int] = field(default_factory=dict)  # messages by topic that found no room in memory
+    unwritten: int = 0  # messages that the disk has not taken
+    slowest_write_s: float = 0.0  # longest time that the disk took for one batch [s]
+    problem: str = ""  # why the disk does not take what waits; empty if it does
+    complete: bool = False  # whether the recording came to an orderly end
 
     @property
     def lost(self) -> int:
-        """Messages that came but are not in the bag."""
-        return self.received - self.recorded
-
-
-@dataclass(frozen=True, slots=True)
-class _Message:
-    topic: str
-    data: bytes
-    log_ns: int
+        """Messages that came and are not, or not yet, in the bag."""
+        return sum(self.dropped.values()) + self.unwritten
 
 
 class BagThread:
     """Writes a bag in a thread of its own; `put` never waits."""
 
     def __init__(
-        self, bag: BagWriter, *, on_error: Callable[[str], None], max_queued: int = MAX_QUEUED
+        self,
+        bag: Bag,
+        *,
+        on_error: Callable[[str], None],
+        max_queued: int = MAX_QUEUED,
+        max_waiting: int = MAX_WAITING,
     ) -> None:
         """Start the thread.
 
         Args:
             bag: Used by this thread alone from now on.
-            on_error: Told once, in one line, when something cannot be kept.
-            max_queued: Messages that may wait.
+            on_error: Told once of each kind of trouble, in one line.
+            max_queued: Messages that may wait for the thread.
+            max_waiting: Bytes that may wait for the thread, and as many for the disk.
         """
-        self._bag, self._tell, self._max_queued = bag, on_error, max_queued
-        self._queue: queue.SimpleQueue[_Message] = queue.SimpleQueue()
-        self._received = 0
-        self._failed = self._overflowed = False
+        self._bag, self._tell = bag, on_error
+        self._max_queued, self._max_waiting = max_queued, max_waiting
+        self._queue: queue.SimpleQueue[tuple[str, bytes, int]] = queue.SimpleQueue()
+        self._files: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self._received = self._put_bytes = self._taken_bytes = 0  # each is changed by one thread alone
+        self._crowded_out: Counter[str] = Counter()  # by `put`
+        self._refused: Counter[str] = Counter()  # by the thread
+        self._told: set[str] = set()
+        self._problem, self._slowest_s = "", 0.0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bag", daemon=True)
         self._thread.start()
@@ -64,46 +107,101 @@ class BagThread:
         return self._received
 
     def put(self, topic: str, data: bytes, log_ns: int) -> None:
-        """Offer a message; arguments as in `BagWriter.write`."""
+        """Offer a message, from one thread only; arguments as of `BagWriter.write`."""
         self._received += 1
-        if self._queue.qsize() >= self._max_queued:
-            if not self._overflowed:
-                self._overflowed = True
-                self._tell(f"{self._max_queued} messages wait for the disk: further ones are dropped.")
+        if (
+            self._queue.qsize() >= self._max_queued
+            or self._put_bytes - self._taken_bytes >= self._max_waiting
+        ):
+            self._crowded_out[topic] += 1
+            self._tell_once("full", "the disk is too slow and memory is full: further messages are dropped.")
             return
-        self._queue.put(_Message(topic, data, log_ns))
+        self._put_bytes += len(data)
+        self._queue.put((topic, data, log_ns))
 
-    def stop(self) -> Outcome:
+    def attach(self, name: str, data: bytes) -> None:
+        """Carry a file along; from any thread."""
+        self._files.put((name, data))
+
+    def account(self, *, complete: bool = False) -> Account:
+        """What became of the messages so far; from any thread."""
+        recorded = self._bag.messages_on_disk
+        return Account(
+            received=self._received,
+            recorded=recorded,
+            waiting=self._put_bytes - self._taken_bytes + self._bag.waiting,
+            size=self._bag.size,
+            files=self._bag.files,
+            dropped=dict(Counter(dict(self._crowded_out)) + Counter(dict(self._refused))),
+            unwritten=self._bag.messages - recorded,
+            slowest_write_s=self._slowest_s,
+            problem=self._problem,
+            complete=complete,
+        )
+
+    def stop(self) -> Account:
         """Write what waits, close the bag, and say how it went."""
         self._stop.set()
         self._thread.join()
-        return Outcome(self._received, self._bag.messages_on_disk, self._bag.size)
+        return self.account(complete=True)
 
     def _run(self) -> None:
+        with contextlib.suppress(OSError, AttributeError):
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
         while not self._stop.wait(EMPTY_EVERY_S):
             self._empty()
+            self._note(complete=False)
             self._try(lambda: self._bag.tick(time.monotonic()))
         self._empty()
+        self._note(complete=True)
         self._try(self._bag.close)
 
     def _empty(self) -> None:
+        while not self._files.empty():
+            self._bag.attach(*self._files.get())
         for _ in range(self._queue.qsize()):
-            message = self._queue.get()
-            if self._bag.waiting < MAX_WAITING:
-                self._bag.write(message.topic, message.data, log_ns=message.log_ns)
+            topic, data, log_ns = self._queue.get()
+            self._taken_bytes += len(data)
+            if self._bag.waiting >= self._max_waiting:
+                self._refused[topic] += 1
+                continue
+            try:
+                self._bag.write(topic, data, log_ns=log_ns)
+            except (BagError, OSError) as error:  # a ring that cannot begin its bag
+                self._refused[topic] += 1
+                self._problem = str(error)
+                self._tell_once(self._problem, self._problem)
+
+    def _note(self, *, complete: bool) -> None:
+        account = self.account(complete=complete)
+        told = {"complete": complete, "received": account.received, "dropped": account.dropped}
+        self._bag.note(RECORDING, json.dumps(told))
 
     def _try(self, action: Callable[[], None]) -> None:
+        began = time.monotonic()
         try:
             action()
         except OSError as error:
-            if not self._failed:
-                self._failed = True
-                self._tell(_reason(error, self._bag))
+            self._problem = f"{_words(error)}: what comes waits in memory"
+            self._tell_once(str(error.errno), self._refusal(error))
+        if self._problem and not self._bag.waiting:  # the disk has taken everything
+            self._problem = ""
+            self._told.clear()
+        self._slowest_s = max(self._slowest_s, time.monotonic() - began)
+
+    def _tell_once(self, kind: str, text: str) -> None:
+        if kind not in self._told:
+            self._told.add(kind)
+            self._tell(text)
+
+    def _refusal(self, error: OSError) -> str:
+        account = self.account()
+        return (
+            f"{_words(error)}. {account.recorded} messages are safe, {account.unwritten} and all that follow wait. "
+            "Make room and they will be written."
+        )
 
 
-def _reason(error: OSError, bag: BagWriter) -> str:
-    what = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else error.strerror
-    return (
-        f"{bag.directory}: {what}. {bag.messages_on_disk} messages are safe, "
-        f"{bag.messages - bag.messages_on_disk} and all that follow wait. Make room and they will be written."
-    )
+def _words(error: OSError) -> str:
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return "the disk is full" if full else str(error.strerror)

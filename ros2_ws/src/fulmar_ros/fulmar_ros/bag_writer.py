@@ -1,4 +1,4 @@
-"""Writes one rosbag2 folder: an MCAP file and its `metadata.yaml`. Knows no rclpy.
+"""Writes one rosbag2 folder: MCAP files one after the other and their `metadata.yaml`. Knows no rclpy.
 
 What was flushed is readable by every rosbag2 and MCAP reader, whatever happens to the process afterwards.
 """
@@ -6,81 +6,66 @@ What was flushed is readable by every rosbag2 and MCAP reader, whatever happens 
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
-from mcap.writer import Writer
-
 from fulmar_core.errors import BagError
 from fulmar_core.topics import Delivery
-from fulmar_ros.bag_file import BagFile
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
-from fulmar_ros.bag_types import MessageType, message_type, offered_qos
+from fulmar_ros.bag_part import BagPart, Topic
+from fulmar_ros.bag_types import message_type, offered_qos
 
 RUN_RECORD = "fulmar"  # name of the MCAP metadata record and of the entry in `custom_data`
 RUN_KEY = "run"
-FLUSH_EVERY_S = 1.0
-CHUNK_BYTES = 1 << 20
-
-
-@dataclass
-class _Channel:
-    number: int
-    name: str
-    type: MessageType
-    delivery: Delivery
-    messages: int = 0
+# A bag may lack the last second at most; the disk, and a machine that is busy, get the other half of it.
+FLUSH_EVERY_S = 0.5
 
 
 class BagWriter:
     """One bag being written.
 
-    The caller drives time: `tick` flushes once a second, so at most that much is lost with the process.
+    The caller drives time: `tick` flushes twice a second, so at most a second is lost with the process.
     """
 
     def __init__(
-        self, directory: Path, *, run_info: Mapping[str, Any], attachments: Mapping[str, bytes] | None = None
+        self,
+        directory: Path,
+        *,
+        run_info: Mapping[str, Any],
+        attachments: Mapping[str, bytes] | None = None,
+        split_bytes: float = 0.0,
+        split_s: float = 0.0,
     ) -> None:
         """Create the bag; it is valid, though empty, from here on.
 
         Args:
             directory: The bag folder; absent or empty, its parents are made.
             run_info: What kind of run this is, anything that JSON can hold.
-            attachments: Files to carry along, by name.
+            attachments: Files to carry along in each MCAP file, by name.
+            split_bytes: A file of this size is followed by a new one; 0: never.
+            split_s: So is one that was begun so long ago; 0: never [s].
 
         Raises:
             BagError: There is something in the folder already, or it cannot be written.
         """
-        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-            raise BagError(f"{directory} exists already, and bags are never overwritten. Name a new folder.")
+        check_free(directory)
         self.directory = directory
-        self._run = json.dumps(run_info, sort_keys=True)
-        self._file_name = f"{directory.resolve().name}_0.mcap"
-        self._channels: dict[str, _Channel] = {}
-        self._schemas: dict[str, int] = {}
-        self._first_ns, self._last_ns = 0, 0
-        self._written = self._flushed = 0
+        self._records = {RUN_RECORD: {RUN_KEY: json.dumps(run_info, sort_keys=True)}}
+        self._attachments = dict(attachments or {})
+        self._split_bytes, self._split_s = split_bytes, split_s
+        self._topics: dict[str, Topic] = {}
+        self._notes: dict[str, str] = {}
+        self._finished: list[BagPart] = []
+        self._last_ns = self._written = self._flushed = self._begun = 0
         self._next_flush: float | None = None
+        self._split_at = float("inf")
         try:
             directory.mkdir(parents=True, exist_ok=True)
-            self._file = BagFile(directory / self._file_name)
-            self._open(attachments or {})
+            self._part = self._new_part()
             self.flush()
         except OSError as error:
             raise BagError(f"{directory}: cannot write a bag here: {error.strerror}.") from error
-
-    def _open(self, attachments: Mapping[str, bytes]) -> None:
-        self._mcap = Writer(self._file, chunk_size=CHUNK_BYTES)
-        self._mcap.start(profile=Profile.ROS2, library="fulmar")
-        self._mcap.add_metadata(RUN_RECORD, {RUN_KEY: self._run})
-        now = time.time_ns()
-        for name, data in attachments.items():
-            self._mcap.add_attachment(now, now, name, "application/octet-stream", data)
 
     @property
     def messages(self) -> int:
@@ -93,14 +78,19 @@ class BagWriter:
         return self._flushed
 
     @property
+    def files(self) -> int:
+        """MCAP files of the bag so far."""
+        return len(self._finished) + 1
+
+    @property
     def size(self) -> int:
-        """Bytes of the MCAP file on disk."""
-        return self._file.size
+        """Bytes of all MCAP files on disk."""
+        return sum(part.size for part in (*self._finished, self._part))
 
     @property
     def waiting(self) -> int:
         """Bytes that the disk has not taken yet, without the chunk in progress."""
-        return self._file.waiting
+        return self._part.waiting
 
     def add_topic(self, name: str, type_name: str, delivery: Delivery) -> None:
         """Announce a topic.
@@ -113,21 +103,8 @@ class BagWriter:
         Raises:
             BagError: Unknown type.
         """
-        kind = message_type(type_name)
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._mcap.register_schema(
-                type_name, SchemaEncoding.ROS2, kind.definition.encode()
-            )
-        number = self._mcap.register_channel(
-            name,
-            MessageEncoding.CDR,
-            self._schemas[type_name],
-            {
-                "offered_qos_profiles": yaml.safe_dump(offered_qos(delivery), sort_keys=False),
-                "topic_type_hash": kind.hash,
-            },
-        )
-        self._channels[name] = _Channel(number, name, kind, delivery)
+        self._topics[name] = Topic(name, message_type(type_name), delivery)
+        self._part.add_topic(self._topics[name])
 
     def write(self, topic: str, data: bytes, *, log_ns: int, publish_ns: int | None = None) -> None:
         """Add a message.
@@ -138,17 +115,29 @@ class BagWriter:
             log_ns: When it came, since the epoch [ns]. Earlier than the one before counts as the same time.
             publish_ns: When it was sent, if known [ns].
         """
-        channel = self._channels[topic]
-        self._first_ns = self._first_ns or log_ns
+        there = self._topics[topic]
         self._last_ns = max(log_ns, self._last_ns)
-        channel.messages += 1
+        there.messages += 1
         self._written += 1
-        self._mcap.add_message(
-            channel.number, self._last_ns, data, publish_ns or self._last_ns, channel.messages
+        self._part.add(
+            topic,
+            data,
+            log_ns=self._last_ns,
+            publish_ns=publish_ns or self._last_ns,
+            sequence=there.messages,
         )
 
+    def attach(self, name: str, data: bytes) -> None:
+        """Carry a file along that was not there at the beginning, in this MCAP file and all that follow."""
+        self._attachments[name] = data
+        self._part.attach(name, data)
+
+    def note(self, name: str, text: str) -> None:
+        """Say something about the recording in `custom_data`, with the next flush; the last text of a name stays."""
+        self._notes[name] = text
+
     def tick(self, now: float) -> None:
-        """Flush if the last flush is a second ago; call this several times a second.
+        """Flush if the last flush is half a second ago, and begin a new file where one is due; call this often.
 
         Args:
             now: Any steady clock [s].
@@ -157,10 +146,14 @@ class BagWriter:
             OSError: As `flush`.
         """
         if self._next_flush is None:
-            self._next_flush = now + FLUSH_EVERY_S
-        if now >= self._next_flush:
-            self._next_flush = now + FLUSH_EVERY_S
-            self.flush()
+            self._next_flush, self._split_at = now + FLUSH_EVERY_S, now + (self._split_s or float("inf"))
+        if now < self._next_flush:
+            return
+        self._next_flush = now + FLUSH_EVERY_S
+        self.flush()
+        if now >= self._split_at or 0 < self._split_bytes <= self._part.size:
+            self.split()
+            self._split_at = now + (self._split_s or float("inf"))
 
     def flush(self) -> None:
         """Bring every message to the disk.
@@ -168,8 +161,23 @@ class BagWriter:
         Raises:
             OSError: The disk refuses. What it took before stays readable; the rest is tried again next time.
         """
-        self._mcap.flush()
+        self._part.flush()
         self._note_flushed()
+
+    def split(self) -> None:
+        """Go on in a new file; one without messages is not left behind.
+
+        Raises:
+            OSError: As `flush`; the old file goes on.
+        """
+        if not self._part.span.messages:
+            return
+        self.flush()
+        following = self._new_part()
+        self._part.finish_if_there_is_room()
+        self._finished.append(self._part)
+        self._part = following
+        self.flush()
 
     def close(self) -> None:
         """Write the rest, the index and the final counts, and let go.
@@ -177,18 +185,33 @@ class BagWriter:
         Raises:
             OSError: The disk refuses. What it took before stays readable.
         """
-        try:
-            self._mcap.finish()
-            self._file.finish()
-            self._note_flushed()
-        finally:
-            self._file.close()
+        for name, text in self._notes.items():
+            self._part.add_record(name, {name: text})
+        self._part.finish()
+        self._note_flushed()
+
+    def _new_part(self) -> BagPart:
+        part = BagPart(self.directory / f"{self.directory.resolve().name}_{self._begun}.mcap")
+        self._begun += 1
+        part.begin(self._records, self._attachments, self._topics.values())
+        return part
 
     def _note_flushed(self) -> None:
         self._flushed = self._written
         topics = [
-            TopicCount(c.name, c.type.name, c.type.hash, offered_qos(c.delivery), c.messages)
-            for c in self._channels.values()
+            TopicCount(t.name, t.type.name, t.type.hash, offered_qos(t.delivery), t.messages)
+            for t in self._topics.values()
         ]
-        span = BagSpan(self._written, self._first_ns, self._last_ns)
-        write_metadata(self.directory, self._file_name, span, topics, {RUN_RECORD: self._run})
+        spans: dict[str, BagSpan] = {part.name: part.span for part in (*self._finished, self._part)}
+        custom = {RUN_RECORD: self._records[RUN_RECORD][RUN_KEY], **self._notes}
+        write_metadata(self.directory, spans, topics, custom)
+
+
+def check_free(directory: Path) -> None:
+    """Refuse a folder that holds something already.
+
+    Raises:
+        BagError: If it does.
+    """
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        raise BagError(f"{directory} exists already, and bags are never overwritten. Name a new folder.")

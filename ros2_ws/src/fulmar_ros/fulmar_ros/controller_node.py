@@ -11,34 +11,44 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
+from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import FulmarError
+from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
-from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
-from fulmar_core.safety.command_gate import Rejections, command_problem
+from fulmar_core.safety.area import outside
+from fulmar_core.safety.command_gate import command_problem
+from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
+from fulmar_core.safety.succession import Succession
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_wires import ControllerWires
-from fulmar_ros.convert import measurement_of, stamp_ns
-from fulmar_ros.deadline import CONTROL_PRIORITY, Deadlines, Spread, take_priority
-from fulmar_ros.goal_messages import GoalMessage, goal_of, obstacles_of
+from fulmar_ros.deadline import Deadlines, Spread
+from fulmar_ros.goal_messages import GoalMessage
+from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
 from fulmar_ros.runtime import RequestExit, settle_memory
+from fulmar_ros.standby import Standby, ready
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
-WARM_UP = 20  # the first inferences are slow; they happen before anything moves
+FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the one that was due
+PATIENCE = 0.25  # of a period, for a measurement that is late
+COPY_AFTER = 0.2  # of a period; the copies of a command are over before the next one
+PATIENCE_AT_FIRST = 0.9  # the same while nobody knows yet when measurements come
+LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 SAFE_REPEATS = 5
 STATUS_PERIOD_S = 0.4  # at least 2 Hz
 
@@ -47,7 +57,12 @@ class ControllerNode(LifecycleNode):
     """Turns odometry and a goal into commands, by the clock or in lock step with a simulator."""
 
     def __init__(
-        self, make_controller: MakeController, request_exit: RequestExit, *, cli_args: list[str] | None = None
+        self,
+        make_controller: MakeController,
+        request_exit: RequestExit,
+        *,
+        cli_args: list[str] | None = None,
+        learned: bool = False,
     ) -> None:
         """Read the parameters and, unless told otherwise, start.
 
@@ -55,6 +70,7 @@ class ControllerNode(LifecycleNode):
             make_controller: Loads the controller; called at configuration.
             request_exit: Ends the process.
             cli_args: ROS arguments of this node alone, where it shares a process.
+            learned: Whether `make_controller` loads a policy, which another may follow while the node runs.
 
         Raises:
             FulmarError: If a parameter, a configuration file or a policy is wrong.
@@ -63,26 +79,31 @@ class ControllerNode(LifecycleNode):
         self.settings = read_parameters(self, ControllerSettings)
         self.robot = load_robot(self.settings.robot)
         self.task = load_task(self.settings.task)
-        self._make_controller, self._request_exit = make_controller, request_exit
+        self._make_controller, self._request_exit, self._learned = make_controller, request_exit, learned
         self._lock = threading.Lock()
         self._stop = threading.Event()
+        self._arrived = threading.Event()  # a measurement, since a beat waits for one
         self._thread: threading.Thread | None = None
         hz = self.settings.control_rate(self.robot)
         timeout_s = self.settings.input_timeout_s or default_timeout(1.0 / hz) / min(self.settings.rate, 1.0)
-        self._flags = Flags(input_timeout_ns=round(timeout_s * 1e9), geofence=self.robot.limits.geofence)
+        self._flags = Flags(
+            input_timeout_ns=round(timeout_s * 1e9),
+            geofence=self.robot.limits.geofence,
+            max_run_time_s=self.settings.max_run_time_s,
+        )
+        self._estop = EstopWatch(required=self.settings.estop)
         noisy = self.robot.sensors.odometry.position.std > 0.0 and not self.settings.lockstep
         self._input_gate = InputGate(self.robot.limits, frozen_after=FROZEN_AFTER if noisy else 0)
-        self._rejections = Rejections()
+        self._swap = ""  # what came of the last request for another policy
+        self._loader: threading.Thread | None = None
+        self._acted = 0  # control steps
         self._newest: Measurement | None = None
         self.mission = Mission(self.robot, self.task, streamed=self.settings.goals_streamed)
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
-        # After so long without a command the actuators are in their safe state, and memories are of no use.
-        pause_s = (
-            1.75 / hz if self.settings.lockstep else default_timeout(1.0 / hz) * max(self.settings.rate, 1.0)
-        )
-        self._pause_ns = round(1e9 * pause_s)
+        self._period_s = 1.0 / (hz * self.settings.rate)
+        self._pause_ns = self.settings.pause_ns(self.robot)
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
         self._inference_ms = Spread()
@@ -97,15 +118,12 @@ class ControllerNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load, validate and warm up the controller; refuse it if anything is wrong."""
         try:
-            self.controller = self._make_controller(self.robot, self.task, self.settings)
+            self._succession = self._line_up()
         except (FulmarError, ImportError) as error:
             self._refusal = str(error)
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
-        for _ in range(WARM_UP):
-            self.controller.act(np.zeros(len(self.controller.observation_names)))
-        self.controller.reset()
-        self._informer, self._seen_ns = Informer(self.robot, self.controller), 0
+        self._seen_ns = 0
         self.wires = ControllerWires(
             self,
             self.robot,
@@ -115,15 +133,46 @@ class ControllerNode(LifecycleNode):
             on_goal=self._on_goal,
             on_obstacles=self._on_obstacles,
             on_block=self._on_block,
+            on_estop=self._on_estop,
+            on_swap=self._on_swap,
             lockstep=self.settings.lockstep,
         )
-        metadata = self.controller.metadata()
-        self._sha256 = str(metadata.get("sha256", ""))
-        self.wires.publish_metadata(metadata)
+        self.wires.publish_metadata(self._succession.current.metadata)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(STATUS_PERIOD_S / 4, self._tell_idle_status)
         self._set(configured=True, latched_fault="")
         return DONE
+
+    @property
+    def controller(self) -> Controller:
+        """Whose turn it is."""
+        return self._succession.current.controller
+
+    def _line_up(self) -> Succession[Standby]:
+        """The controller that was asked for, or, where it is refused and one is named, its fallback.
+
+        Raises:
+            FulmarError: Both are refused, or the one is and no other is named.
+            ImportError: A library is missing, and no fallback is named.
+        """
+        fallback = self._fallback()
+        try:
+            controller = self._make_controller(self.robot, self.task, self.settings)
+        except (FulmarError, ImportError) as error:
+            if fallback is None:
+                raise
+            self.get_logger().error(f"falling back to {self.settings.fallback}: {error}")
+            return Succession(None, fallback, refused=str(error))
+        return Succession(ready(controller, self.robot), fallback)
+
+    def _fallback(self) -> Standby | None:
+        name = self.settings.fallback
+        if not name:
+            return None
+        law = None if name == "classical" else name
+        hz = self.settings.control_rate(self.robot)
+        controller = load_classical(self.robot, self.task, control_hz=hz, law=law)
+        return ready(controller, self.robot, said={"fallback": True})
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to answer, from fresh measurements on."""
@@ -131,8 +180,9 @@ class ControllerNode(LifecycleNode):
             self._newest = None
             self._input_gate.forget()
             self._flags = dataclasses.replace(
-                self._flags, activated=True, last_input_ns=None, input_problem=""
+                self._flags, activated=True, last_input_ns=None, input_problem="", active_s=0.0
             )
+            self._acted = 0
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
         settle_memory()
@@ -195,7 +245,68 @@ class ControllerNode(LifecycleNode):
 
     def _decide(self) -> Decision:
         with self._lock:
-            return arbitrate(self._flags, time.monotonic_ns())
+            return self._arbitrate()
+
+    def _arbitrate(self) -> Decision:
+        """The decision for now; call with the lock held.
+
+        An e-stop takes the goal away: after it, nothing moves by itself.
+        """
+        now = time.monotonic_ns()
+        stopped = self._estop.reason(now)
+        if stopped and self._estop.heard:
+            self.mission.drop()
+            self._follow_mission()
+        self._flags = dataclasses.replace(self._flags, estop=stopped)
+        return arbitrate(self._flags, now)
+
+    def _on_estop(self, message: Bool) -> None:
+        with self._lock:
+            self._estop.hear(bool(message.data), time.monotonic_ns())
+        self._tell_status(self._decide())
+
+    def _on_swap(self, message: String) -> None:
+        """Load another policy beside the one that runs; the one that runs is not disturbed."""
+        folder = message.data
+        if not self._learned:
+            self._refuse_swap(folder, "this controller runs no policy")
+        elif not folder or len(folder) > LONGEST_PATH:
+            self._refuse_swap(folder, f"a folder has 1 to {LONGEST_PATH} characters, found {len(folder)}")
+        elif self._loader is not None and self._loader.is_alive():
+            self._refuse_swap(folder, "another policy is being loaded")
+        else:
+            self._swap = f"loading {folder}"
+            self._loader = threading.Thread(target=self._load, args=(folder,), name="loader", daemon=True)
+            self._loader.start()
+
+    def _load(self, folder: str) -> None:
+        try:
+            settings = dataclasses.replace(self.settings, policy=folder)
+            controller = self._make_controller(self.robot, self.task, settings)
+            if controller.observation_names != self.controller.observation_names:
+                raise ConfigError("it sees something else than the controller that runs")
+            candidate = ready(controller, self.robot)
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with it, the one that runs goes on
+            known = isinstance(error, FulmarError)
+            self._refuse_swap(folder, str(error) if known else f"{type(error).__name__}: {error}")
+            return
+        self._swap = f"ready {folder}"
+        self._succession.propose(candidate)
+
+    def _refuse_swap(self, folder: str, reason: str) -> None:
+        self._swap = f"refused {folder[:LONGEST_PATH]}: {reason}"
+        self.get_logger().warning(f"policy not changed: {reason}")
+
+    def _take_turns(self) -> None:
+        """Between two control steps: let a new policy take over, and say so."""
+        if self._succession.turn():
+            self._swap = self._swap.replace("ready", "done", 1)
+            self._announce()
+
+    def _announce(self) -> None:
+        """Say who controls now; what is known of the actuators begins anew."""
+        self._seen_ns = 0
+        self.wires.publish_metadata(self._succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
         goal, problem = goal_of(message)
@@ -203,6 +314,9 @@ class ControllerNode(LifecycleNode):
             self.get_logger().warning(f"goal refused: {problem}")
             return
         with self._lock:
+            if self._estop.heard and self._estop.reason(time.monotonic_ns()):
+                self.get_logger().warning("goal refused: the e-stop holds. Reset it first.")
+                return
             if self.mission.give(goal, stamp_ns(message.header.stamp)):
                 self.controller.reset()
             self._follow_mission()
@@ -269,15 +383,17 @@ class ControllerNode(LifecycleNode):
                 changes["lacking"] = self.mission.lacking
                 changes["has_goal"] = not changes["lacking"]
                 changes["goal_distance"] = self.mission.distance(measurement.state)
+                x, y = (float(value) for value in measurement.state.position_in_world[:2])
+                changes["outside"] = outside(x, y, self.settings.area)
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
+        self._arrived.set()
         if self.settings.lockstep:
             self._control(measurement)
 
     def _follow(self, measurement: Measurement, now_ns: int) -> None:
         """Let the beat follow the arrivals, in real time."""
         if self._newest is None:
-            # The executor's thread, which this is, shares the interpreter with the control loop.
-            take_priority(CONTROL_PRIORITY)
+            take_priority_with_helpers(CONTROL_PRIORITY)
         anchor = self._phase.anchor_ns(measurement.stamp_ns, now_ns)
         if anchor is not None:
             self._deadlines.align(anchor)
@@ -285,13 +401,29 @@ class ControllerNode(LifecycleNode):
     def _run(self) -> None:
         take_priority(CONTROL_PRIORITY)
         deadlines = self._deadlines
+        limit = self.settings.overruns_to_stop
         while deadlines.wait(self._stop):
+            if limit and deadlines.late_in_a_row >= limit:
+                self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
+            self._wait_for_what_is_due()
+            self.wires.forget_command()
             self._control(self._newest)
+            for _ in range(self.settings.copies - 1):
+                if not self._stop.wait(COPY_AFTER * self._period_s):
+                    self.wires.repeat_command()
+
+    def _wait_for_what_is_due(self) -> None:
+        """Wait a moment for the measurement that comes with this beat: what is acted on is as young as it can be."""
+        self._arrived.clear()
+        last_ns = self._flags.last_input_ns
+        if last_ns is not None and time.monotonic_ns() - last_ns > FRESH_NS:
+            self._arrived.wait((PATIENCE if self._phase.known else PATIENCE_AT_FIRST) * self._period_s)
 
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
+        self._take_turns()
         with self._lock:
-            decision = arbitrate(self._flags, time.monotonic_ns())
+            decision = self._arbitrate()
             observation = self._observe(measurement) if decision.may_act and measurement else None
         stamp = measurement.stamp_ns if measurement else 0
         if measurement is not None and not self._watch_actuators(measurement):
@@ -303,6 +435,9 @@ class ControllerNode(LifecycleNode):
             self.wires.publish_command(command, stamp)
         self._answered_ns, self._answer = stamp, command
         self._steps += 1
+        if observation is not None:
+            self._acted += 1
+            self._set(active_s=self._acted * self._control_ns / 1e9)
         self._tell_status(decision)
 
     def _watch_actuators(self, measurement: Measurement) -> bool:
@@ -310,17 +445,16 @@ class ControllerNode(LifecycleNode):
         passed_ns = measurement.stamp_ns - self._seen_ns
         if passed_ns == 0:  # by the clock, one measurement may serve twice
             return True
+        informer = self._succession.current.informer
         if not 0 < passed_ns <= self._pause_ns:
-            self._informer.reset()
+            informer.reset()
         self._seen_ns = measurement.stamp_ns
         wanted = self.wires.health_wanted
-        if not (wanted or self._informer.listens):
+        if not (wanted or informer.listens):
             self._seen_ns = 0  # whoever comes to listen later begins anew
             return True
         try:
-            health = self._informer.see(
-                planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted
-            )
+            health = informer.see(planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted)
         except Exception as error:  # noqa: BLE001 - as in `_act`
             self._give_up(f"the controller raised {type(error).__name__}: {error}", measurement.stamp_ns)
             return False
@@ -349,17 +483,23 @@ class ControllerNode(LifecycleNode):
         self._inference_ms.add((time.perf_counter_ns() - began) / 1e6)
         self.wires.publish_command(command, stamp)
         self.wires.publish_reasoning(observation, action, stamp)
-        fault = self._rejections.note(problem)
+        before = self._succession.current
+        fault = self._succession.judge(problem)
         if fault:
             self._set(latched_fault=fault)
+        elif self._succession.current is not before:
+            self._announce()
         return command
 
     def _give_up(self, reason: str, stamp: int) -> np.ndarray:
-        """Latch a fault, command what is safe, and end the process."""
-        self._set(latched_fault=reason)
+        """Command what is safe; let the fallback go on, or, where there is none, latch a fault and end the process."""
         self.get_logger().error(reason)
         safe = self.robot.actuators.safe_command
         self.wires.publish_command(safe, stamp)
+        if self._succession.fall_back(reason):
+            self._announce()
+            return safe
+        self._set(latched_fault=reason)
         self._request_exit(FAILED)
         return safe
 
@@ -374,18 +514,27 @@ class ControllerNode(LifecycleNode):
             decision.reason.split(" (")[0][:24],
             not self.settings.goals_streamed and self.mission.goal_stamp_ns,
             self.mission.obstacles_stamp_ns,
-            self._rejections.total,
+            self._succession.rejections,
+            self._succession.current.sha256,
+            self._succession.fell_back,
+            self._swap,
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < STATUS_PERIOD_S:
             return
         self._said, self._said_at = changed, now
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
+        fell_back = self._succession.fell_back
+        level = "warn" if level == "ok" and fell_back else level
         age_ms = (time.monotonic_ns() - self._flags.last_input_ns) / 1e6 if self._flags.last_input_ns else 0.0
         values = {
             "mode": decision.mode.value,
             "reason": decision.reason,
-            "sha256": self._sha256,
+            "sha256": self._succession.current.sha256,
+            "controller": self.controller.name,
+            "fell_back": fell_back,
+            "swap": self._swap,
+            "epoch": str(self._input_gate.epoch),
             "goal_stamp_ns": str(self.mission.goal_stamp_ns),
             "obstacles_stamp_ns": str(self.mission.obstacles_stamp_ns),
             "goals_done": str(self.mission.done),
@@ -393,7 +542,7 @@ class ControllerNode(LifecycleNode):
             "observation_age_ms": f"{age_ms:.1f}",
             "control_rate_hz": f"{self._deadlines.rate_hz:.4f}",
             "overruns": str(self._deadlines.overruns),
-            "rejections": str(self._rejections.total),
+            "rejections": str(self._succession.rejections),
             **self._inference_ms.percentiles("inference_ms"),
             **self._deadlines.period_error_ms.percentiles("period_error_ms"),
         }

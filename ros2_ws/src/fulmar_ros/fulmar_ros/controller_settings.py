@@ -6,6 +6,10 @@ import math
 from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
+from fulmar_core.safety.area import NO_AREA, check_area
+from fulmar_core.safety.watchdog import default_timeout
+
+MOST_COPIES = 3
 
 
 @dataclass(frozen=True)
@@ -23,16 +27,35 @@ class ControllerSettings:
     goals_streamed: bool = (
         False  # a goal node sends the goal with each odometry; in lock step it is waited for
     )
+    fallback: str = ""  # classical controller that takes over when a policy is refused, or its commands are
+    trusted_keys: str = ""  # file or folder of public keys: no bundle runs that none of them has signed
+    estop: bool = False  # nothing moves before an e-stop is heard
+    max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
+    area: tuple[float, ...] = NO_AREA  # x_min, x_max, y_min, y_max that the robot must not leave [m]
+    overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
+    copies: int = 1  # of each command, within its period; in real time only
     autostart: bool = True
 
     def __post_init__(self) -> None:
         """Refuse values without meaning."""
-        for name in ("control_hz", "rate", "input_timeout_s"):
+        for name in ("control_hz", "rate", "input_timeout_s", "max_run_time_s"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} = {getattr(self, name)} must be a finite number, at least 0.")
         if self.rate == 0.0:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
+        if self.overruns_to_stop < 0:
+            raise ValueError(f"overruns_to_stop = {self.overruns_to_stop} must not be negative.")
+        if not 1 <= self.copies <= MOST_COPIES:
+            raise ValueError(f"copies = {self.copies} must be from 1 to {MOST_COPIES}.")
+        if self.area != NO_AREA:
+            check_area(self.area)
 
     def control_rate(self, robot: Robot) -> float:
         """Command rate in the robot's own time [Hz]."""
         return self.control_hz or robot.timing.control_hz
+
+    def pause_ns(self, robot: Robot) -> int:
+        """After so long without a command the actuators are in their safe state, and memories are of no use [ns]."""
+        hz = self.control_rate(robot)
+        pause_s = 1.75 / hz if self.lockstep else default_timeout(1.0 / hz) * max(self.rate, 1.0)
+        return round(1e9 * pause_s)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -13,26 +11,27 @@ from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
-from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_HEALTH,
     BLOCK,
     DIAGNOSTICS,
+    ESTOP,
     GOAL_WIRES,
     METADATA,
     OBSERVATION,
     OBSTACLES,
     ODOMETRY,
     STATUS,
+    SWAP,
     VELOCITY_COMMAND,
     command_wire,
 )
@@ -42,11 +41,6 @@ from fulmar_ros.health import Health
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 FLUSH = Duration(seconds=0.3)
-
-
-def sees_obstacles(task: Task) -> bool:
-    """Whether a controller of this task must be told what stands about."""
-    return isinstance(task, GoToPositionWithObstacles)
 
 
 class ControllerWires:
@@ -63,6 +57,8 @@ class ControllerWires:
         on_goal: Callable[[GoalMessage], None],
         on_obstacles: Callable[[MarkerArray], None],
         on_block: Callable[[PoseStamped], None],
+        on_estop: Callable[[Bool], None],
+        on_swap: Callable[[String], None],
         lockstep: bool,
     ) -> None:
         """Create every endpoint.
@@ -76,6 +72,8 @@ class ControllerWires:
             on_goal: Told every goal.
             on_obstacles: Told all obstacles whenever they change.
             on_block: Told where the block is.
+            on_estop: Told whether the e-stop is pressed.
+            on_swap: Told which policy shall go on.
             lockstep: Ask for lost odometry again: the plant waits for its answer.
         """
         wire = command_wire(robot)
@@ -104,6 +102,7 @@ class ControllerWires:
             *([self._health] if self._health else []),
         )
         self._write_command = self._command_writer()
+        self._newest: TwistStamped | JointState | None = None
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_health = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(controller.observation_names, "position")
@@ -112,6 +111,8 @@ class ControllerWires:
         self._subscriptions = [
             node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
             node.create_subscription(TYPES[goal.name], goal.name, on_goal, subscriber_qos(goal)),
+            node.create_subscription(Bool, ESTOP.name, on_estop, subscriber_qos(ESTOP)),
+            node.create_subscription(String, SWAP.name, on_swap, subscriber_qos(SWAP, reliable=True)),
         ]
         if sees_obstacles(task):
             self._subscriptions.append(
@@ -133,7 +134,17 @@ class ControllerWires:
 
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""
-        self._command.publish(self._write_command.write(command, stamp))
+        self._newest = self._write_command.write(command, stamp)
+        self._command.publish(self._newest)
+
+    def repeat_command(self) -> None:
+        """Publish the newest command once more, unless there is none since `forget_command`."""
+        if self._newest is not None:
+            self._command.publish(self._newest)
+
+    def forget_command(self) -> None:
+        """Have nothing to repeat."""
+        self._newest = None
 
     def publish_safe(self, stamp: int) -> None:
         """Publish the safe command; with a message of its own, so that any thread may."""
@@ -167,6 +178,6 @@ class ControllerWires:
         assert self._health is not None
         self._health.publish(self._write_health.write(effectiveness, stamp))
 
-    def publish_metadata(self, metadata: dict[str, Any]) -> None:
-        """Say who controls."""
-        self._metadata.publish(String(data=json.dumps(metadata, sort_keys=True)))
+    def publish_metadata(self, text: str) -> None:
+        """Say who controls: a JSON object."""
+        self._metadata.publish(String(data=text))

@@ -1,4 +1,4 @@
-"""Between the core's types and ROS messages; the only place that knows both.
+"""From the core's types to ROS messages; `message_reader` goes the other way.
 
 Messages are filled in place by writers that keep one message each: building an Odometry anew costs more than
 everything else a control step does.
@@ -6,32 +6,29 @@ everything else a control step does.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
 from fulmar_core.robot import Robot
-from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
+from fulmar_ros.message_reader import NS, turned
 
-NS = 1_000_000_000
+LATEST_NS = 2**31 * NS  # seconds of a message have 32 bits
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
 
 
 def stamp_of(time_ns: int) -> Time:
-    """ROS time of nanoseconds since the epoch."""
+    """ROS time of nanoseconds since the epoch; the nearest that a message can hold, since senders may err."""
+    time_ns = min(max(time_ns, -LATEST_NS), LATEST_NS - 1)
     return Time(sec=time_ns // NS, nanosec=time_ns % NS)
-
-
-def stamp_ns(stamp: Time) -> int:
-    """Nanoseconds since the epoch of a ROS time."""
-    return stamp.sec * NS + stamp.nanosec
 
 
 class OdometryWriter:
@@ -70,40 +67,36 @@ class OdometryWriter:
         q = pose.orientation
         x, y, z, w = state.quat_xyzw.tolist()
         q.x, q.y, q.z, q.w = x, y, z, w
-        velocity = _turned((x, y, z, -w), state.velocity_in_world.tolist())
+        velocity = turned((x, y, z, -w), state.velocity_in_world.tolist())
         twist.linear.x, twist.linear.y, twist.linear.z = velocity
         twist.angular.x, twist.angular.y, twist.angular.z = state.angular_velocity_in_body.tolist()
         return message
 
 
-def _turned(quat_xyzw: Sequence[float], vector: Sequence[float]) -> tuple[float, float, float]:
-    """`rotation.rotate` of one vector in plain numbers, to the last bit: arrays of three cost five times it."""
-    x, y, z, w = quat_xyzw
-    a, b, c = vector
-    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
+class PoseWriter:
+    """States as poses of a motion capture."""
+
+    def __init__(self) -> None:
+        """Fill in what never changes."""
+        self._message = PoseStamped()
+        self._message.header.frame_id = "odom"
+
+    def write(self, state: RigidBodyState, time_ns: int) -> PoseStamped:
+        """Fill the message; it is overwritten by the next call."""
+        message = self._message
+        message.header.stamp = stamp_of(time_ns)
+        p, q = message.pose.position, message.pose.orientation
+        p.x, p.y, p.z = state.position_in_world.tolist()
+        q.x, q.y, q.z, q.w = state.quat_xyzw.tolist()
+        return message
 
 
 def _diagonal(stds: Sequence[float]) -> np.ndarray:
     return np.diag(np.square(np.asarray(stds, dtype=float))).ravel()
 
 
-def measurement_of(message: Odometry) -> Measurement:
-    """Read an odometry message; nothing is checked here."""
-    p, q = message.pose.pose.position, message.pose.pose.orientation
-    v, w = message.twist.twist.linear, message.twist.twist.angular
-    quat = (q.x, q.y, q.z, q.w)
-    state = RigidBodyState(
-        np.array([p.x, p.y, p.z]),
-        np.array(quat),
-        np.array(_turned(quat, (v.x, v.y, v.z))),
-        np.array([w.x, w.y, w.z]),
-    )
-    return Measurement(stamp_ns(message.header.stamp), message.header.frame_id, message.child_frame_id, state)
-
-
 class ImuWriter:
-    """Inertial readings per REP-145, without an orientation."""
+    """Inertial readings per REP-145, without an orientation; a specific force of NaN is one that nobody measures."""
 
     def __init__(self, robot: Robot) -> None:
         """Fill in what never changes."""
@@ -119,7 +112,10 @@ class ImuWriter:
         message = self._message
         message.header.stamp = stamp_of(time_ns)
         a, w = message.linear_acceleration, message.angular_velocity
-        a.x, a.y, a.z = sample.specific_force.tolist()
+        a.x, a.y, a.z = force = sample.specific_force.tolist()
+        if math.isnan(force[0]):
+            a.x = a.y = a.z = 0.0
+            message.linear_acceleration_covariance[0] = UNKNOWN
         w.x, w.y, w.z = sample.angular_velocity.tolist()
         return message
 

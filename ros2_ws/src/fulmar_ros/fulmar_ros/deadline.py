@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
@@ -14,9 +13,6 @@ KEPT = 20_000  # newest samples that percentiles are taken over
 NS = 1_000_000_000
 LONG_NS = NS // 2
 EARLY_NS = 300_000  # stay awake for the last of the wait; longer would keep callbacks from the interpreter
-# Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
-# other, and a controller that spins for ever must not keep the watchdog from closing the valves.
-CONTROL_PRIORITY, PLANT_PRIORITY = 10, 20
 
 
 class Spread:
@@ -30,33 +26,21 @@ class Spread:
         """Note one sample."""
         self._samples.append(value)
 
+    def values(self) -> np.ndarray:
+        """The newest samples, in their order."""
+        return np.fromiter(self._samples, dtype=float)
+
     def percentiles(self, name: str) -> dict[str, str]:
         """`<name>_p50`, `_p99` and `_max` as text for diagnostics; empty texts before the first sample."""
         if not self._samples:
             return {f"{name}_{key}": "" for key in ("p50", "p99", "max")}
-        values = np.fromiter(self._samples, dtype=float)
+        values = self.values()
         p50, p99 = np.percentile(values, (50, 99))
         return {
             f"{name}_p50": f"{p50:.4f}",
             f"{name}_p99": f"{p99:.4f}",
             f"{name}_max": f"{values.max():.4f}",
         }
-
-
-def take_priority(priority: int) -> bool:
-    """Put the calling thread before every ordinary one (SCHED_FIFO), where this process may.
-
-    Args:
-        priority: Among such threads, 1 to 99; the higher interrupts the lower.
-
-    Returns:
-        Whether it could; without the right to it the thread keeps its place and is late when others are busy.
-    """
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (PermissionError, AttributeError):
-        return False
-    return True
 
 
 class Deadlines:
@@ -71,6 +55,7 @@ class Deadlines:
         self._anchor_ns: int | None = None
         self.beats = 0
         self.overruns = 0
+        self.late_in_a_row = 0  # beats, each of which missed its deadline by a period or more
         self.period_error_ms = Spread()
 
     def align(self, anchor_ns: int) -> None:
@@ -113,14 +98,16 @@ class Deadlines:
         self._last_ns = now
         self.beats += 1
         self._next_ns += self._period_ns
+        self.late_in_a_row = self.late_in_a_row + 1 if self._next_ns <= now else 0
         while self._next_ns <= now:
             self._next_ns += self._period_ns
             self.overruns += 1
         if self._anchor_ns is not None:
             self._next_ns = now + self._period_ns - (now - self._anchor_ns) % self._period_ns
-            # The step to the new beat is no error of the period; the rate counts from here.
+            # The step to the new beat is no error of the period; rate and errors count from here.
             self._anchor_ns = self._last_ns = self._first_ns = None
-            self.beats = 0
+            self.beats = self.overruns = 0
+            self.period_error_ms = Spread()
         return True
 
     @property

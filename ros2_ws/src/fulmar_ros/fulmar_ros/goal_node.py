@@ -25,9 +25,9 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, ODOMETRY
-from fulmar_ros.convert import measurement_of
 from fulmar_ros.goal_messages import TYPES, goal_message
 from fulmar_ros.health import Health
+from fulmar_ros.message_reader import measurement_of
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node

@@ -14,6 +14,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.simulated_time import SimulatedTime
+from fulmar_ros.wall_time import WallTime
 
 RESEND_S = 0.5
 OnStep = Callable[
@@ -29,7 +30,7 @@ class LockstepLoop:
         backend: Backend,
         wires: PlantWires,
         guard: ActuatorGuard,
-        clock: SimulatedTime,
+        clock: SimulatedTime | WallTime,
         *,
         control_hz: float,
         answer_timeout_s: float,
@@ -97,6 +98,6 @@ class LockstepLoop:
                 # The first messages can get lost while endpoints still find each other.
                 self._wires.publish_sample(sample, stamp, resend=True)
             # The very command that answered: how long its answer or this thread took does not matter here.
-            command = self._guard.command
+            command = self._guard.answer(time.monotonic_ns())
         self._wires.publish_applied(command, stamp)
         return command

@@ -12,10 +12,9 @@ from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.schedule import Schedule
 from fulmar_core.state import RigidBodyState
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.push_block import PushBlock
-from fulmar_ros.controller_wires import sees_obstacles
 
 BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
 
@@ -76,6 +75,12 @@ class Mission:
             return False
         self._goal, self._since_ns = goal, None
         return True
+
+    def drop(self) -> None:
+        """Forget the goal, as after an emergency stop: what moves then is asked for anew."""
+        self._goal, self._since_ns, self.goal_stamp_ns = None, None, 0
+        if self._schedule is not None:
+            self._schedule = Schedule()
 
     def turn_to(self, stamp_ns: int) -> None:
         """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""

@@ -1,13 +1,15 @@
-"""When measurements really come, so that a controller's beat can follow them closely."""
+"""When measurements really come, so that a controller's beat can be there just before them."""
 
 from __future__ import annotations
 
 LISTEN = 25  # measurements; the least delayed of them tells the phase
-MARGIN_NS = 3_000_000  # what an ordinary measurement may be later than the least delayed one
+EARLY_NS = (
+    1_000_000  # a beat comes so long before the least delayed measurement, and waits for the one that is due
+)
 
 
 class ArrivalPhase:
-    """Finds the instant just after measurements usually arrive.
+    """Finds the instant just before measurements arrive.
 
     Single arrivals are late by the scheduler's whim, most of all the first ones; stamps are not.
     """
@@ -17,6 +19,11 @@ class ArrivalPhase:
         self._rate = rate
         self._heard = 0
         self._least_ns: float | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether enough measurements have come."""
+        return self._heard >= LISTEN
 
     def anchor_ns(self, stamp_ns: int, arrival_ns: int) -> int | None:
         """Note one arrival.
@@ -35,4 +42,4 @@ class ArrivalPhase:
         self._heard += 1
         if self._heard < LISTEN:
             return None
-        return round(stamp_ns / self._rate + self._least_ns) + MARGIN_NS
+        return round(stamp_ns / self._rate + self._least_ns - EARLY_NS / max(1.0, self._rate))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode
@@ -15,6 +16,7 @@ from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.realtime_loop import RealtimeLoop
 from fulmar_ros.simulated_time import SimulatedTime
+from fulmar_ros.wall_time import WallTime
 
 LOOK_S = 0.1  # how soon a change is noticed
 AT_LEAST_S = 1.0  # how often it is said without a change
@@ -25,8 +27,9 @@ class PlantHealth:
     """Looks at a plant's loop from outside its thread, and publishes what it finds.
 
     Attributes:
-        mode: inactive, waiting, running, finished or fault.
+        mode: inactive, waiting, running, stopping, finished or fault.
         reason: Why it is in fault, or could not be configured.
+        more: What a device has to tell by itself; see `Device.health`.
     """
 
     def __init__(self, robot: str) -> None:
@@ -35,6 +38,7 @@ class PlantHealth:
         self._robot = robot
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
+        self.more: Callable[[], dict[str, str]] = dict
 
     def open(self, node: LifecycleNode) -> None:
         """Begin to publish."""
@@ -51,7 +55,7 @@ class PlantHealth:
         self,
         guard: ActuatorGuard,
         wires: PlantWires,
-        clock: SimulatedTime,
+        clock: SimulatedTime | WallTime,
         lockstep: LockstepLoop,
         realtime: RealtimeLoop | None,
     ) -> None:
@@ -62,12 +66,16 @@ class PlantHealth:
     def tell(self) -> None:
         """Publish when something changed, and now and then."""
         level, message, key = self._verdict()
-        changed = (self.mode, self.reason, key, self._guard.watchdog.trips, self._guard.rejected)
+        more = self.more()
+        warning = more.get("warning", "")
+        if warning and level == "ok":
+            level, message = "warn", warning
+        changed = (self.mode, self.reason, key, warning, self._guard.watchdog.trips, self._guard.rejected)
         now = time.monotonic()
         if changed == self._said and now - self._said_at < AT_LEAST_S:
             return
         self._said, self._said_at = changed, now
-        self._health.publish(level, message, self._values())
+        self._health.publish(level, message, self._values() | more)
 
     def _verdict(self) -> tuple[str, str, str]:
         """Level, message, and what of the message counts as a change."""
@@ -89,10 +97,22 @@ class PlantHealth:
                     f"no command for {silent_ns / 1e6:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state",
                     "tripped",
                 )
+        stopped = self._estop()
+        if stopped:
+            return stopped
+        if self._guard.person:
+            return "warn", "a person has the actuators", "person"
         if self._guard.last_rejection:
             count = self._guard.rejected
             return "warn", f"{count} commands refused, the last: {self._guard.last_rejection}", "refused"
         return "ok", self.mode, ""
+
+    def _estop(self) -> tuple[str, str, str] | None:
+        """The verdict while the e-stop holds: before it ever allowed anything it is a state, after that an event."""
+        with self._wires.lock:
+            reason = self._guard.estop.reason(time.monotonic_ns())
+            level = "error" if self._guard.estop.was_released and self.mode == "running" else "warn"
+        return (level, f"{reason}: actuators in their safe state", reason[:16]) if reason else None
 
     def _values(self) -> dict[str, str]:
         values = {
@@ -102,6 +122,8 @@ class PlantHealth:
             "sim_time_s": f"{self._clock.now_ns / 1e9:.3f}",
             "watchdog_trips": str(self._guard.watchdog.trips),
             "rejected_commands": str(self._guard.rejected),
+            "commanded_by": "person" if self._guard.person else "controller",
+            "answers": str(self._wires.answers),
             **self._wires.latency_ms.percentiles("latency_ms"),
         }
         if self._realtime is not None:

@@ -5,20 +5,21 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-import numpy as np
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
+from fulmar_core.episode import Episode
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
-from fulmar_core.planar import at_rest
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
+from fulmar_ros.first_episode import first_episode
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
+from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_settings import PlantSettings
@@ -26,6 +27,7 @@ from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.realtime_loop import RealtimeLoop
 from fulmar_ros.runtime import RequestExit, settle_memory
 from fulmar_ros.simulated_time import SimulatedTime
+from fulmar_ros.wall_time import WallTime
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -46,6 +48,7 @@ class PlantNode(LifecycleNode):
         request_exit: RequestExit,
         *,
         simulated: bool = True,
+        settings_class: type[PlantSettings] = PlantSettings,
         cli_args: list[str] | None = None,
     ) -> None:
         """Read the parameters and, unless told otherwise, start.
@@ -54,16 +57,17 @@ class PlantNode(LifecycleNode):
             make_backend: Builds the backend; called at configuration.
             request_exit: Ends the process.
             simulated: Whether the backend knows the truth and makes the time.
+            settings_class: Parameters of the node.
             cli_args: ROS arguments of this node alone, where it shares a process.
 
         Raises:
             FulmarError: If a parameter or a configuration file is wrong.
         """
         super().__init__("plant", cli_args=cli_args)
-        self.settings = read_parameters(self, PlantSettings)
+        self.settings = read_parameters(self, settings_class)
         self.robot = load_robot(self.settings.robot)
-        self._scenario = load_scenario(self.settings.scenario)
-        load_task(self.settings.task)  # a wrong name is told before anything starts
+        load_scenario(self.settings.scenario)  # a wrong name is told before anything starts
+        load_task(self.settings.task)
         self._make_backend, self._request_exit, self._simulated = make_backend, request_exit, simulated
         self._backend: Backend | None = None
         self._thread: threading.Thread | None = None
@@ -75,8 +79,13 @@ class PlantNode(LifecycleNode):
                 "THE COMMAND WATCHDOG IS OFF: actuators stay as they are when a controller dies."
             )
             timeout_s = 1e9
-        self.guard = ActuatorGuard(self.robot.actuators, Watchdog(round(timeout_s * 1e9)))
-        self.clock = SimulatedTime()
+        self.guard = ActuatorGuard(
+            self.robot.actuators,
+            Watchdog(round(timeout_s * 1e9)),
+            estop=EstopWatch(required=self.settings.estop),
+            control_dt=1.0 / self.settings.control_rate(self.robot),
+        )
+        self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
@@ -91,7 +100,15 @@ class PlantNode(LifecycleNode):
             self.health.reason = str(error)
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
-        self.wires = PlantWires(self, self.robot, self.guard, simulated=self._simulated)
+        self.wires = PlantWires(
+            self,
+            self.robot,
+            self.guard,
+            simulated=self._simulated,
+            odometry=self.settings.publishes_odometry,
+            mocap=self._motion_capture(),
+            realtime=not self.settings.lockstep,
+        )
         self._make_loops(self._backend)
         self.health.open(self)
         return DONE
@@ -102,6 +119,7 @@ class PlantNode(LifecycleNode):
         self._stop.clear()
         with self.wires.lock:
             self.guard.reset()
+        self.wires.listening = True
         self._make_loops(self._backend)
         self.health.mode = "waiting"
         settle_memory()
@@ -157,6 +175,12 @@ class PlantNode(LifecycleNode):
         sample = self._backend.reset(episode, seed=seed, number=number)
         self._lockstep.run(sample, steps, self._stop, on_step)
 
+    def _motion_capture(self) -> MotionCapture | None:
+        """The source of poses that stands in for the odometry, where an estimator runs."""
+        if not self.settings.estimated:
+            return None
+        return MotionCapture(rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
+
     def _make_loops(self, backend: Backend) -> None:
         """New loops: neither counts nor deadlines survive a deactivation."""
         self._lockstep = LockstepLoop(
@@ -200,6 +224,8 @@ class PlantNode(LifecycleNode):
                 )
             else:
                 self._realtime.run(sample, self._count(self.robot.timing.physics_dt), self._stop)
+            self.health.mode = "stopping"
+            self.wires.listening = False  # from here on nobody has to command
             self._make_safe()
             self.health.mode = "inactive" if self._stop.is_set() else "finished"
         except FulmarError as error:
@@ -208,12 +234,7 @@ class PlantNode(LifecycleNode):
             self._fail(f"{type(error).__name__}: {error}")
 
     def _first_sample(self, backend: Backend) -> Sample:
-        x, y, heading = (np.asarray(float(value)) for value in self.settings.start)
-        episode = draw_episode(
-            self.robot, load_task(self.settings.task), self._scenario, seed=self.settings.seed, number=0
-        )
-        start = at_rest(x, y, np.deg2rad(heading))
-        return backend.reset(Episode(start, episode.goal, episode.world), seed=self.settings.seed)
+        return backend.reset(first_episode(self.robot, self.settings), seed=self.settings.seed)
 
     def _count(self, dt: float) -> int | None:
         """How many loops of `dt` seconds fill the duration; None for no end."""

@@ -27,7 +27,11 @@ class PlantSettings:
     duration_s: float = 0.0  # simulated time after which the plant stops; 0: never [s]
     command_timeout_s: float = BY_RATE  # 0 switches the watchdog off
     answer_timeout_s: float = 5.0  # longest wait for a controller in lock step [s]
-    wait_for_subscribers: int = 0  # of odom, before the first step
+    wait_for_subscribers: int = 0  # of odom, or of what an estimator is told, before the first step
+    estimated: bool = False  # publish mocap/pose in the place of odom: an estimator makes odom of it
+    mocap_hz: float = 0.0  # captures; 0: at every tick [Hz]
+    mocap_late_s: float = 0.0  # by which a pose is stamped and sent after its capture [s]
+    estop: bool = False  # nothing moves before an e-stop is heard
     autostart: bool = True
 
     def __post_init__(self) -> None:
@@ -36,13 +40,24 @@ class PlantSettings:
             raise ValueError(
                 f"start = {list(self.start)} must be three finite numbers: x [m], y [m], heading [deg]."
             )
-        for name in ("control_hz", "rate", "duration_s", "command_timeout_s", "answer_timeout_s"):
+        for name in (
+            "control_hz", "rate", "duration_s", "command_timeout_s", "answer_timeout_s", "mocap_hz", "mocap_late_s",
+        ):  # fmt: skip
             if not math.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} = {getattr(self, name)} must be a finite number.")
         if self.rate <= 0.0:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
+        if min(self.mocap_hz, self.mocap_late_s) < 0.0:
+            raise ValueError("mocap_hz and mocap_late_s must not be negative.")
+        if self.estimated and self.lockstep:
+            raise ValueError("an estimator needs every measurement in between; lock step has none.")
         if self.seed < 0:
             raise ValueError(f"seed = {self.seed} must not be negative.")
+
+    @property
+    def publishes_odometry(self) -> bool:
+        """Whether this plant says where it is, rather than an estimator or somebody else."""
+        return not self.estimated
 
     def control_rate(self, robot: Robot) -> float:
         """Command rate [Hz]."""

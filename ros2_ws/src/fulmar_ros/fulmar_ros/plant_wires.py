@@ -15,22 +15,31 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     BLOCK,
     CLOCK,
+    ESTOP,
+    GIVE_BACK,
     IMU,
+    MOCAP,
     ODOMETRY,
+    TELEOP,
     TRUTH,
     VELOCITY_COMMAND,
     command_wire,
 )
-from fulmar_ros.convert import ImuWriter, OdometryWriter, VectorWriter, stamp_ns, stamp_of
+from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
 from fulmar_ros.deadline import Spread
+from fulmar_ros.message_reader import stamp_ns
+from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
@@ -41,7 +50,17 @@ REMEMBERED = 256  # odometry messages whose answer may still come
 class PlantWires:
     """Publishers, the command subscription, and the times between them."""
 
-    def __init__(self, node: LifecycleNode, robot: Robot, guard: ActuatorGuard, *, simulated: bool) -> None:
+    def __init__(
+        self,
+        node: LifecycleNode,
+        robot: Robot,
+        guard: ActuatorGuard,
+        *,
+        simulated: bool,
+        odometry: bool = True,
+        mocap: MotionCapture | None = None,
+        realtime: bool = True,
+    ) -> None:
         """Create every endpoint.
 
         Args:
@@ -49,19 +68,35 @@ class PlantWires:
             robot: The robot.
             guard: Takes the commands; only touched under `self.lock`.
             simulated: Whether truth and clock are published.
+            odometry: Whether the plant says where it is; if not, somebody else does.
+            mocap: Publish its poses, of which an estimator makes odometry.
+            realtime: By the clock: a person may take the actuators, and commands go before other work.
         """
+        self._mocap = mocap
+        self._prior = not realtime  # whether the threads that commands pass have what priority they need
         self.lock = threading.Condition()
         self.latency_ms = Spread()
+        self.answers = 0  # states that a command has answered
+        self.listening = True  # whether commands of controllers are heard
         self._guard = guard
         self._sent_ns: OrderedDict[int, int] = OrderedDict()
         self._answered: int | None = None
         self._clock_ns = 0
-        self._odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+        self._captured_ns = 0
+        self._odometry = (
+            node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY)) if odometry else None
+        )
+        self._poses = (
+            node.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
+            if mocap is not None
+            else None
+        )
         self._imu = node.create_publisher(Imu, IMU.name, publisher_qos(IMU))
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
         self._truth = node.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH)) if simulated else None
         self._clock = node.create_publisher(Clock, CLOCK.name, publisher_qos(CLOCK)) if simulated else None
         self._write_odometry = OdometryWriter(robot.sensors.odometry)
+        self._write_pose = PoseWriter()
         self._write_truth = OdometryWriter(None, frame="map")
         self._write_imu = ImuWriter(robot)
         self._write_state = VectorWriter(robot.actuators.names)
@@ -69,42 +104,60 @@ class PlantWires:
         self._node = node
         self._block: Publisher | None = None
         wire = command_wire(robot)
-        qos = subscriber_qos(wire, reliable=True)
+        # By the clock the newest command counts. A reliable reader would hold it back while one that a network lost is
+        # asked for again, which takes seconds.
+        qos = subscriber_qos(wire, reliable=not realtime)
         self._commands = (
             node.create_subscription(TwistStamped, wire.name, self._on_velocity, qos)
             if wire is VELOCITY_COMMAND
             else node.create_subscription(JointState, wire.name, self._on_command, qos)
         )
+        self._operator = [node.create_subscription(Bool, ESTOP.name, self._on_estop, subscriber_qos(ESTOP))]
+        if realtime:
+            qos = subscriber_qos(TELEOP, reliable=True)
+            self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, qos))
+        self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
 
     def destroy(self, node: LifecycleNode) -> None:
         """Give every endpoint back."""
-        node.destroy_subscription(self._commands)
-        for publisher in (self._odometry, self._imu, self._state, self._truth, self._clock, self._block):
+        for subscription in (self._commands, *self._operator):
+            node.destroy_subscription(subscription)
+        node.destroy_service(self._give_back)
+        made = (self._odometry, self._poses, self._imu, self._state, self._truth, self._clock, self._block)
+        for publisher in made:
             if publisher is not None:
                 node.destroy_publisher(publisher)
 
     def subscribers(self) -> int:
-        """Matched subscriptions of the odometry."""
-        return int(self._odometry.get_subscription_count())
+        """Matched subscriptions of the odometry, of the poses in its place, or of the actuators' state."""
+        return int((self._odometry or self._poses or self._state).get_subscription_count())
 
     def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
         """Publish what the backend reports; the odometry first, since somebody waits for it.
 
         Args:
             sample: From the backend.
-            time_ns: Time of measurement [ns].
+            time_ns: Time of measurement, where the sample names none [ns].
             resend: Only the odometry, once more.
         """
+        if sample.stamp_ns is not None:
+            if sample.stamp_ns <= self._captured_ns:
+                return  # a device that has nothing new
+            time_ns = self._captured_ns = sample.stamp_ns
         self._sent_ns.setdefault(time_ns, time.monotonic_ns())  # of a resent one, the first sending counts
         while len(self._sent_ns) > REMEMBERED:
             self._sent_ns.popitem(last=False)
         if sample.block is not None:
             self._publish_block(sample.block, time_ns)
-        self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
+        if self._odometry is not None and sample.odometry is not None:
+            self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
         if resend:
             return
         if sample.imu is not None and self._imu.get_subscription_count():
             self._imu.publish(self._write_imu.write(sample.imu, time_ns))
+        if self._mocap is not None and self._poses is not None and sample.odometry is not None:
+            for stamp, state in self._mocap.see(sample.odometry, time_ns):
+                self._poses.publish(self._write_pose.write(state, stamp))
         self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
@@ -151,13 +204,33 @@ class PlantWires:
         values = (message.twist.linear.x, message.twist.angular.z)
         self._take(self._names, values, stamp_ns(message.header.stamp))
 
+    def _on_estop(self, message: Bool) -> None:
+        with self.lock:
+            self._guard.estop.hear(bool(message.data), time.monotonic_ns())
+
+    def _on_teleop(self, message: JointState) -> None:
+        with self.lock:
+            self._guard.offer_by_hand(message.name, message.effort, time.monotonic_ns())
+
+    def _on_give_back(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        with self.lock:
+            problem = self._guard.give_back(time.monotonic_ns())
+        response.success, response.message = not problem, problem or "the controller has the robot again"
+        return response
+
     def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
         now = time.monotonic_ns()
+        if not self.listening:
+            return
+        if not self._prior:
+            take_priority_with_helpers(CONTROL_PRIORITY)
+            self._prior = True
         with self.lock:
             taken = self._guard.offer(names, values, now, stamp_ns=stamp)
             sent = self._sent_ns.pop(stamp, None)
             if taken and sent is not None:
                 self.latency_ms.add((now - sent) / 1e6)
+                self.answers += 1
             if taken:
                 self._answered = stamp
             self.lock.notify_all()

@@ -8,17 +8,25 @@ import time
 import numpy as np
 
 from fulmar_core.backend import Backend, Sample
+from fulmar_core.priority import PLANT_PRIORITY, take_priority
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_ros.deadline import PLANT_PRIORITY, Deadlines, take_priority
+from fulmar_ros.deadline import Deadlines
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.simulated_time import SimulatedTime
+from fulmar_ros.wall_time import WallTime
 
 
 class RealtimeLoop:
     """Steps a backend by the clock; the watchdog acts at every tick."""
 
     def __init__(
-        self, backend: Backend, wires: PlantWires, guard: ActuatorGuard, clock: SimulatedTime, *, rate: float
+        self,
+        backend: Backend,
+        wires: PlantWires,
+        guard: ActuatorGuard,
+        clock: SimulatedTime | WallTime,
+        *,
+        rate: float,
     ) -> None:
         """Join the parts.
 
@@ -48,9 +56,10 @@ class RealtimeLoop:
         self._ticked_ns = time.monotonic_ns()
         self._wires.publish_sample(sample, self._clock.now_ns)
         while (ticks is None or self.ticks < ticks) and self.deadlines.wait(stop):
-            command = self._command()
-            self._wires.publish_applied(command, self._clock.now_ns)
+            command, begun_ns = self._command(), self._clock.now_ns
             sample = self._backend.step(command)
+            applied = command if sample.applied is None else sample.applied
+            self._wires.publish_applied(applied, begun_ns)
             self._clock.advance(self._dt)
             self.ticks += 1
             self._ticked_ns = time.monotonic_ns()

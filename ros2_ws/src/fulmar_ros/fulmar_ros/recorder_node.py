@@ -3,38 +3,32 @@
 from __future__ import annotations
 
 import importlib
-import json
 import sys
+import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rclpy.node import Node
 
-from fulmar_core.errors import BagError, ConfigError
+from fulmar_core.errors import BagError
 from fulmar_core.exit_codes import DONE, FAILED
 from fulmar_core.topics import WIRES, Wire
+from fulmar_ros.bag_ring import BagRing
 from fulmar_ros.bag_thread import BagThread
-from fulmar_ros.bag_writer import BagWriter
+from fulmar_ros.bag_writer import BagWriter, check_free
+from fulmar_ros.fault_signs import fault_finder
 from fulmar_ros.parameters import read_parameters
+from fulmar_ros.provenance import attachments
 from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.recorder_health import RecorderHealth
+from fulmar_ros.recorder_settings import RecorderSettings
 from fulmar_ros.runtime import RequestExit, run_node
 
 # Messages of one topic that may wait for a callback; a lock-stepped run is far faster than real time.
 DEPTH = 5000
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
 LONGEST_GOODBYE_S = 5.0
-
-
-@dataclass(frozen=True)
-class RecorderSettings:
-    """Parameters of the recorder."""
-
-    directory: str = ""  # bag folder to make; "" makes one under `runs/` that is named after robot and time
-    run_info: str = "{}"  # JSON object: what kind of run this is
-    attachments: str = "{}"  # JSON object: name to path of files to carry along
 
 
 class RecorderNode(Node):
@@ -48,66 +42,110 @@ class RecorderNode(Node):
             ConfigError: A parameter is wrong.
         """
         super().__init__("recorder")
-        settings = read_parameters(self, RecorderSettings)
-        run_info = _json_object("run_info", settings.run_info)
-        attachments = _read_files(_json_object("attachments", settings.attachments))
-        directory = Path(settings.directory or self._default_directory())
-        self._bag = BagWriter(directory, run_info=run_info, attachments=attachments)
-        wires = [(wire, self.resolve_topic_name(wire.name)) for wire in WIRES if wire.recorded]
-        for wire, topic in wires:
-            self._bag.add_topic(topic, wire.type, wire.delivery)
-        self._thread = BagThread(self._bag, on_error=self.get_logger().error)
-        for wire, topic in wires:
+        self._settings = settings = read_parameters(self, RecorderSettings)
+        self._robot = self.get_namespace().strip("/") or "robot"
+        self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
+        self._run_info, self._attachments = settings.run(), settings.files()
+        classes = {wire: _message_class(wire) for wire in WIRES if wire.recorded}
+        self._topics = {
+            wire: self.resolve_topic_name(wire.name) for wire, kind in classes.items() if kind is not None
+        }
+        self._ring = self._new_ring() if settings.mode == "ring" else None
+        self._thread = BagThread(self._ring or self._open_bag(), on_error=self.get_logger().error)
+        self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
+        self._provenance.start()
+        for wire, topic in self._topics.items():
             qos = subscriber_qos(wire, reliable=True, depth=DEPTH)
-            self.create_subscription(_message_class(wire), topic, self._keep(topic), qos, raw=True)
-        sys.stdout.write(f"recording to {self._bag.directory}\n")
+            self.create_subscription(classes[wire], topic, self._keep(topic), qos, raw=True)
+        self._health = RecorderHealth(
+            self, self._robot, self._directory, self._thread.account, lambda: self._mode
+        )
+        told = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
+        sys.stdout.write(f"{told} {self._directory}\n")
         sys.stdout.flush()
 
-    def _default_directory(self) -> str:
-        return f"runs/{self.get_namespace().strip('/') or 'robot'}_{time.strftime('%Y%m%d_%H%M%S')}"
+    @property
+    def _mode(self) -> str:
+        """What the recorder is doing, in a few words."""
+        if self._ring is None:
+            return "recording"
+        short = ": memory is too small for more" if self._ring.cut_short else ""
+        return f"ring: {self._ring.kept_s:.0f} s in memory, {len(self._ring.faults)} faults written{short}"
+
+    def _open_bag(self) -> BagWriter:
+        """Make the bag, with its topics."""
+        bag = BagWriter(
+            self._directory,
+            run_info=self._run_info,
+            attachments=self._attachments,
+            split_bytes=1e6 * self._settings.split_mb,
+            split_s=self._settings.split_s,
+        )
+        for wire, topic in self._topics.items():
+            bag.add_topic(topic, wire.type, wire.delivery)
+        bag.flush()
+        return bag
+
+    def _new_ring(self) -> BagRing:
+        """A ring; that no bag could be written is told now, not at the fault.
+
+        Raises:
+            BagError: If it could not.
+        """
+        check_free(self._directory)
+        try:
+            self._directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BagError(f"{self._directory}: cannot write a bag here: {error.strerror}.") from error
+        return BagRing(
+            self._open_bag,
+            before_s=self._settings.before_fault_s,
+            after_s=self._settings.after_fault_s,
+            latched={
+                topic: wire.latest for wire, topic in self._topics.items() if wire.delivery == "latched"
+            },
+            fault_in=fault_finder(self._robot, self._topics),
+        )
 
     def _keep(self, topic: str) -> Callable[[bytes], None]:
         put = self._thread.put
         # No time of sending: the EventsExecutor of rclpy 7.1.6 fails on callbacks that ask for message info.
         return lambda data: put(topic, data, time.time_ns())
 
+    def _attach_provenance(self) -> None:
+        """Tell the code and the packages; git and a slow disk may take seconds, in which messages come already."""
+        for name, data in attachments().items():
+            self._thread.attach(name, data)
+
     def stop(self) -> int:
         """Wait until nothing more comes, close the bag, and say what is in it."""
+        self._provenance.join(LONGEST_GOODBYE_S)
         deadline = time.monotonic() + LONGEST_GOODBYE_S
         before = -1
         while self._thread.received != before and time.monotonic() < deadline:
             before = self._thread.received
             time.sleep(QUIET_S)
-        outcome = self._thread.stop()
-        sys.stdout.write(
-            f"recorded {outcome.recorded} messages, {outcome.size / 1e3:.0f} kB, to {self._bag.directory}\n"
-        )
+        account = self._thread.stop()
+        if self._ring is not None and not self._ring.faults:
+            self._directory.rmdir()
+            sys.stdout.write(f"no fault in {account.received} messages: nothing was written\n")
+        else:
+            sys.stdout.write(
+                f"recorded {account.recorded} messages, {account.size / 1e3:.0f} kB, to {self._directory}\n"
+            )
         sys.stdout.flush()
-        if outcome.lost:
-            self.get_logger().error(f"{outcome.lost} of {outcome.received} messages are not in the bag.")
-        return FAILED if outcome.lost else DONE
+        if account.lost:
+            self.get_logger().error(f"{account.lost} of {account.received} messages are not in the bag.")
+        return FAILED if account.lost else DONE
 
 
-def _message_class(wire: Wire) -> type:
+def _message_class(wire: Wire) -> type | None:
+    """The class of a wire's messages; None where the package of a foreign one is not installed."""
     package, kind, name = wire.type.split("/")
-    return getattr(importlib.import_module(f"{package}.{kind}"), name)
-
-
-def _json_object(parameter: str, text: str) -> dict[str, Any]:
     try:
-        value = json.loads(text or "{}")
-    except json.JSONDecodeError as error:
-        raise ConfigError(f"parameter '{parameter}' of node 'recorder' is not JSON: {error}.") from error
-    if not isinstance(value, dict):
-        raise ConfigError(f"parameter '{parameter}' of node 'recorder' must be a JSON object, found {text}.")
-    return value
-
-
-def _read_files(paths: dict[str, Any]) -> dict[str, bytes]:
-    try:
-        return {name: Path(path).read_bytes() for name, path in paths.items()}
-    except OSError as error:
-        raise BagError(f"cannot attach {error.filename}: {error.strerror}.") from error
+        return getattr(importlib.import_module(f"{package}.{kind}"), name)
+    except ModuleNotFoundError:
+        return None
 
 
 def main() -> None:

@@ -32,6 +32,7 @@ from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
 SWITCH_INTERVAL_S = 0.0005
 
 SPIN_S = 60.0
+EXECUTOR = "FULMAR_EXECUTOR"  # environment variable: default, or events
 
 RequestExit = Callable[[int], None]
 """Ends the process in order, with an exit code; from any thread, returns at once, the first call counts."""
@@ -63,6 +64,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     end_with_parent()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
+    stay_on_this_host()
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot read
@@ -76,6 +78,11 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         return BAD_USAGE
     finally:
         rclpy.try_shutdown()
+
+
+def stay_on_this_host() -> None:
+    """Let nobody on the network find this process, unless the environment asks for it; call before `rclpy.init`."""
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 
 def end_with_parent() -> None:
@@ -156,6 +163,11 @@ def _stop(node: Any) -> int:
 
 
 def _executor() -> Executor:
+    """The EventsExecutor; rclpy's default one where there is none, or where the environment asks for it."""
+    if os.environ.get(EXECUTOR) == "default":
+        from rclpy.executors import SingleThreadedExecutor
+
+        return SingleThreadedExecutor()
     try:
         from rclpy.experimental import EventsExecutor
     except ImportError:  # rclpy before Jazzy's 7.1.2

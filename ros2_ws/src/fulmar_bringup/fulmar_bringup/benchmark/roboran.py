@@ -13,7 +13,7 @@ from fulmar_bringup.benchmark.pairs import Pair, find_pair, units_of
 from fulmar_bringup.benchmark.results import FORMAT, pair_entry
 from fulmar_bringup.benchmark.unit import Unit
 from fulmar_bringup.benchmark.work import Outcome, do_all
-from fulmar_bringup.provenance import fulmar_version, git_revision
+from fulmar_ros.provenance import fulmar_version, git_revision
 
 EPISODES = {"batch": 4096, "mujoco": 256, "ros": 16}
 

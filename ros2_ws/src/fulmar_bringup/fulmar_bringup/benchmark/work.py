@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.unit import Unit, judge
+from fulmar_bringup.environment import environment
 from fulmar_core.errors import RunFailed
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Outcome = Judged | str  # a sentence where a unit failed
 Done = Callable[[Unit, Outcome], None]
-_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
 def do_all(
@@ -72,8 +72,8 @@ def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], 
     spawn = multiprocessing.get_context("spawn")
     counts = spawn.Array("q", len(units), lock=False)
     with (
-        _environment(_ONE_THREAD),
-        _ended_with_us(ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts,))) as pool,
+        environment(ONE_THREAD),
+        ended_with_us(ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts,))) as pool,
     ):
         futures: dict[Future[Outcome], Unit] = {
             pool.submit(_work, unit, index): unit for index, unit in enumerate(units)
@@ -90,7 +90,7 @@ def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], 
 
 
 @contextlib.contextmanager
-def _ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
+def ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
     """Wait for the workers; after an error or Ctrl-C, end them."""
     try:
         yield pool
@@ -100,21 +100,6 @@ def _ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-@contextlib.contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    """Variables that children inherit."""
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 _counts: Any = None

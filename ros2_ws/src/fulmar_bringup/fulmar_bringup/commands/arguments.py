@@ -25,6 +25,17 @@ SeedOption = Annotated[
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", metavar="NAME", help="Disturbances: a name from configs/scenarios.")
 ]
+CalibrationOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration",
+        metavar="FILE",
+        help="What `fulmar identify` measured on this robot, instead of its YAML.",
+    ),
+]
+BagArgument = Annotated[
+    Path, typer.Argument(metavar="BAG", help="A bag folder, or the .mcap or .db3 file in it.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 

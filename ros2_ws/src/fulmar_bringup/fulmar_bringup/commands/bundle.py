@@ -38,6 +38,61 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
 
 
 @bundle.command()
+def keys(
+    private: Annotated[
+        Path, typer.Argument(metavar="PRIVATE", help="File for the private key; keep it secret.")
+    ],
+    public: Annotated[Path, typer.Argument(metavar="PUBLIC", help="File for the public key, for robots.")],
+) -> None:
+    """Make a pair of ed25519 keys: one to sign bundles, one for robots to check them by."""
+    from fulmar_bringup.extras import require
+
+    require("cryptography")
+    from fulmar_core.bundle_signature import make_keys
+
+    make_keys(private, public)
+    output.print(f"sign with {private}, give {public} to robots", markup=False, soft_wrap=True)
+
+
+@bundle.command()
+def sign(
+    folder: FolderArgument,
+    key: Annotated[Path, typer.Option(metavar="FILE", help="A private key of `fulmar bundle keys`.")],
+) -> None:
+    """Sign a bundle, whose hashes are checked first."""
+    from fulmar_bringup.extras import require
+
+    require("cryptography")
+    from fulmar_core.bundle_signature import sign_bundle
+
+    sign_bundle(folder, key)
+    output.print(f"{folder}: signed", markup=False, soft_wrap=True)
+
+
+@bundle.command()
+def verify(
+    folder: FolderArgument,
+    trusted: Annotated[
+        Path, typer.Option(metavar="FILE|DIR", help="A public key, or a folder of them (*.pem).")
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Check that a trusted key has signed a bundle, and that nothing was changed since."""
+    from fulmar_bringup.extras import require
+
+    require("cryptography")
+    from fulmar_core.bundle_signature import verify_bundle
+    from fulmar_core.policy_bundle import read_passport
+
+    passport = read_passport(folder)
+    name = verify_bundle(folder, trusted)
+    if as_json:
+        print_json({"bundle": str(folder), "signed_by": name, "sha256": passport.sha256})
+    else:
+        output.print(f"{folder}: signed by {name}", markup=False, soft_wrap=True)
+
+
+@bundle.command()
 def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
     """Load a bundle as the robot would: hashes, robot, task, rate, names, shapes, golden vectors."""
     from fulmar_bringup.planning import checked_rate

@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from fulmar_bringup.commands.arguments import (
+    CalibrationOption,
     ControllerOption,
     JsonOption,
     PolicyOption,
@@ -47,6 +48,7 @@ def evaluate(
     episodes: Annotated[int, typer.Option(metavar="N", min=1, help="Number of episodes.")] = 256,
     seed: SeedOption = JUDGE_SEED,
     scenario: ScenarioOption = "nominal",
+    calibration: CalibrationOption = None,
     control_hz: Annotated[
         float | None, typer.Option(metavar="HZ", min=0.01, help="Command rate; the robot's own by default.")
     ] = None,
@@ -82,6 +84,7 @@ def evaluate(
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, modules_of
+    from fulmar_core.calibration import use_calibration
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.robot import load_robot
     from fulmar_core.rollout import WORLDS
@@ -89,6 +92,7 @@ def evaluate(
 
     if through not in WAYS:
         raise UnknownNameError("way", through, WAYS)
+    use_calibration(calibration, robot)
     check_names(robot, task, controller, "mujoco")
     the_robot, the_task = load_robot(robot), load_task(task)
     load_scenario(scenario)  # so that a wrong name is told before anything is started

@@ -11,17 +11,19 @@ from fulmar_bringup.console import output, print_json
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.paths import config_names
 
-FAMILIES = ("robots", "tasks", "controllers", "systems", "policies", "goals")
+FAMILIES = ("robots", "tasks", "controllers", "systems", "policies", "goals", "hardware")
 
 
 def list_names(
     family: Annotated[
         str | None,
-        typer.Argument(metavar="[robots|tasks|controllers|systems|policies|goals]", help="All by default."),
+        typer.Argument(
+            metavar="[robots|tasks|controllers|systems|policies|goals|hardware]", help="All by default."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the robots, tasks, controllers, systems, policies and goal files there are."""
+    """Show the robots, tasks, controllers, systems, policies, goal files and hardware files there are."""
     if family is not None and family not in FAMILIES:
         raise UnknownNameError("family", family, FAMILIES)
     chosen = FAMILIES if family is None else (family,)
@@ -43,6 +45,7 @@ def _entries(family: str) -> dict[str, str]:
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
+    from hardware_drivers.settings import load_hardware
     from policy_server.shipped import shipped_policies
 
     if family == "robots":
@@ -51,6 +54,8 @@ def _entries(family: str) -> dict[str, str]:
         return {name: load_task(name).title for name in config_names("tasks")}
     if family == "goals":
         return {name: load_goals(name).title for name in config_names("goals")}
+    if family == "hardware":
+        return {name: load_hardware(name).title for name in config_names("hardware")}
     if family == "systems":
         return {name: load_system(name).title for name in config_names("systems")}
     if family == "policies":

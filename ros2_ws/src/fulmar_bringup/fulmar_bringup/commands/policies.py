@@ -40,7 +40,7 @@ def policies(
 
     fulmar policies kingfisher_go_to_pose
     """
-    from fulmar_bringup.provenance import git_revision
+    from fulmar_ros.provenance import git_revision
     from policy_server.shipped import policies_directory
     from training.executors import LocalExecutor
     from training.job_bars import JobBars

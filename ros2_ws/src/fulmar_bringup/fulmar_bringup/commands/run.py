@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from fulmar_bringup.commands.arguments import (
+    CalibrationOption,
     ControllerOption,
     JsonOption,
     PolicyOption,
@@ -20,6 +21,7 @@ from fulmar_bringup.commands.arguments import (
 )
 from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import ConfigError
+from fulmar_core.exit_codes import DONE
 
 
 def run(
@@ -34,6 +36,17 @@ def run(
     ] = None,
     controller: ControllerOption = "policy",
     backend: Annotated[str, typer.Option(metavar="B", help="mujoco, mock or hardware.")] = "mujoco",
+    hardware: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="With --backend hardware: a name from configs/hardware, or a .yaml file; the robot's own by default.",
+        ),
+    ] = None,
+    emulate: Annotated[
+        bool,
+        typer.Option("--emulate", help="With --backend hardware: an emulator speaks for the device."),
+    ] = False,
     policy: PolicyOption = None,
     goal: Annotated[
         str | None,
@@ -66,16 +79,60 @@ def run(
         float | None, typer.Option(metavar="HZ", min=0.01, help="Command rate; the system file's by default.")
     ] = None,
     scenario: ScenarioOption = "nominal",
+    calibration: CalibrationOption = None,
     seed: SeedOption = 0,
     record: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the bag; runs/<time>... by default.")
     ] = None,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Take odometry from poses and inertial readings: a name from configs/estimators.",
+        ),
+    ] = None,
+    estop: Annotated[
+        bool,
+        typer.Option("--estop", help="Run an e-stop node; nothing moves without it. See `fulmar estop`."),
+    ] = False,
+    fallback: Annotated[
+        str | None,
+        typer.Option(metavar="C", help="Classical controller that takes over when the policy is refused."),
+    ] = None,
+    trusted_keys: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE|DIR", help="Public keys: run no bundle that none of them has signed."),
+    ] = None,
+    recording: Annotated[
+        str | None,
+        typer.Option(
+            metavar="whole|ring",
+            help="whole: every message. ring: the last 30 s stay in memory and are written only when a fault shows "
+            "(an error of plant or controller, the watchdog, the e-stop), with 5 s after it; without one there is "
+            "no bag and no verdict on the goal, and the exit code is 0. The system file's `recorder:` by default.",
+        ),
+    ] = None,
+    copies: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, max=3, help="Send each command so often, where a network loses some."
+        ),
+    ] = 1,
+    controller_network: Annotated[
+        str,
+        typer.Option(
+            "--controller-in",
+            metavar="NETNS",
+            help="Network namespace of Linux that the controller runs in, as on another computer.",
+        ),
+    ] = "",
     as_json: JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
 
     Starts a plant, a controller and a recorder as processes of their own, gives the goal, and stops them in order
-    when the time is up. The exit code is 0 if the goal was met, 1 if not or if anything failed.
+    when the time is up. The exit code is 0 if the goal was met, 1 if not or if anything failed; `--controller excite`,
+    which only moves about so that `fulmar identify` has something to learn from, needs no goal to be met.
 
     Try:
 
@@ -86,6 +143,10 @@ def run(
     fulmar run turtlebot2 --task go_through_positions --controller classical
 
     fulmar run floating_platform --controller classical --goals circle
+
+    fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
+
+    fulmar run floating_platform --controller lqr --duration 3600 --recording ring
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
@@ -93,8 +154,10 @@ def run(
     from fulmar_bringup.extras import require
     from fulmar_bringup.goal_plan import default_task as task_of_goals
     from fulmar_bringup.planning import default_task, plan_run
-    from fulmar_bringup.system import modules_of
+    from fulmar_bringup.system import CONTROLLERS, modules_of
+    from fulmar_core.calibration import use_calibration
 
+    use_calibration(calibration, robot)
     request = plan_run(
         robot=robot,
         task=task or (task_of_goals(goals) if goals else default_task(robot)),
@@ -112,8 +175,17 @@ def run(
         record=record or default_record(robot, controller),
         command="fulmar " + " ".join(sys.argv[1:]),
         goals=goals,
+        hardware=hardware,
+        emulate=emulate,
+        guards=asked_guards(estimator, estop, fallback, trusted_keys),
+        recording=recording,
+        copies=copies,
+        controller_network=controller_network,
     )
-    require(*modules_of(controller, backend))  # the nodes would fail for want of them one by one
+    plan = request.plan
+    require(  # the nodes would fail for want of them one by one
+        *modules_of(controller, backend, guards=plan.guards, hardware=plan.hardware, emulated=emulate)
+    )
     outcome = conduct(request)
     if as_json:
         print_json(outcome.summary)
@@ -121,7 +193,21 @@ def run(
         output.print(verdict(outcome.summary))
     if outcome.failure:
         console.print(f"run failed: {outcome.failure}", markup=False)
-    raise typer.Exit(outcome.exit_code)
+    aimless = not CONTROLLERS[controller].strives and not outcome.failure
+    raise typer.Exit(DONE if aimless else outcome.exit_code)
+
+
+def asked_guards(
+    estimator: str | None, estop: bool, fallback: str | None, trusted_keys: Path | None
+) -> dict[str, Any]:
+    """The guards that were asked for, by name."""
+    asked = {
+        "estimator": estimator,
+        "estop": estop or None,
+        "fallback": fallback,
+        "trusted_keys": str(trusted_keys) if trusted_keys else None,
+    }
+    return {key: value for key, value in asked.items() if value is not None}
 
 
 def default_record(robot: str, controller: str) -> Path:
@@ -147,7 +233,14 @@ def told_figure(summary: dict[str, Any], name: str) -> str:
 
 def verdict(summary: dict[str, Any]) -> str:
     """One run in a few lines."""
-    reached = "goal met" if summary["success"] else "goal missed"
+    from fulmar_bringup.system import CONTROLLERS
+
+    if summary["success"] is None:
+        return f"{summary['controller']}: no fault, so the ring of the recorder was not written; no verdict on the goal"
+    if CONTROLLERS[summary["controller"]].strives:
+        reached = "goal met" if summary["success"] else "goal missed"
+    else:
+        reached = "drove about"
     latency = summary["latency_ms"]
     told = [words for words in (told_figure(summary, name) for name in TOLD) if words]
     told += ["touched an obstacle"] if summary["collided"] else []

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fulmar_bringup.commands.arguments import JsonOption, SeedOption
+from fulmar_bringup.commands.arguments import CalibrationOption, JsonOption, SeedOption
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.extras import require
+from fulmar_core.calibration import use_calibration
 from fulmar_core.errors import ConfigError
 from fulmar_core.exit_codes import FAILED
 
@@ -55,6 +56,7 @@ def train(
     episodes: Annotated[
         int, typer.Option(metavar="N", min=1, help="Episodes of the closing judgement in MuJoCo.")
     ] = 256,
+    calibration: CalibrationOption = None,
     resume: Annotated[
         Path | None, typer.Option(metavar="RUN", help="Go on with this run, exactly where it was.")
     ] = None,
@@ -89,6 +91,16 @@ def train(
         require("wandb")
     if executor not in ("local", "ray"):
         raise ConfigError(f"--executor {executor}: must be local or ray.")
+    if calibration is not None:
+        if resume:
+            raise ConfigError(
+                "--resume goes on with the calibration that the run began with; leave --calibration out."
+            )
+        if executor == "ray":
+            raise ConfigError(
+                "--calibration is a file of this machine; --executor ray does not carry it. Use local."
+            )
+        use_calibration(calibration, robot or "")
     job = Job(
         name="",
         **(_resumed(resume) if resume else _asked(robot, task, seed, settings, out, campaign=seeds > 1)),
@@ -140,16 +152,18 @@ def _asked(
 def _resumed(run: Path) -> dict[str, Any]:
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
-    from training.run_folder import SETTINGS_FILE, read_start
+    from training.run_folder import CALIBRATION_FILE, SETTINGS_FILE, read_start
     from training.settings import load_training_settings
 
     start = read_start(run)
+    if (run / CALIBRATION_FILE).is_file():
+        use_calibration(run / CALIBRATION_FILE, start["robot"])
     robot, task = load_robot(start["robot"]), load_task(start["task"])
     return start | {"settings": load_training_settings(robot, task, str(run / SETTINGS_FILE)), "out": run}
 
 
 def _revision() -> str:
-    from fulmar_bringup.provenance import git_revision
+    from fulmar_ros.provenance import git_revision
 
     return git_revision()
 

@@ -26,6 +26,7 @@ CONTROLLER_COLOURS = {
     "mpc": "#a23b9e",
     "lqr_drift": "#8a6d3b",
     "classical": "#1a9e84",
+    "excite": "#777777",
 }
 OTHER_COLOURS = ("#8d62d9", "#3f9e4d", "#b8860b", "#c2477f", "#5f7a8c")
 

@@ -19,6 +19,7 @@ SPOKEN = {
     "lqr_drift": "DRIFT's LQR",
     "policy": "policy",
     "classical": "classical law",
+    "excite": "excitation",
 }
 
 

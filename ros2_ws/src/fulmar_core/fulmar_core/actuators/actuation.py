@@ -66,7 +66,7 @@ class ActuationState:
             self._wanted = (command + world.action_noise * self._scale * noise) * world.alive
         self._since_s = 0.0
         self._late = self._response.delay_s + world.action_delay
-        self._open_late = self._late + world.opening_delay
+        self._open_late = self._late + self._response.opening_delay_s + world.opening_delay
 
     def advance(self, dt: float, *, latest_s: float) -> Array:
         """Let time pass.

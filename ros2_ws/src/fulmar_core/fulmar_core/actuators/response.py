@@ -12,11 +12,15 @@ class Response:
     delay_s: float = 0.0  # before anything happens, at most one control step [s]
     slew: tuple[float, ...] = ()  # fastest change of each actuator, in its command's unit [per s]
     lag_s: float = 0.0  # time constant of a first-order lag [s]
+    opening_delay_s: float = 0.0  # by which closed valves open later than others close [s]
+    gain: tuple[float, ...] = ()  # what each actuator really does of what it is told; empty: all of it [-]
 
     def __post_init__(self) -> None:
         """Refuse times and rates without meaning."""
-        if min(self.delay_s, self.lag_s) < 0.0 or any(rate <= 0.0 for rate in self.slew):
-            raise ValueError("delay_s and lag_s must not be negative, and every slew must be greater than 0.")
+        if min(self.delay_s, self.lag_s, self.opening_delay_s) < 0.0:
+            raise ValueError("delay_s, lag_s and opening_delay_s must not be negative.")
+        if any(rate <= 0.0 for rate in (*self.slew, *self.gain)):
+            raise ValueError("every slew and every gain must be greater than 0.")
 
     @property
     def remembers(self) -> bool:

@@ -6,6 +6,7 @@ The explicit table. A law for another family or task is one file here and one en
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from fulmar_core.config import load_config
@@ -111,6 +112,11 @@ def load_classical(
     except ValueError as error:
         hz = control_hz or robot.timing.control_hz
         raise ConfigError(f"{entry.law.law} for '{robot.name}' at {hz:g} Hz: {error}") from error
+
+
+def gains_path(robot: Robot, law: str | None = None) -> Path:
+    """The file with the gains of a law for a robot; arguments and errors as of `load_classical`."""
+    return config_path("controllers", _gains_of(robot, entry_of(robot, law)))
 
 
 def _gains_of(robot: Robot, entry: Entry) -> str:

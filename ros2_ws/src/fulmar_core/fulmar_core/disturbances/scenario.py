@@ -227,13 +227,15 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     valves = 1.0 if isinstance(robot.actuators, Thrusters) else 0.0
     low, high = faults.gain
     gain = 1.0 + strength * (low + (high - low) * gain_share - 1.0)
+    if robot.actuators.response.gain:
+        gain = gain * xp.asarray(robot.actuators.response.gain, dtype=gain.dtype)
     own = 1.0 if scenario.sensor_noise else 0.0  # what the robot's YAML says of its sensors
     zero = xp.zeros_like(mass)
     return World(
         mass=mass,
         yaw_inertia=izz,
-        com_x=offset * xp.cos(bearing),
-        com_y=offset * xp.sin(bearing),
+        com_x=robot.body.center_of_mass[0] + offset * xp.cos(bearing),
+        com_y=robot.body.center_of_mass[1] + offset * xp.sin(bearing),
         drag=drag,
         gain=gain.T,
         alive=_survivors(lottery, chances, faults, strength),

@@ -7,6 +7,7 @@ The core's own dynamics move in the plane; simulators that also heave, roll and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from array_api_compat import device
 
@@ -80,7 +81,7 @@ class Hydrodynamics:
             Force ahead [N], to the left [N], and yaw moment [N·m], shapes (...,).
         """
         (du, dv, dr), (qu, qv, qr) = _planar(self.linear_damping), _planar(self.quadratic_damping)
-        return _drag(u, du, qu), _drag(v, dv, qv), _drag(r, dr, qr)
+        return drag(u, du, qu), drag(v, dv, qv), drag(r, dr, qr)
 
     def damping(self, velocity: Array) -> Array:
         """Drag of the water.
@@ -130,13 +131,19 @@ class Hydrodynamics:
         return _planar(self.added_mass)
 
 
-def _drag(speed: Array, linear: float, quadratic: float) -> Array:
-    """-(linear + quadratic |speed|) speed, in as few arrays as that takes."""
-    drag = array_namespace(speed).abs(speed)
-    drag *= -quadratic
-    drag -= linear
-    drag *= speed
-    return drag
+def drag(speed: Array, linear: Any, quadratic: Any) -> Array:
+    """-(linear + quadratic |speed|) speed, in as few arrays as that takes.
+
+    Args:
+        speed: Shape (...,) [m/s or rad/s].
+        linear: A number, or an array that broadcasts to the speed's shape.
+        quadratic: Same.
+    """
+    force = array_namespace(speed).abs(speed)
+    force *= -quadratic
+    force -= linear
+    force *= speed
+    return force
 
 
 def _planar(six: Six) -> tuple[float, float, float]:

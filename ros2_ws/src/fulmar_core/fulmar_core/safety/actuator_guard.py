@@ -1,4 +1,4 @@
-"""The last word before actuators: names, values, limits and the watchdog in one place."""
+"""The last word before actuators: who commands, names, values, limits, slew, watchdog and e-stop in one place."""
 
 from __future__ import annotations
 
@@ -8,33 +8,59 @@ import numpy as np
 
 from fulmar_core.robot import Actuators, Rolling
 from fulmar_core.safety.command_gate import command_problem, name_problem
+from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 
 
 class ActuatorGuard:
-    """Holds the newest acceptable command for as long as the watchdog lets it.
+    """Holds the newest acceptable command for as long as the watchdog and the e-stop let it.
 
-    Not thread-safe; the caller holds a lock.
+    A person's command takes the actuators from the controller, and keeps them, also in silence, until the person gives
+    them back. Not thread-safe; the caller holds a lock.
+
+    Attributes:
+        command: The newest that was taken, whatever watchdog and e-stop say.
+        rejected: How many commands could not be carried out.
+        last_rejection: Why not the last of them.
+        person: Whether a person has the actuators.
     """
 
-    def __init__(self, actuators: Actuators, watchdog: Watchdog) -> None:
-        """Begin with the safe command."""
+    def __init__(
+        self,
+        actuators: Actuators,
+        watchdog: Watchdog,
+        *,
+        estop: EstopWatch | None = None,
+        control_dt: float = 0.0,
+    ) -> None:
+        """Begin with the safe command.
+
+        Args:
+            actuators: What they can take, and how fast they may follow.
+            watchdog: Ends a command that nobody repeats.
+            estop: Ends any command; none by default.
+            control_dt: Time between commands: what they may differ by follows from it; 0 for no such limit [s].
+        """
         self._actuators, self.watchdog = actuators, watchdog
-        self.command = actuators.safe_command  # the newest that was taken, whatever the watchdog says
+        self.estop = estop or EstopWatch(required=False)
+        self._control_dt = control_dt
         self.rejected = 0
         self.last_rejection = ""
-        self._stamp_ns = 0
+        self.reset()
 
     def reset(self) -> None:
-        """Forget the command: a plant that starts again begins with the safe one."""
+        """Forget the command: a plant that starts again begins with the safe one, and with the controller."""
         self.command = self._actuators.safe_command
+        self.person = False
         self._stamp_ns = 0
+        self._stopped_ns: int | None = None
+        self._taken_ns: int | None = None
         self.watchdog.reset()
 
     def offer(
         self, names: Sequence[str], values: Sequence[float], now_ns: int, *, stamp_ns: int | None = None
     ) -> bool:
-        """Take a command if it can be carried out.
+        """Take a controller's command if it can be carried out and no person has the actuators.
 
         A refused command does not feed the watchdog: a controller that sends nothing but nonsense counts as silent.
 
@@ -47,37 +73,119 @@ class ActuatorGuard:
         Returns:
             Whether it was taken.
         """
+        if self.person:
+            return False
         if self.watchdog.tripped:
             self._stamp_ns = 0  # one stray stamp from the future must not lock everybody out for good
-        command = np.asarray(values, dtype=float)
-        problem = (
-            name_problem(names, self._actuators.names)
-            or command_problem(command, len(self._actuators.names))
-            or self._stamp_problem(stamp_ns or 0)
-        )
-        if problem:
-            self.rejected += 1
-            self.last_rejection = problem
+        if not self._check(names, values, self._stamp_problem(stamp_ns or 0)):
             return False
-        self.command = self._actuators.limited(command)
+        answers_anew = bool(stamp_ns) and (stamp_ns or 0) > self._stamp_ns
+        self._take(values, now_ns, self._control_dt if answers_anew else None)
         self._stamp_ns = stamp_ns or self._stamp_ns
-        self.watchdog.feed(now_ns)
         return True
+
+    def offer_by_hand(self, names: Sequence[str], values: Sequence[float], now_ns: int) -> bool:
+        """Take a person's command if it can be carried out, and the actuators with it; arguments as of `offer`."""
+        if not self._check(names, values, None):
+            return False
+        if not self.person:
+            self.person = True
+            self.command = self._actuators.safe_command  # what the controller wanted is over
+        self._take(values, now_ns, None)
+        return True
+
+    def give_back(self, now_ns: int) -> str:
+        """Give the actuators back to the controller.
+
+        Args:
+            now_ns: Steady clock [ns].
+
+        Returns:
+            Why the person keeps them; empty if they are given back.
+        """
+        if not self.person:
+            return "nobody has taken the actuators"
+        if np.any(self.output(now_ns) != self._actuators.safe_command):
+            return "refused: the last command by hand still moves the robot. Let go first."
+        self.reset()
+        return ""
 
     def output(self, now_ns: int) -> np.ndarray:
         """What to apply at this time of the steady clock [ns].
 
-        After a silence the safe command; wheels slow down to it as fast as they may, so that they do not lock.
+        After a silence and under the e-stop the safe command; wheels slow down to it as fast as they may, so that they
+        do not lock.
         """
-        if not self.watchdog.expired(now_ns):
+        since_ns = self._ended_ns(now_ns)
+        if since_ns is None:
             return self.command
         slew = self._actuators.response.slew
         if not slew or not isinstance(self._actuators, Rolling):
             return self._actuators.safe_command
-        since_s = max(0, self.watchdog.silent_ns(now_ns) - self.watchdog.timeout_ns) / 1e9
+        since_s = max(0, now_ns - since_ns) / 1e9
         left = np.maximum(np.abs(self.command) - since_s * np.asarray(slew), 0.0)
         slowed: np.ndarray = np.where(left > 0.0, np.copysign(left, self.command), 0.0)
         return slowed
+
+    def answer(self, now_ns: int) -> np.ndarray:
+        """What to apply in lock step, where time stands still between commands and only the e-stop may end one."""
+        return self._actuators.safe_command if self._stopped(now_ns) is not None else self.command
+
+    def _ended_ns(self, now_ns: int) -> int | None:
+        """When the command came to its end; None if it holds."""
+        ends = [self._stopped(now_ns)]
+        if self.watchdog.expired(now_ns):
+            ends.append(now_ns - self.watchdog.silent_ns(now_ns) + self.watchdog.timeout_ns)
+        return min((end for end in ends if end is not None), default=None)
+
+    def _stopped(self, now_ns: int) -> int | None:
+        """Since when the e-stop holds; None if it does not."""
+        if not self.estop.reason(now_ns):
+            self._stopped_ns = None
+        elif self._stopped_ns is None:
+            self._stopped_ns = now_ns
+        return self._stopped_ns
+
+    def _check(self, names: Sequence[str], values: Sequence[float], problem: str | None) -> bool:
+        count = len(self._actuators.names)
+        if len(values) > count:  # before anything is made of what may be millions
+            problem = f"command has {len(values)} values, must have {count}"
+        else:
+            command = np.asarray(values, dtype=float)
+            problem = name_problem(names, self._actuators.names) or command_problem(command, count) or problem
+        if problem:
+            self.rejected += 1
+            self.last_rejection = problem
+        return not problem
+
+    def _take(self, values: Sequence[float], now_ns: int, seconds: float | None) -> None:
+        """Take a good command; `seconds` is the time it has had to change in, None for that since the last one."""
+        if self._stopped(now_ns) is not None:
+            if not isinstance(self._actuators, Rolling) or not np.any(self.output(now_ns)):
+                self.command = self._actuators.safe_command  # nothing is left to slow down from
+        else:
+            if self.watchdog.expired(now_ns):
+                self.command = self.output(now_ns)  # where wheels have slowed down to
+            self.command = self._slewed(np.asarray(values, dtype=float), now_ns, seconds)
+        self._taken_ns = now_ns
+        self.watchdog.feed(now_ns)
+
+    def _slewed(self, values: np.ndarray, now_ns: int, seconds: float | None) -> np.ndarray:
+        """Within the limits, and no further from the command before than actuators follow."""
+        wanted: np.ndarray = self._actuators.limited(values)
+        slew = self._actuators.response.slew
+        if not slew or not self._control_dt:
+            return wanted
+        if seconds is None:
+            since_s = self._control_dt if self._taken_ns is None else (now_ns - self._taken_ns) / 1e9
+            seconds = min(self._control_dt, since_s)
+        most = seconds * np.asarray(slew) * (1.0 + 1e-9)
+        # Who keeps to the limit already gets the very command, to the last bit.
+        within = np.abs(wanted - self.command) <= most
+        near: np.ndarray = np.where(
+            within, wanted, self.command + np.clip(wanted - self.command, -most, most)
+        )
+        return near
 
     def _stamp_problem(self, stamp_ns: int) -> str | None:
         if stamp_ns and stamp_ns < self._stamp_ns:

@@ -30,6 +30,10 @@ class Flags:
     goal_distance: float = 0.0  # [m]
     geofence: float = float("inf")  # [m]
     lacking: str = "goal"  # what there is none of yet, where `has_goal` is false
+    estop: str = ""  # why the emergency stop holds, empty if it does not
+    outside: str = ""  # how the robot left the area that it may be in, empty if it did not
+    active_s: float = 0.0  # how long it has been acting [s]
+    max_run_time_s: float = 0.0  # and how long it may; 0: for ever [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +61,10 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
         return Decision(Mode.UNCONFIGURED, False, "not configured")
     if not flags.activated:
         return Decision(Mode.IDLE, False, "not activated")
+    if flags.estop:
+        return Decision(Mode.ARMED, False, flags.estop)
+    if 0.0 < flags.max_run_time_s < flags.active_s:
+        return Decision(Mode.ARMED, False, f"max_run_time of {flags.max_run_time_s:g} s is over")
     if flags.last_input_ns is None:
         return Decision(Mode.ARMED, False, flags.input_problem or "no odom yet. Is the plant running?")
     age_ns = now_ns - flags.last_input_ns
@@ -68,6 +76,8 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
         )
     if flags.input_problem:
         return Decision(Mode.ARMED, False, flags.input_problem)
+    if flags.outside:
+        return Decision(Mode.ARMED, False, flags.outside)
     if not flags.has_goal:
         return Decision(Mode.ARMED, False, f"no {flags.lacking} yet")
     if not flags.goal_distance <= flags.geofence:  # so that a distance that is not a number is beyond it too

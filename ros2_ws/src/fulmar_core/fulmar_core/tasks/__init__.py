@@ -54,3 +54,8 @@ def load_task(name: str) -> Task:
             f"{path}: 'name' is '{task.name}', the file's own name is '{name}'. Make them equal."
         )
     return task
+
+
+def sees_obstacles(task: Task) -> bool:
+    """Whether a controller of this task must be told what stands about."""
+    return isinstance(task, GoToPositionWithObstacles)

@@ -14,7 +14,7 @@ from fulmar_bringup.benchmark.drift.physics import Physics
 from fulmar_bringup.benchmark.drift.published import FIGURES, TRACKING, published
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.pairs import Pair
-from fulmar_bringup.provenance import fulmar_version, git_revision
+from fulmar_ros.provenance import fulmar_version, git_revision
 
 if TYPE_CHECKING:
     from fulmar_bringup.benchmark.drift.campaign import Request

@@ -1,0 +1,114 @@
+"""Commands of other stacks for our robots: their messages in, our wires out."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Twist, TwistStamped
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from std_srvs.srv import SetBool
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.robot import load_robot
+from fulmar_core.topics import VELOCITY_COMMAND, command_wire
+from fulmar_ros.air_bearing import SERVICE
+from fulmar_ros.convert import TwistWriter, VectorWriter
+from fulmar_ros.parameters import read_parameters
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import RequestExit, run_node
+from hardware_drivers.settings import ThrustTopic, ValveTopic, VelocityTopic, load_hardware
+from hardware_drivers.valve_message import from_message
+
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches whatever they offer
+NO_STAMP = 0  # they answer no observation of ours
+
+
+@dataclass(frozen=True)
+class AdapterSettings:
+    """ROS parameters of an adapter node."""
+
+    hardware: str = (
+        ""  # a file of configs/hardware with the driver `valve_topic`, `velocity_topic` or `thrust_topic`
+    )
+    topic: str = ""  # hear this instead of the file's topic
+
+
+class AdapterNode(Node):
+    """Hears what a controller of another stack commands, and commands the same on our wires.
+
+    It holds nothing back and repeats nothing: when they fall silent, so does it, and the watchdog acts.
+    """
+
+    def __init__(self, _request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
+        """Create both ends.
+
+        Raises:
+            ConfigError: A parameter is wrong, or the hardware file has another driver.
+        """
+        super().__init__("adapter", cli_args=cli_args)
+        settings = read_parameters(self, AdapterSettings)
+        if not settings.hardware:
+            raise ConfigError("parameter 'hardware' of node 'adapter' names no file of configs/hardware.")
+        hardware = load_hardware(settings.hardware)
+        self._robot = load_robot(hardware.robot)
+        driver = hardware.driver
+        if not isinstance(driver, (ValveTopic, VelocityTopic, ThrustTopic)):
+            raise ConfigError(f"{settings.hardware}: driver '{driver.kind}' is no message of another stack.")
+        self._order = driver.order if isinstance(driver, ValveTopic) else ()
+        wire = command_wire(self._robot)
+        self._write = TwistWriter() if wire is VELOCITY_COMMAND else VectorWriter(self._robot.actuators.names)
+        kind = TwistStamped if wire is VELOCITY_COMMAND else JointState
+        self._publisher = self.create_publisher(kind, wire.name, publisher_qos(wire))
+        self._bearing: bool | None = None
+        self._enable = self.create_client(SetBool, SERVICE) if self._order else None
+        heard, take = self._ear(driver)
+        self.create_subscription(heard, settings.topic or driver.topic, take, NEWEST)
+
+    def _ear(self, driver: ValveTopic | VelocityTopic | ThrustTopic) -> tuple[type, Callable[[Any], None]]:
+        if isinstance(driver, ValveTopic):
+            return Int16MultiArray, self._valves
+        if isinstance(driver, ThrustTopic):
+            return Float32MultiArray, lambda message: self._pass_on(np.array(message.data, dtype=float))
+        if driver.stamped:
+            return TwistStamped, lambda message: self._velocity(message.twist)
+        return Twist, self._velocity
+
+    def _velocity(self, twist: Twist) -> None:
+        self._pass_on(np.array([twist.linear.x, twist.angular.z]))
+
+    def _valves(self, message: Int16MultiArray) -> None:
+        wanted = from_message(message.data.tolist(), self._order)
+        if wanted is None:
+            self._refuse(f"{len(message.data)} values, not {len(self._order) + 1} zeros and ones")
+            return
+        bearing, valves = wanted
+        if bearing is not self._bearing and self._enable is not None and self._enable.service_is_ready():
+            self._enable.call_async(SetBool.Request(data=bearing))
+            self._bearing = bearing
+        self._pass_on(valves)
+
+    def _pass_on(self, command: np.ndarray) -> None:
+        if len(command) != len(self._robot.actuators.names) or not all(map(math.isfinite, command)):
+            self._refuse(f"{len(command)} values, not {len(self._robot.actuators.names)} finite ones")
+            return
+        self._publisher.publish(self._write.write(command, NO_STAMP))
+
+    def _refuse(self, what: str) -> None:
+        self.get_logger().warning(f"command refused: {what}", throttle_duration_sec=1.0)
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    sys.exit(run_node(AdapterNode))
+
+
+if __name__ == "__main__":
+    main()

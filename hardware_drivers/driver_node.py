@@ -1,0 +1,122 @@
+"""The process that moves a real robot: a device behind the plant's wires."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+
+from fulmar_core.backend import AirBearing, Backend, Device
+from fulmar_core.errors import ConfigError
+from fulmar_core.robot import Robot
+from fulmar_ros.air_bearing import AirBearingWires
+from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_sender
+from fulmar_ros.plant_node import DONE, PlantNode
+from fulmar_ros.plant_settings import PlantSettings
+from fulmar_ros.runtime import RequestExit, run_node
+from hardware_drivers.devices import make_device
+from hardware_drivers.settings import Hardware, ThrustTopic, ValveTopic, VelocityTopic, load_hardware
+from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
+from hardware_drivers.valve_message import to_message
+
+
+@dataclass(frozen=True)
+class DriverSettings(PlantSettings):
+    """ROS parameters of a driver node."""
+
+    backend: str = "hardware"
+    hardware: str = ""  # a name of configs/hardware, or a path that ends in .yaml
+    port: str = ""  # takes the place of the hardware file's port
+    connect_s: float = 10.0  # wait so long for the device [s]
+
+    def __post_init__(self) -> None:
+        """Refuse what a real device cannot do."""
+        super().__post_init__()
+        if self.lockstep or self.rate != 1.0:
+            raise ValueError(
+                "a real device neither waits nor hurries: lockstep and rate have no meaning here."
+            )
+        if not self.hardware:
+            raise ValueError("'hardware' names no file: give a name of configs/hardware, or a path.")
+
+    @property
+    def publishes_odometry(self) -> bool:
+        """Whether the device knows where it is, and nobody else is asked for it."""
+        return super().publishes_odometry and load_hardware(self.hardware).measures_odometry
+
+
+class DriverNode(PlantNode):
+    """The plant node with a machine for its backend, and with what machines have besides: a bearing, a health."""
+
+    settings: DriverSettings
+    _air: AirBearingWires | None = None
+
+    def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
+        """Read the parameters and, unless told otherwise, start.
+
+        Raises:
+            FulmarError: If a parameter or a configuration file is wrong.
+        """
+        super().__init__(
+            self._make_device, request_exit, simulated=False, settings_class=DriverSettings, cli_args=cli_args
+        )
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Connect to the device."""
+        outcome = super().on_configure(state)
+        device = self._backend
+        if outcome == DONE and device is not None:
+            self.health.more = device.health  # type: ignore[attr-defined]
+            if isinstance(device, AirBearing):
+                self._air = AirBearingWires(self, device)
+        return outcome
+
+    def stop(self) -> None:
+        """Last words, also of the bearing."""
+        super().stop()
+        if self._air is not None:
+            self._air.tell()
+
+    def _dismantle(self) -> None:
+        super()._dismantle()
+        self.health.more = dict
+        if self._air is not None:
+            self._air.destroy(self)
+            self._air = None
+
+    def _motion_capture(self) -> None:
+        """The room has its own; a device stands in for none."""
+
+    def _make_device(self, robot: Robot, settings: PlantSettings) -> Backend:
+        assert isinstance(settings, DriverSettings)
+        hardware = load_hardware(settings.hardware)
+        if hardware.robot != robot.name:
+            raise ConfigError(f"{settings.hardware} is of '{hardware.robot}', the robot is '{robot.name}'.")
+        by_topic = self._by_topic(robot, hardware)
+        return by_topic or make_device(robot, hardware, port=settings.port, patience_s=settings.connect_s)
+
+    def _by_topic(self, robot: Robot, hardware: Hardware) -> Device | None:
+        driver = hardware.driver
+        if isinstance(driver, VelocityTopic):
+            return TopicDriver(robot, velocity_sender(self, driver.topic, stamped=driver.stamped))
+        if isinstance(driver, ThrustTopic):
+            return TopicDriver(robot, thrust_sender(self, driver.topic))
+        if isinstance(driver, ValveTopic):
+            publish = valve_sender(self, driver.topic)
+
+            def send(valves: np.ndarray, bearing: bool) -> None:
+                publish(to_message(valves, bearing=bearing, order=driver.order))
+
+            return ValveTopicDriver(robot, send, bearing_on=driver.bearing_on_at_start)
+        return None
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    sys.exit(run_node(DriverNode))
+
+
+if __name__ == "__main__":
+    main()

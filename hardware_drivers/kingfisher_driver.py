@@ -1,0 +1,113 @@
+"""A Kingfisher behind the backend seam."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from fulmar_core.backend import Sample
+from fulmar_core.episode import Episode
+from fulmar_core.robot import Robot
+from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.state import RigidBodyState
+from hardware_drivers import kingfisher_protocol as protocol
+from hardware_drivers.attitude import attitude
+from hardware_drivers.device_time import DeviceTime
+from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.local_frame import LocalFrame
+from hardware_drivers.nmea import Decoder
+from hardware_drivers.ports import Reader, open_port
+from hardware_drivers.settings import KingfisherNmea
+
+DAY_MS = 86_400_000
+STOPS = 5
+
+
+class KingfisherDriver:
+    """Drives by `$PYDIR`, measures by `$CPNVG`, `$CPNVR` and `$CPIMU`."""
+
+    def __init__(self, robot: Robot, settings: KingfisherNmea, *, patience_s: float) -> None:
+        """Open the port and wait for the first fix.
+
+        Raises:
+            DeviceError: Nothing is there, or it has no fix.
+        """
+        self.robot, self._settings = robot, settings
+        self._shift = np.zeros(3)  # from where the frame begins to where `odom` does [m]
+        self._feedback = Feedback(f"boat at {settings.port}", settings.silent_s)
+        self._decoder, self._time = Decoder(), DeviceTime(DAY_MS)
+        origin = settings.origin
+        self._frame = LocalFrame(origin.latitude, origin.longitude) if origin else None
+        self._rates: protocol.Rates | None = None
+        self._imu: ImuSample | None = None
+        self._voltage = ""
+        self._port = open_port(settings.port, settings.baud, patience_s)
+        self._reader = Reader(self._port, self._take, self._feedback.fail)
+        try:
+            self._feedback.wait(patience_s)
+        except Exception:
+            self.close()
+            raise
+
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
+        """Without an origin, take the place of the episode for where the boat is; see `Backend.reset`."""
+        if self._settings.origin is None:
+            here = self._feedback.newest.odometry.position_in_world - self._shift
+            self._shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
+        return self.step(self.robot.actuators.safe_command)
+
+    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+        """Send a command; see `Backend.step`."""
+        shares = np.asarray(command, dtype=float)
+        self._port.write(protocol.drive(float(shares[0]), float(shares[1])))
+        return self._feedback.sample(shares)
+
+    def make_safe(self) -> None:
+        """Stop both propellers."""
+        for _ in range(STOPS):
+            self._port.write(protocol.drive(0.0, 0.0))
+
+    def close(self) -> None:
+        """Stop, and let go of the port."""
+        try:
+            self.make_safe()
+        except OSError:
+            pass  # it is gone; the boat stops by its own timeout
+        finally:
+            self._reader.stop()
+
+    def health(self) -> dict[str, str]:
+        """Battery and lost sentences; see `Device.health`."""
+        return {"battery_v": self._voltage, "lost_sentences": str(self._decoder.lost), "warning": ""}
+
+    def _take(self, data: bytes) -> None:
+        now_ns = time.time_ns()
+        for fields in self._decoder.feed(data):
+            message = protocol.read(fields)
+            if isinstance(message, protocol.Rates):
+                self._rates = message
+            elif isinstance(message, protocol.Inertial):
+                self._imu = message.reading
+            elif isinstance(message, protocol.Battery):
+                self._voltage = f"{message.voltage:.1f}"
+            elif isinstance(message, protocol.Fix):
+                self._report(message, now_ns)
+
+    def _report(self, fix: protocol.Fix, now_ns: int) -> None:
+        rates = self._rates
+        # Velocities come beside the fix; without fresh ones there is no state to report.
+        if rates is None or abs(fix.time_s - rates.time_s) > protocol.OLDEST_SPEED_S:
+            return
+        if self._frame is None:
+            self._frame = LocalFrame(fix.latitude, fix.longitude)
+        east, north = self._frame.metres(fix.latitude, fix.longitude)
+        turn = np.array([0.0, 0.0, -math.radians(rates.yaw_rate)])
+        state = RigidBodyState(
+            np.array([east, north, 0.0]) + self._shift,
+            attitude(*(math.radians(angle) for angle in (fix.roll, fix.pitch, fix.heading))),
+            np.array([rates.east, rates.north, 0.0]),
+            turn,
+        )
+        self._feedback.put(Report(state, self._imu, self._time.stamp_ns(1e3 * fix.time_s, now_ns)))

@@ -1,0 +1,145 @@
+"""Sentences of the Kingfisher's front seat, the host's side.
+
+Clearpath's boats of this family (Kingfisher, Heron, M200) take `$PYDIR,left,right` in percent, and report place and
+attitude (`$CPNVG`), velocities (`$CPNVR`) and the inertial unit (`$CPIMU`). No specification is public; the fields are
+those that the open iM200 application of MOOS-IvP reads, and its recording of a real boat is a test of ours.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.sensors.imu import ImuSample
+from hardware_drivers.nmea import sentence
+
+GRAVITY = 9.80665  # [m/s²]; the recorded boat reports accelerations in multiples of it, with z down
+DAY_S = 86400.0
+OLDEST_SPEED_S = 0.5  # a velocity that came longer before a position says nothing about it
+
+
+@dataclass(frozen=True)
+class Fix:
+    """`$CPNVG`: where the boat is and how it lies."""
+
+    time_s: float  # of the day, UTC [s]
+    latitude: float  # [deg]
+    longitude: float  # [deg]
+    heading: float  # clockwise from true north [deg]
+    roll: float  # starboard down [deg]
+    pitch: float  # bow up [deg]
+
+
+@dataclass(frozen=True)
+class Rates:
+    """`$CPNVR`: how the boat moves."""
+
+    time_s: float
+    east: float  # [m/s]
+    north: float  # [m/s]
+    yaw_rate: float  # clockwise from above [deg/s]
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """`$CPIMU`, in the axes of ROS: x ahead, y to port, z up."""
+
+    time_s: float
+    reading: ImuSample
+
+
+@dataclass(frozen=True)
+class Battery:
+    """`$CPRBS`: one battery."""
+
+    voltage: float  # [V]
+
+
+Message = Fix | Rates | Inertial | Battery
+
+
+def drive(left: float, right: float) -> bytes:
+    """The sentence that makes the propellers turn.
+
+    Args:
+        left: Share of full thrust, -1 to 1.
+        right: Same.
+    """
+    shares = (max(-100.0, min(100.0, 100.0 * share)) for share in (left, right))
+    return sentence("PYDIR," + ",".join(f"{share:.1f}" for share in shares))
+
+
+def read(fields: list[str]) -> Message | None:
+    """Understand a sentence.
+
+    Args:
+        fields: Of a sound sentence, its name first.
+
+    Returns:
+        What it says; None where it says nothing that a driver needs, no fix included, or nonsense.
+    """
+    reader = READERS.get(fields[0])
+    try:
+        message = reader(fields) if reader else None
+    except (ValueError, IndexError):
+        return None
+    return message
+
+
+def _fix(fields: list[str]) -> Fix | None:
+    if fields[6] != "1" or fields[3] not in ("N", "S") or fields[5] not in ("E", "W"):
+        return None
+    latitude = _degrees(fields[2]) * (1.0 if fields[3] == "N" else -1.0)
+    longitude = _degrees(fields[4]) * (1.0 if fields[5] == "E" else -1.0)
+    if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        return None
+    heading, roll, pitch = (_number(field) for field in fields[9:12])
+    return Fix(_time(fields, 12), latitude, longitude, heading, roll, pitch)
+
+
+def _rates(fields: list[str]) -> Rates:
+    return Rates(_time(fields, -1), _number(fields[2]), _number(fields[3]), _number(fields[7]))
+
+
+def _inertial(fields: list[str]) -> Inertial:
+    wx, wy, wz, ax, ay, az = (_number(field) for field in fields[2:8])
+    turn = np.radians((wx, -wy, -wz))
+    return Inertial(_time(fields, 8), ImuSample(GRAVITY * np.array([ax, -ay, -az]), turn))
+
+
+def _battery(fields: list[str]) -> Battery:
+    return Battery(_number(fields[3]))
+
+
+READERS = {"CPNVG": _fix, "CPNVR": _rates, "CPIMU": _inertial, "CPRBS": _battery}
+
+
+def _number(text: str) -> float:
+    """A finite number, as NMEA writes it; raises ValueError."""
+    value = float(text)
+    if not math.isfinite(value) or "_" in text:
+        raise ValueError(text)
+    return value
+
+
+def _degrees(text: str) -> float:
+    """Degrees and minutes in one number, as in 4221.711142."""
+    value = _number(text)
+    degrees, minutes = divmod(value, 100.0)
+    if value < 0.0 or minutes >= 60.0:
+        raise ValueError(text)
+    return degrees + minutes / 60.0
+
+
+def _time(fields: list[str], own: int) -> float:
+    """Time of the measurement where the sentence has one, else of the sentence, as in 164958.858 [s of the day]."""
+    text = fields[own] if 0 < own < len(fields) and fields[own] else fields[1]
+    value = _number(text)
+    hours, rest = divmod(value, 10000.0)
+    minutes, seconds = divmod(rest, 100.0)
+    time_s = 3600.0 * hours + 60.0 * minutes + seconds
+    if not value >= 0.0 or minutes >= 60.0 or not time_s < DAY_S + 2.0:
+        raise ValueError(text)
+    return time_s

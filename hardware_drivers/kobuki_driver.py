@@ -1,0 +1,141 @@
+"""A Kobuki base behind the backend seam."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from fulmar_core.backend import Sample
+from fulmar_core.episode import Episode
+from fulmar_core.robot import Robot
+from fulmar_core.sensors.imu import ImuSample
+from hardware_drivers.device_time import DeviceTime
+from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.kobuki_protocol import (
+    COUNT,
+    WHEEL_RADIUS,
+    WRAP_MS,
+    CoreSensors,
+    Decoder,
+    Inertia,
+    base_control,
+)
+from hardware_drivers.ports import Reader, open_port
+from hardware_drivers.settings import Kobuki
+from hardware_drivers.wheel_odometry import WheelOdometry
+
+LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous
+STOPS = 5  # the stop goes out this often on the way out
+ABSENT = np.full(3, np.nan)  # the base has no accelerometer
+
+
+class KobukiDriver:
+    """Drives by base control, measures by encoders and gyroscope.
+
+    While a bumper or a cliff sensor answers, the base stands, or backs off straight; while a wheel hangs in the air, it
+    stands.
+    """
+
+    def __init__(self, robot: Robot, settings: Kobuki, *, patience_s: float) -> None:
+        """Open the port and wait for the first report.
+
+        Raises:
+            DeviceError: Nothing is there, or it does not speak Kobuki's protocol.
+        """
+        self.robot = robot
+        self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
+        self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
+        self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
+        self._begin: tuple[float, float, float] | None = None
+        self._core: CoreSensors | None = None
+        self._port = open_port(settings.port, settings.baud, patience_s)
+        self._reader = Reader(self._port, self._take, self._feedback.fail)
+        try:
+            self._feedback.wait(patience_s)
+        except Exception:
+            self.close()
+            raise
+
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
+        """Take the pose of the episode for where the base stands; see `Backend.reset`."""
+        start = episode.start
+        self._begin = (float(start.x), float(start.y), float(start.yaw))  # taken by the reading thread
+        deadline = time.monotonic() + 1.0
+        while self._begin is not None and time.monotonic() < deadline:
+            time.sleep(0.002)
+        return self.step(self.robot.actuators.safe_command)
+
+    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+        """Send a command, or a stop where something is in the way; see `Backend.step`."""
+        allowed = self._allowed(np.asarray(command, dtype=float))
+        self._port.write(base_control(float(allowed[0]), float(allowed[1])))
+        return self._feedback.sample(allowed)
+
+    def make_safe(self) -> None:
+        """Stop."""
+        for _ in range(STOPS):
+            self._port.write(base_control(0.0, 0.0))
+
+    def close(self) -> None:
+        """Stop, and let go of the port."""
+        try:
+            self.make_safe()
+        except OSError:
+            pass  # it is gone; the base stops by its own timeout
+        finally:
+            self._reader.stop()
+
+    def health(self) -> dict[str, str]:
+        """Battery and what touches; see `Device.health`."""
+        core = self._core
+        if core is None:
+            return {}
+        warning = _touched(core) or (f"battery at {core.battery:.1f} V" if core.battery < LOW_BATTERY else "")
+        return {
+            "battery_v": f"{core.battery:.1f}",
+            "bumpers": str(core.bumpers),
+            "cliffs": str(core.cliffs),
+            "wheel_drops": str(core.wheel_drops),
+            "lost_bytes": str(self._decoder.lost),
+            "warning": warning,
+        }
+
+    def _allowed(self, command: np.ndarray) -> np.ndarray:
+        core = self._core
+        if core is None or core.wheel_drops:
+            return np.zeros(2)
+        if core.bumpers or core.cliffs:
+            return np.array([min(0.0, command[0]), 0.0])
+        return command
+
+    def _take(self, data: bytes) -> None:
+        now_ns = time.time_ns()
+        for packet in self._decoder.feed(data):
+            if packet.core is not None:
+                self._core = packet.core
+            if packet.core is not None and packet.inertia is not None:
+                self._report(packet.core, packet.inertia, now_ns)
+
+    def _report(self, core: CoreSensors, inertia: Inertia, now_ns: int) -> None:
+        begin, stamp_ns = self._begin, self._time.stamp_ns(core.time_ms, now_ns)
+        if begin is not None:
+            self._odometry.begin(*begin)
+        rate = math.radians(inertia.rate)
+        gyro = math.radians(inertia.angle)
+        state = self._odometry.see(core.left, core.right, gyro, rate, stamp_ns / 1e9)
+        imu = ImuSample(ABSENT, np.array([0.0, 0.0, rate]))
+        self._feedback.put(Report(state, imu, stamp_ns))
+        if begin is not None:
+            self._begin = None  # only now: who waits for it shall find the new place
+
+
+def _touched(core: CoreSensors) -> str:
+    if core.wheel_drops:
+        return "a wheel hangs in the air: the base stands"
+    if core.cliffs:
+        return "a cliff sensor sees no floor: the base only backs off"
+    if core.bumpers:
+        return "a bumper is pressed: the base only backs off"
+    return ""

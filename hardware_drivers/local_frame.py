@@ -1,0 +1,27 @@
+"""Places on Earth as metres east and north of an origin."""
+
+from __future__ import annotations
+
+import math
+
+# WGS 84.
+EQUATOR_M = 6378137.0
+FLATTENING = 1.0 / 298.257223563
+
+
+class LocalFrame:
+    """The plane that touches the ellipsoid at an origin; within some kilometres it is as good as the ellipsoid."""
+
+    def __init__(self, latitude: float, longitude: float) -> None:
+        """Put the origin [deg, deg]; not at a pole."""
+        self._latitude, self._longitude = latitude, longitude
+        square = FLATTENING * (2.0 - FLATTENING)
+        sine = math.sin(math.radians(latitude))
+        bend = 1.0 - square * sine * sine
+        self._north = math.radians(1.0) * EQUATOR_M * (1.0 - square) / bend**1.5  # metres a degree
+        self._east = math.radians(1.0) * EQUATOR_M / math.sqrt(bend) * math.cos(math.radians(latitude))
+
+    def metres(self, latitude: float, longitude: float) -> tuple[float, float]:
+        """East and north of the origin [m, m], the short way round [deg, deg]."""
+        east = (longitude - self._longitude + 180.0) % 360.0 - 180.0
+        return east * self._east, (latitude - self._latitude) * self._north

@@ -1,0 +1,215 @@
+"""A boat with ArduPilot behind the backend seam, by MAVLink."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from typing import Any
+
+# MAVLink 2 carries the messages that ArduPilot speaks today; pymavlink reads this when it is imported.
+os.environ.setdefault("MAVLINK20", "1")
+
+import numpy as np
+from pymavlink import mavutil
+
+from fulmar_core.backend import Sample
+from fulmar_core.episode import Episode
+from fulmar_core.errors import DeviceError
+from fulmar_core.robot import Robot
+from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.state import RigidBodyState
+from hardware_drivers.attitude import attitude
+from hardware_drivers.device_time import DeviceTime
+from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.settings import MavlinkBoat
+
+HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
+HEARTBEAT_S = 1.0
+NO_CHANGE = 65535  # of a channel in an override
+MILLI_G = 9.80665e-3  # [m/s²]
+STOPS = 5
+RATES_HZ = {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 50.0, "RAW_IMU": 25.0}
+FRESH_MS = 200.0  # an attitude that differs more in time says nothing about a position
+
+
+class MavlinkDriver:
+    """Drives by overriding two RC channels in MANUAL mode, measures by the autopilot's own estimate.
+
+    ArduPilot mixes steering and throttle into two motors: left is throttle + steering, right throttle - steering.
+    """
+
+    def __init__(self, robot: Robot, settings: MavlinkBoat, *, patience_s: float) -> None:
+        """Open the link, wait for the autopilot, and ask for what is needed.
+
+        Raises:
+            DeviceError: Nobody answers.
+        """
+        self.robot, self._settings = robot, settings
+        self._shift = np.zeros(3)  # from where the autopilot's frame begins to where `odom` does [m]
+        self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
+        self._time = DeviceTime()
+        self._attitude: Any = None
+        self._imu: ImuSample | None = None
+        self._voltage, self._armed = "", False
+        self._sending = threading.Lock()
+        self._over = threading.Event()
+        try:
+            self._link: Any = mavutil.mavlink_connection(
+                settings.port,
+                baud=settings.baud,
+                source_system=HOST_SYSTEM,
+                source_component=HOST_COMPONENT,
+                autoreconnect=False,
+                robust_parsing=True,
+            )
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"{settings.port} cannot be opened: {error}.") from error
+        if self._link.wait_heartbeat(timeout=patience_s) is None:
+            self._link.close()
+            raise DeviceError(f"autopilot at {settings.port}: no heartbeat for {patience_s:g} s. Is it on?")
+        self._prepare()
+        self._thread = threading.Thread(target=self._run, name="mavlink reader", daemon=True)
+        self._thread.start()
+        try:
+            self._feedback.wait(patience_s)
+        except Exception:
+            self.close()
+            raise
+
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
+        """Take the place of the episode for where the boat is, and arm; see `Backend.reset`."""
+        here = self._feedback.newest.odometry.position_in_world - self._shift
+        self._shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
+        self._drive(0.0, 0.0)
+        self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        return self.step(self.robot.actuators.safe_command)
+
+    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+        """Send a command; see `Backend.step`."""
+        left, right = (float(share) for share in command)
+        self._drive(left, right)
+        return self._feedback.sample(np.array([left, right]))
+
+    def make_safe(self) -> None:
+        """Stop both propellers."""
+        for _ in range(STOPS):
+            self._drive(0.0, 0.0)
+
+    def close(self) -> None:
+        """Stop, disarm, and let go of the link."""
+        try:
+            self.make_safe()
+            self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        except OSError:
+            pass  # it is gone; the autopilot stops by its own failsafe
+        finally:
+            self._over.set()
+            self._thread.join(0.5)
+            self._link.close()
+
+    def health(self) -> dict[str, str]:
+        """Battery and arming; see `Device.health`."""
+        warning = "" if self._armed else "the autopilot is not armed: its propellers stand"
+        return {"battery_v": self._voltage, "armed": str(self._armed).lower(), "warning": warning}
+
+    def _prepare(self) -> None:
+        mavlink = mavutil.mavlink
+        for name, rate in RATES_HZ.items():
+            kind = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
+            self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
+        manual = 0  # of ArduPilot's rover and boat modes
+        self._command(
+            mavlink.MAV_CMD_DO_SET_MODE, float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(manual)
+        )
+
+    def _command(self, number: int, first: float, second: float = 0.0) -> None:
+        link = self._link
+        with self._sending:
+            link.mav.command_long_send(
+                link.target_system, link.target_component, number, 0, first, second, 0.0, 0.0, 0.0, 0.0, 0.0
+            )
+
+    def _drive(self, left: float, right: float) -> None:
+        settings, link = self._settings, self._link
+        channels = [NO_CHANGE] * 8
+        shares = {
+            settings.steering_channel: 0.5 * (left - right),
+            settings.throttle_channel: 0.5 * (left + right),
+        }
+        for channel, share in shares.items():
+            channels[channel - 1] = settings.trim_us + round(settings.span_us * max(-1.0, min(1.0, share)))
+        with self._sending:
+            link.mav.rc_channels_override_send(link.target_system, link.target_component, *channels)
+
+    def _run(self) -> None:
+        beaten = 0.0
+        while not self._over.is_set():
+            now = time.monotonic()
+            try:
+                if now - beaten >= HEARTBEAT_S:
+                    beaten = now
+                    self._beat()
+                message = self._link.recv_match(blocking=True, timeout=0.05)
+            except (OSError, mavutil.mavlink.MAVError) as error:
+                if not self._over.is_set():
+                    self._feedback.fail(f"the link is gone ({error})")
+                return
+            if message is not None and message.get_srcSystem() == self._link.target_system:
+                self._take(message, time.time_ns())
+
+    def _beat(self) -> None:
+        mavlink = mavutil.mavlink
+        with self._sending:
+            self._link.mav.heartbeat_send(
+                mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 0
+            )
+
+    def _take(self, message: Any, now_ns: int) -> None:
+        kind = message.get_type()
+        if kind == "ATTITUDE":
+            self._attitude = message
+        elif kind == "RAW_IMU":
+            ahead, right, down = message.xacc, message.yacc, message.zacc
+            turn = 1e-3 * np.array([message.xgyro, -message.ygyro, -message.zgyro])
+            self._imu = ImuSample(MILLI_G * np.array([ahead, -right, -down]), turn)
+        elif kind == "SYS_STATUS":
+            self._voltage = f"{1e-3 * message.voltage_battery:.1f}"
+        elif kind == "HEARTBEAT":
+            self._armed = bool(message.base_mode & mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        elif kind == "LOCAL_POSITION_NED" and self._attitude is not None:
+            state = state_of(message, self._attitude, self._shift)
+            if state is not None:
+                stamp_ns = self._time.stamp_ns(float(message.time_boot_ms), now_ns)
+                self._feedback.put(Report(state, self._imu, stamp_ns))
+
+
+def state_of(position: Any, attitude_of: Any, shift: np.ndarray) -> RigidBodyState | None:
+    """State in ROS' frames: from north-east-down and starboard to east-north-up and port.
+
+    Args:
+        position: LOCAL_POSITION_NED.
+        attitude_of: ATTITUDE.
+        shift: To add to the place, shape (3,) [m].
+
+    Returns:
+        The state; None where the two are of different times, or not finite.
+    """
+    if abs(position.time_boot_ms - attitude_of.time_boot_ms) > FRESH_MS:
+        return None
+    values = np.array(
+        [
+            position.x, position.y, position.z, position.vx, position.vy, position.vz,
+            attitude_of.roll, attitude_of.pitch, attitude_of.yaw,
+            attitude_of.rollspeed, attitude_of.pitchspeed, attitude_of.yawspeed,
+        ]
+    )  # fmt: skip
+    if not np.isfinite(values).all():
+        return None
+    north, east, down, vn, ve, vd, roll, pitch, yaw, p, q, r = values.tolist()
+    return RigidBodyState(
+        np.array([east, north, -down]) + shift,
+        attitude(roll, pitch, yaw),
+        np.array([ve, vn, -vd]),
+        np.array([p, -q, -r]),
+    )

@@ -1,0 +1,164 @@
+"""Byte streams to devices: a serial port or a TCP connection, read in a thread of its own, written without waiting."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import serial
+
+from fulmar_core.errors import ConfigError, DeviceError
+
+READ_S = 0.05  # how soon the reading thread hears that it shall end
+RETRY_S = 0.1
+CHUNK = 4096
+
+
+class Port(Protocol):
+    """A stream of bytes in both directions."""
+
+    def read(self) -> bytes:
+        """What has come, nothing after a short while without; raises OSError when the other side is gone."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send; raises OSError when that is not possible at once."""
+        ...
+
+    def close(self) -> None:
+        """Let go."""
+        ...
+
+
+class SerialPort:
+    """A serial port."""
+
+    def __init__(self, path: str, baud: int) -> None:
+        """Open it; raises OSError."""
+        self._port = serial.Serial(path, baud, timeout=READ_S, exclusive=True)
+
+    def read(self) -> bytes:
+        """See `Port`."""
+        return bytes(self._port.read(max(1, self._port.in_waiting)))
+
+    def write(self, data: bytes) -> None:
+        """See `Port`."""
+        # Not pyserial's own: it waits, or counts a late thread as a late device. The descriptor never blocks.
+        if os.write(self._port.fileno(), data) < len(data):
+            raise OSError("it does not take any more bytes")
+
+    def close(self) -> None:
+        """See `Port`."""
+        self._port.close()
+
+
+class TcpPort:
+    """A TCP connection to a device."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Connect; raises OSError."""
+        self._socket = socket.create_connection((host, port), timeout=2.0)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.settimeout(READ_S)
+
+    def read(self) -> bytes:
+        """See `Port`."""
+        try:
+            data = self._socket.recv(CHUNK)
+        except TimeoutError:
+            return b""
+        if not data:
+            raise OSError("the other side closed the connection")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """See `Port`."""
+        self._socket.sendall(data)
+
+    def close(self) -> None:
+        """See `Port`."""
+        self._socket.close()
+
+
+def open_port(address: str, baud: int, patience_s: float) -> Port:
+    """Open a device's port, and wait for it if it is not there yet.
+
+    Args:
+        address: Path of a serial port, or `tcp://host:port`.
+        baud: Of a serial port.
+        patience_s: Try again for so long [s].
+
+    Returns:
+        The open port.
+
+    Raises:
+        ConfigError: The address is none.
+        DeviceError: It cannot be opened.
+    """
+    make = _maker(address, baud)
+    until = time.monotonic() + patience_s
+    while True:
+        try:
+            return make()
+        except OSError as error:
+            if time.monotonic() > until:
+                reason = error.strerror or str(error)
+                raise DeviceError(
+                    f"{address} cannot be opened: {reason}. Is the device connected, and may this user use the port?"
+                ) from error
+        time.sleep(RETRY_S)
+
+
+def _maker(address: str, baud: int) -> Callable[[], Port]:
+    if not address.startswith("tcp://"):
+        return lambda: SerialPort(address, baud)
+    host, _, number = address.removeprefix("tcp://").rpartition(":")
+    if not host or not number.isdecimal() or not 0 < int(number) < 65536:
+        raise ConfigError(
+            f"port = '{address}' must be a serial port such as /dev/ttyUSB0, or tcp://host:port."
+        )
+    return lambda: TcpPort(host, int(number))
+
+
+class Reader:
+    """Hands whatever comes through a port to a function, in a thread of its own."""
+
+    def __init__(self, port: Port, take: Callable[[bytes], None], on_end: Callable[[str], None]) -> None:
+        """Start.
+
+        Args:
+            port: Where to read.
+            take: Told the bytes.
+            on_end: Told why the port is gone, once; not at `stop`.
+        """
+        self._port, self._take, self._on_end = port, take, on_end
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="device reader", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            try:
+                data = self._port.read()
+            except (
+                OSError,
+                TypeError,
+                AttributeError,
+            ) as error:  # pyserial's own ways to say that it was closed
+                if not self._over.is_set():
+                    self._on_end(f"the connection is gone ({error})")
+                return
+            if data:
+                self._take(data)
+
+    def stop(self) -> None:
+        """End the thread, then close the port."""
+        self._over.set()
+        self._thread.join(4 * READ_S)
+        with contextlib.suppress(OSError):
+            self._port.close()

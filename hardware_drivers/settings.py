@@ -1,0 +1,252 @@
+"""What is wired to a robot, as read from `configs/hardware/*.yaml`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from fulmar_core.config import load_config
+from fulmar_core.errors import ConfigError
+from fulmar_core.paths import config_names, config_path
+from fulmar_core.robot import Actuators, load_robot
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """The valve that feeds the air bearing."""
+
+    line: str  # name of its GPIO line, or its number
+    on_at_start: bool = True  # when the driver starts; else the service `air_bearing/enable` does it
+    linger_s: float = 1.0  # it carries the platform so long after the last valve has closed for good [s]
+    idle_off_s: float = (
+        0.0  # it is switched off after so long without an open valve, to save air; 0: never [s]
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse times without meaning."""
+        if min(self.linger_s, self.idle_off_s) < 0.0 or self.linger_s > 5.0:
+            raise ValueError("linger_s must be from 0 to 5 s, and idle_off_s must not be negative.")
+
+
+@dataclass(frozen=True)
+class GpioValves:
+    """Solenoid valves on lines of a GPIO chip, by libgpiod."""
+
+    kind: Literal["gpio_valves"]
+    port: str  # the chip, such as /dev/gpiochip0
+    lines: tuple[str, ...]  # names or numbers, in the order of the wiring
+    order: tuple[int, ...]  # which thruster, counted from 0, each of these lines opens
+    bearing: Bearing
+    active_low: bool = True
+    min_on_s: float = 0.0  # an opened valve stays open so long, except when all must close [s]
+
+    def __post_init__(self) -> None:
+        """Refuse two valves on one line, and times that would outlast a watchdog."""
+        every = (*self.lines, self.bearing.line)
+        if len(set(every)) != len(every):
+            raise ValueError("each valve and the bearing need a line of their own.")
+        if sorted(self.order) != list(range(len(self.lines))):
+            raise ValueError(f"'order' must hold each of 0 to {len(self.lines) - 1} once.")
+        if not 0.0 <= self.min_on_s <= 0.2:
+            raise ValueError("min_on_s must be from 0 to 0.2 s.")
+
+
+@dataclass(frozen=True)
+class ValveTopic:
+    """The SnT valve node: `std_msgs/Int16MultiArray` of nine, the bearing first."""
+
+    kind: Literal["valve_topic"]
+    topic: str
+    order: tuple[int, ...]  # which thruster, counted from 0, each entry after the first opens
+    bearing_on_at_start: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse orders that leave a valve out."""
+        if sorted(self.order) != list(range(len(self.order))):
+            raise ValueError(f"'order' must hold each of 0 to {len(self.order) - 1} once.")
+
+
+@dataclass(frozen=True)
+class Kobuki:
+    """The base of a Turtlebot2, by its serial protocol."""
+
+    kind: Literal["kobuki"]
+    port: str  # serial port
+    baud: int = 115200
+    silent_s: float = 0.3  # a base that reports nothing for so long is gone [s]
+
+
+@dataclass(frozen=True)
+class VelocityTopic:
+    """A base that somebody else drives: `geometry_msgs/Twist`, or TwistStamped."""
+
+    kind: Literal["velocity_topic"]
+    topic: str
+    stamped: bool
+
+
+@dataclass(frozen=True)
+class ThrustTopic:
+    """A boat that somebody else drives: `std_msgs/Float32MultiArray`, one share of full thrust a propeller."""
+
+    kind: Literal["thrust_topic"]
+    topic: str
+
+
+@dataclass(frozen=True)
+class Geodetic:
+    """A place on Earth (WGS 84)."""
+
+    latitude: float  # [deg]
+    longitude: float  # [deg]
+
+    def __post_init__(self) -> None:
+        """Refuse places that are not on Earth, and the poles, where east has no meaning."""
+        if not (abs(self.latitude) < 89.0 and abs(self.longitude) <= 180.0):
+            raise ValueError("latitude must be within 89° and longitude within 180°.")
+
+
+@dataclass(frozen=True)
+class Thrust:
+    """What a propeller gives at full command; asymmetric on most boats."""
+
+    ahead: float  # [N]
+    astern: float  # [N]
+
+    def __post_init__(self) -> None:
+        """Refuse propellers that do not push."""
+        if min(self.ahead, self.astern) <= 0.0:
+            raise ValueError("'ahead' and 'astern' must be greater than 0.")
+
+
+@dataclass(frozen=True)
+class KingfisherNmea:
+    """Kingfisher, Heron or M200, by the NMEA sentences of its front seat."""
+
+    kind: Literal["kingfisher_nmea"]
+    port: str  # serial port, or tcp://host:port
+    thrust: Thrust
+    origin: Geodetic | None = None  # where `odom` begins; None: at the first fix
+    baud: int = 115200
+    silent_s: float = 1.0  # a boat that reports nothing for so long is gone [s]
+
+
+@dataclass(frozen=True)
+class MavlinkBoat:
+    """A boat with ArduPilot and skid steering, by MAVLink."""
+
+    kind: Literal["mavlink_boat"]
+    port: str  # as pymavlink names it: udpin:0.0.0.0:14550, tcp:host:5760, /dev/ttyACM0
+    thrust: Thrust
+    baud: int = 115200
+    steering_channel: int = 1  # RC channels that its mixer takes steering and throttle from
+    throttle_channel: int = 3
+    trim_us: int = 1500
+    span_us: int = 400  # of a full deflection
+    silent_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse channels that MAVLink's override does not have, and pulses beyond those of servos."""
+        channels = {self.steering_channel, self.throttle_channel}
+        if len(channels) != 2 or not channels <= set(range(1, 9)):
+            raise ValueError("steering_channel and throttle_channel must be two of 1 to 8.")
+        if not 800 <= self.trim_us - self.span_us < self.trim_us + self.span_us <= 2200:
+            raise ValueError("trim_us ± span_us must lie within 800 and 2200 µs.")
+
+
+Driver = GpioValves | ValveTopic | Kobuki | VelocityTopic | KingfisherNmea | MavlinkBoat | ThrustTopic
+NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
+    GpioValves: ("gpiod",),
+    Kobuki: ("serial",),
+    KingfisherNmea: ("serial",),
+    MavlinkBoat: ("pymavlink",),
+}
+TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
+SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that motion capture alone knows the place of
+MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device knows where it is
+FITS = {
+    "thrusters": (GpioValves, ValveTopic),
+    "differential_drive": (Kobuki, VelocityTopic),
+    "propellers": (KingfisherNmea, MavlinkBoat, ThrustTopic),
+}
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """One file of `configs/hardware`."""
+
+    title: str
+    robot: str
+    driver: Driver
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Modules that its driver imports, which not every machine has."""
+        return NEEDS.get(type(self.driver), ())
+
+    @property
+    def measures_odometry(self) -> bool:
+        """Whether the device knows where it is; if not, motion capture or another node says so."""
+        return isinstance(self.driver, MEASURES)
+
+    @property
+    def seen_from_outside(self) -> bool:
+        """Whether motion capture alone knows where the robot is."""
+        return isinstance(self.driver, SEEN_FROM_OUTSIDE)
+
+
+def hardware_path(name: str) -> Path:
+    """The file that a name of `configs/hardware`, or a path that ends in `.yaml`, means.
+
+    Raises:
+        UnknownNameError: If there is no file of that name.
+    """
+    return Path(name) if name.endswith(".yaml") else config_path("hardware", name)
+
+
+def load_hardware(name: str) -> Hardware:
+    """Read a hardware file and check that it fits its robot.
+
+    Args:
+        name: A name of `configs/hardware`, or a path that ends in `.yaml`.
+
+    Returns:
+        What is wired to the robot.
+
+    Raises:
+        ConfigError: Unknown name, a mistake in the file, or a driver that the robot's actuators do not go with.
+    """
+    path = hardware_path(name)
+    hardware = load_config(Hardware, path)
+    actuators = load_robot(hardware.robot).actuators
+    if not isinstance(hardware.driver, FITS.get(actuators.kind, ())):
+        raise ConfigError(
+            f"{path}: driver '{hardware.driver.kind}' cannot move '{hardware.robot}', which has {actuators.kind}."
+        )
+    problem = _count_problem(hardware.driver, actuators)
+    if problem:
+        raise ConfigError(f"{path}: {problem}")
+    return hardware
+
+
+def hardware_of(robot: str) -> list[str]:
+    """Names of the hardware files of a robot; the first is its own.
+
+    Raises:
+        ConfigError: A mistake in one of the files.
+    """
+    mine = [name for name in config_names("hardware") if load_hardware(name).robot == robot]
+    return sorted(
+        mine, key=lambda name: (isinstance(load_hardware(name).driver, TOPIC_DRIVERS), name != robot, name)
+    )
+
+
+def _count_problem(driver: Driver, actuators: Actuators) -> str:
+    count = len(actuators.names)
+    order = getattr(driver, "order", None)
+    if order is not None and len(order) != count:
+        return f"'order' has {len(order)} entries, the robot has {count} thrusters."
+    if isinstance(driver, GpioValves) and len(driver.lines) != count:
+        return f"'lines' has {len(driver.lines)} entries, the robot has {count} thrusters."
+    return ""

@@ -1,0 +1,126 @@
+"""Valves and air bearing of a floating platform behind the backend seam."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+from gpiod.line import Value
+
+from fulmar_core.backend import Sample
+from fulmar_core.episode import Episode
+from fulmar_core.robot import Robot
+from hardware_drivers.gpio import LineRequest, line_of, output_lines
+from hardware_drivers.settings import GpioValves
+from hardware_drivers.valve_timing import ValveTiming
+
+STATES = {False: Value.INACTIVE, True: Value.ACTIVE}
+
+
+class ThrusterDriver:
+    """Opens and closes valves by GPIO; knows nothing of where the platform is.
+
+    The bearing is a line like the others, but no command of thrust reaches it: it is switched by its service, by the
+    start and the end of the driver, and by a long idle time. While it is off, the valves stay closed: a platform that
+    stands on the floor would only waste its air.
+    """
+
+    def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
+        """Take the lines, everything closed.
+
+        Raises:
+            DeviceError: The chip or a line is not there.
+        """
+        self.robot, self._settings = robot, settings
+        self._order = np.array(settings.order)
+        self._valves = [line_of(line) for line in settings.lines]
+        self._bearing = line_of(settings.bearing.line)
+        every = (*settings.lines, settings.bearing.line)
+        self._lines: LineRequest | None = output_lines(
+            settings.port, every, active_low=settings.active_low, patience_s=patience_s
+        )
+        self._timing = ValveTiming(len(self._valves), settings.min_on_s)
+        self._lock = threading.Lock()
+        self._bearing_on = False
+        self._used_ns = time.monotonic_ns()
+
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
+        """Begin with closed valves, on air where the hardware file says so; see `Backend.reset`."""
+        if self._settings.bearing.on_at_start:
+            self.set_bearing(True)
+        return self.step(self.robot.actuators.safe_command)
+
+    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+        """Set the valves; see `Backend.step`."""
+        now_ns = time.monotonic_ns()
+        with self._lock:
+            wanted = np.asarray(command, dtype=float) if self._bearing_on else np.zeros(len(self._valves))
+            applied = self._timing.allowed(wanted, now_ns)
+            self._set(applied)
+            self._watch_idleness(bool(applied.any()), now_ns)
+        return Sample(None, None, None, applied=applied)
+
+    def make_safe(self) -> None:
+        """Close every valve; the bearing stays as it is."""
+        with self._lock:
+            self._set(self._timing.allowed(np.zeros(len(self._valves)), time.monotonic_ns()))
+
+    def close(self) -> None:
+        """Close every valve, let the platform down after a while, and give the lines back."""
+        with self._lock:
+            carried = self._bearing_on and self._lines is not None
+        if carried:
+            self.make_safe()
+            time.sleep(self._settings.bearing.linger_s)
+        with self._lock:
+            if self._lines is not None:
+                self._set(np.zeros(len(self._valves)))
+                self._switch(False)
+                self._lines.release()
+                self._lines = None
+
+    def health(self) -> dict[str, str]:
+        """Whether it floats; see `Device.health`."""
+        return {
+            "air_bearing": "on" if self._bearing_on else "off",
+            "warning": "" if self._bearing_on else "the air bearing is off: the valves stay closed",
+        }
+
+    @property
+    def bearing_on(self) -> bool:
+        """See `AirBearing`."""
+        return self._bearing_on
+
+    def set_bearing(self, on: bool) -> str:
+        """See `AirBearing`."""
+        with self._lock:
+            if self._lines is None:
+                return "the driver has let go of the lines"
+            if not on:
+                self._set(np.zeros(len(self._valves)))
+            self._switch(on)
+            self._used_ns = time.monotonic_ns()
+        return ""
+
+    def _set(self, valves: np.ndarray) -> None:
+        """Bring every valve into its state; call with the lock held."""
+        if self._lines is not None:
+            wired = valves[self._order] > 0.5
+            self._lines.set_values(
+                {line: STATES[bool(on)] for line, on in zip(self._valves, wired, strict=True)}
+            )
+
+    def _switch(self, on: bool) -> None:
+        """Switch the bearing; call with the lock held."""
+        assert self._lines is not None
+        self._lines.set_values({self._bearing: STATES[on]})
+        self._bearing_on = on
+
+    def _watch_idleness(self, used: bool, now_ns: int) -> None:
+        """Save air when nothing has happened for long; call with the lock held."""
+        if used:
+            self._used_ns = now_ns
+        limit_ns = self._settings.bearing.idle_off_s * 1e9
+        if limit_ns and self._bearing_on and now_ns - self._used_ns > limit_ns:
+            self._switch(False)

@@ -1,0 +1,66 @@
+"""Where a base on two wheels is, told from its encoders and its gyroscope."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fulmar_core.planar import PlanarState, rigid_of
+from fulmar_core.rotation import wrap_angle
+from fulmar_core.state import RigidBodyState
+
+COUNTS = 1 << 16  # encoders count up to here and begin again
+LONGEST_GAP_S = 0.5  # over a longer one the wheels are taken to have stood still
+
+
+class WheelOdometry:
+    """Dead reckoning: distance from the wheels, heading from the gyroscope, both from one report to the next."""
+
+    def __init__(self, metres_per_count: float) -> None:
+        """Prepare for `begin`.
+
+        Args:
+            metres_per_count: What a wheel rolls on one count of its encoder, > 0 [m].
+        """
+        self._scale = metres_per_count
+        self.begin(0.0, 0.0, 0.0)
+
+    def begin(self, x: float, y: float, heading: float) -> None:
+        """Say where the base stands now [m, m, rad]."""
+        self._x, self._y, self._heading = x, y, heading
+        self._left: int | None = None
+        self._right, self._gyro, self._time_s = 0, 0.0, 0.0
+
+    def see(self, left: int, right: int, gyro: float, yaw_rate: float, time_s: float) -> RigidBodyState:
+        """Take a report.
+
+        Args:
+            left: Count of the left wheel, 0 to 65535.
+            right: Count of the right wheel.
+            gyro: Heading as the gyroscope sums it up, any multiple of a turn added [rad].
+            yaw_rate: [rad/s].
+            time_s: When it was measured [s].
+
+        Returns:
+            Where the base is, in the frame that `begin` named.
+        """
+        passed_s = time_s - self._time_s
+        speed = 0.0
+        if self._left is not None:
+            turned = float(wrap_angle(np.asarray(gyro - self._gyro)))
+            ahead = 0.5 * self._scale * (_rolled(left - self._left) + _rolled(right - self._right))
+            middle = self._heading + 0.5 * turned  # an arc's chord points half-way between its ends
+            self._x += ahead * math.cos(middle)
+            self._y += ahead * math.sin(middle)
+            self._heading += turned
+            speed = ahead / passed_s if 0.0 < passed_s < LONGEST_GAP_S else 0.0
+        self._left, self._right, self._gyro, self._time_s = left, right, gyro, time_s
+        c, s = math.cos(self._heading), math.sin(self._heading)
+        values = (self._x, self._y, self._heading, speed * c, speed * s, yaw_rate)
+        return rigid_of(PlanarState(*(np.asarray(value) for value in values)))
+
+
+def _rolled(counts: int) -> int:
+    """Difference of two counts, the short way round."""
+    return (counts + COUNTS // 2) % COUNTS - COUNTS // 2

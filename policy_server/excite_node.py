@@ -1,0 +1,27 @@
+"""The process that drives a robot by random commands, to identify it by: same node, same wires as a policy."""
+
+from __future__ import annotations
+
+import sys
+
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.excite import Excite
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.controller_settings import ControllerSettings
+from fulmar_ros.runtime import run_node
+
+
+def make_excite(robot: Robot, task: Task, settings: ControllerSettings) -> Controller:
+    """Random commands around the goal of the task."""
+    return Excite(robot, task, control_hz=settings.control_rate(robot))
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    sys.exit(run_node(lambda request_exit: ControllerNode(make_excite, request_exit)))
+
+
+if __name__ == "__main__":
+    main()

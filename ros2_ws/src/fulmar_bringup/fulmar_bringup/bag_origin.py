@@ -1,0 +1,78 @@
+"""What a bag says about its run: the plan, and the files that made it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fulmar_core.calibration import calibration_path
+from fulmar_core.controllers.classical import gains_path
+from fulmar_core.paths import config_names, config_path
+from fulmar_core.policy_bundle import PASSPORT
+from fulmar_core.robot import load_robot
+from fulmar_ros.provenance import fulmar_version, git_revision
+from policy_server.shipped import shipped_policy
+
+if TYPE_CHECKING:
+    from fulmar_bringup.node_table import RunPlan
+
+CALIBRATION = "calibration.yaml"  # name of the attachment
+
+
+def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
+    """The plan as the JSON object that the recorder is given.
+
+    Args:
+        plan: What is run.
+        more: What else is known, by name.
+    """
+    return json.dumps(
+        {
+            **{key: value for key, value in asdict(plan).items() if key != "supervised"},
+            **(more or {}),
+            "calibration": str(calibration_path() or ""),
+            "fulmar_version": fulmar_version(),
+            "git_revision": git_revision(),
+        }
+    )
+
+
+def attachments(plan: RunPlan, system: str = "") -> str:
+    """Files to carry along, as the JSON object of names and paths that the recorder is given.
+
+    Args:
+        plan: What is run.
+        system: File of `configs/systems` that it was made from; that of backend and controller by default.
+    """
+    system = system or f"{plan.backend}_{plan.controller}"
+    calibration = calibration_path()
+    files = {
+        "robot.yaml": config_path("robots", plan.robot),
+        "task.yaml": config_path("tasks", plan.task),
+        "scenario.yaml": config_path("scenarios", plan.scenario),
+        **({"system.yaml": config_path("systems", system)} if system in config_names("systems") else {}),
+        **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
+        **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
+        **(
+            {"estimator.yaml": config_path("estimators", plan.guards.estimator)}
+            if plan.guards.estimator
+            else {}
+        ),
+        **({CALIBRATION: calibration} if calibration else {}),
+        **_of_controller(plan),
+    }
+    return json.dumps({name: str(path.absolute()) for name, path in files.items()})
+
+
+def _of_controller(plan: RunPlan) -> dict[str, Path]:
+    """The passport of a policy, which has the hash of its weights; the gains of a law."""
+    if plan.controller == "excite":
+        return {}
+    if plan.controller != "policy":
+        law = None if plan.controller == "classical" else plan.controller
+        return {"controller.yaml": gains_path(load_robot(plan.robot), law)}
+    folder = Path(plan.policy) if plan.policy else shipped_policy(plan.robot, plan.task)
+    return {"passport.json": folder / PASSPORT} if folder else {}

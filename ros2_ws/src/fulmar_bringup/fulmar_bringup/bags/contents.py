@@ -1,0 +1,272 @@
+"""Everything that a bag holds, as far as it can be read: any rosbag2 folder with MCAP or sqlite3, or one such file."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+
+from fulmar_core.errors import BagError, UnknownNameError
+from fulmar_core.topics import Wire
+from fulmar_ros.bag_metadata import METADATA_FILE
+from fulmar_ros.bag_records import place_in_bag, read_records
+from fulmar_ros.bag_thread import RECORDING
+from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
+
+ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
+
+
+@dataclass
+class Topic:
+    """The messages of one topic, in the order of the file."""
+
+    name: str
+    type: str  # such as `nav_msgs/msg/Odometry`
+    data: list[bytes] = field(default_factory=list)  # in CDR
+    log_ns: list[int] = field(default_factory=list)  # when each was recorded, since the epoch [ns]
+    sequence: list[int] = field(default_factory=list)  # number of each, counted by its recorder; 0: not known
+
+    def __len__(self) -> int:
+        """Number of messages."""
+        return len(self.data)
+
+    def from_time(self, start_ns: int, end_ns: int) -> Topic:
+        """The messages that were recorded from a time on and before another [ns]."""
+        kept = [i for i, log_ns in enumerate(self.log_ns) if start_ns <= log_ns < end_ns]
+        return Topic(
+            self.name,
+            self.type,
+            [self.data[i] for i in kept],
+            [self.log_ns[i] for i in kept],
+            [self.sequence[i] for i in kept],
+        )
+
+
+@dataclass(frozen=True)
+class Bag:
+    """One bag in memory."""
+
+    path: Path
+    storage: str  # `mcap` or `sqlite3`
+    files: tuple[Path, ...]
+    topics: dict[str, Topic]  # by absolute name, sorted
+    info: dict[str, Any] | None  # what kind of run this is; None: Fulmar did not record it
+    recording: dict[str, Any]  # what became of the messages, as far as the recorder told it
+    attachments: dict[str, bytes]
+    warnings: tuple[str, ...]  # what could not be read
+
+    @property
+    def size(self) -> int:
+        """Bytes of its files."""
+        return sum(file.stat().st_size for file in self.files)
+
+    @property
+    def robot(self) -> str:
+        """Name of the robot, empty where the bag does not say."""
+        return str((self.info or {}).get("robot") or "")
+
+    def of(self, wire: Wire) -> Topic:
+        """The messages of a wire, none where the bag has none of them.
+
+        Under the robot's name, or, where no robot is named, under the only namespace that has the wire.
+        """
+        name = self.topic_name(wire)
+        found = [topic for topic in self.topics.values() if topic.name == name and topic.type == wire.type]
+        return found[0] if found else Topic(name, wire.type)
+
+    def topic_name(self, wire: Wire) -> str:
+        """Absolute name of a wire's topic; the wire's own name where it cannot be told."""
+        if wire.name.startswith("/"):
+            return wire.name
+        if self.robot:
+            return f"/{self.robot}/{wire.name}"
+        names = {
+            topic.name
+            for topic in self.topics.values()
+            if topic.name.endswith(f"/{wire.name}") and topic.type == wire.type
+        }
+        return names.pop() if len(names) == 1 else wire.name
+
+    def odometry(self, chosen: str | None = None) -> Topic:
+        """The odometry: that of the robot, the one that was chosen, or the only one there is.
+
+        Args:
+            chosen: Name of a topic.
+
+        Raises:
+            BagError: There is none, or several to choose from.
+            ConfigError: There is no such topic.
+        """
+        kind = "nav_msgs/msg/Odometry"
+        known = {name: topic for name, topic in self.topics.items() if topic.type == kind and len(topic)}
+        if chosen is not None:
+            if chosen not in known:
+                raise UnknownNameError(f"odometry topic in {self.path}:", chosen, known)
+            return known[chosen]
+        own = known.get(f"/{self.robot}/odom") if self.robot else None
+        if own is not None:
+            return own
+        if len(known) == 1:
+            return next(iter(known.values()))
+        if not known:
+            raise BagError(f"{self.path}: holds no {kind}. It has: {', '.join(self.topics) or 'nothing'}.")
+        raise BagError(
+            f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC."
+        )
+
+
+def open_bag(path: Path) -> Bag:
+    """Read a bag.
+
+    Args:
+        path: Bag folder, or a file in it.
+
+    Returns:
+        The bag. What is damaged is left out and named in `warnings`.
+
+    Raises:
+        BagError: There is no bag, or nothing of it can be read.
+    """
+    path = Path(path)
+    files = _files(path)
+    gathered = _Gathered()
+    problems: list[str] = []
+    for file in files:
+        try:
+            gathered.read(file)
+        except BagError as error:  # one file of several may be lost; the others count
+            problems.append(str(error))
+    if len(problems) == len(files):
+        raise BagError(problems[0])
+    folder = path if path.is_dir() else path.parent
+    info = gathered.info or _told_beside(folder, RUN_RECORD)
+    return Bag(
+        path=path,
+        storage=ENDINGS[files[0].suffix],
+        files=files,
+        topics=dict(sorted(gathered.topics.items())),
+        info=info,
+        recording=_told_beside(folder, RECORDING) or {},
+        attachments=gathered.attachments,
+        warnings=tuple(problems + gathered.warnings),
+    )
+
+
+def _files(path: Path) -> tuple[Path, ...]:
+    """Files of a bag in the order of their numbers; a bag may be split into several."""
+    if path.is_file():
+        if path.suffix not in ENDINGS:
+            raise BagError(f"{path}: this is no bag. Give a bag folder, or the .mcap or .db3 file in it.")
+        return (path,)
+    if not path.is_dir():
+        raise BagError(f"{path}: there is no such bag. Give a bag folder, or the .mcap or .db3 file in it.")
+    for ending in ENDINGS:
+        files = sorted(path.glob(f"*{ending}"), key=place_in_bag)
+        if files:
+            return tuple(files)
+    found = ", ".join(sorted(each.name for each in path.iterdir())[:4]) or "nothing"
+    raise BagError(f"{path}: has no .mcap and no .db3 file, only {found}. Give a bag folder.")
+
+
+class _Gathered:
+    """What the files of one bag hold together."""
+
+    def __init__(self) -> None:
+        self.topics: dict[str, Topic] = {}
+        self.info: dict[str, Any] | None = None
+        self.attachments: dict[str, bytes] = {}
+        self.warnings: list[str] = []
+
+    def read(self, file: Path) -> None:
+        if file.suffix == ".db3":
+            self._read_sqlite3(file)
+        else:
+            self._read_mcap(file)
+
+    def _topic(self, name: str, kind: str) -> Topic:
+        """The topic of a name; the same name with another type is told apart."""
+        topic = self.topics.setdefault(name, Topic(name, kind))
+        if topic.type == kind:
+            return topic
+        return self.topics.setdefault(f"{name} ({kind})", Topic(name, kind))
+
+    def _read_mcap(self, file: Path) -> None:
+        schemas: dict[int, str] = {}
+        channels: dict[int, Topic] = {}
+        lost: Counter[str] = Counter()
+        for record in read_records(file, self.warnings):
+            if isinstance(record, Message):
+                topic = channels.get(record.channel_id)
+                if topic is None:
+                    lost["messages of channels that nobody announced"] += 1
+                    continue
+                topic.data.append(record.data)
+                topic.log_ns.append(record.log_time)
+                topic.sequence.append(record.sequence)
+            elif isinstance(record, Schema):
+                schemas[record.id] = record.name
+            elif isinstance(record, Channel):
+                # The index at the end of a file announces every channel once more.
+                channels[record.id] = self._topic(record.topic, schemas.get(record.schema_id, ""))
+                if record.message_encoding != "cdr":
+                    lost[f"'{record.message_encoding}' as encoding of {record.topic}, only cdr is read"] = 1
+            elif isinstance(record, Metadata) and record.name == RUN_RECORD:
+                self.info = json_object(record.metadata.get(RUN_KEY, "")) or self.info
+            elif isinstance(record, Attachment):
+                self.attachments[record.name] = record.data
+        self.warnings += [f"{file.name}: {count} {what}." for what, count in lost.items()]
+
+    def _read_sqlite3(self, file: Path) -> None:
+        from rosbags.rosbag2 import Reader
+
+        try:
+            with Reader(file) as reader:
+                topics = {each.id: self._topic(each.topic, each.msgtype) for each in reader.connections}
+                try:
+                    for connection, log_ns, data in reader.messages():
+                        topic = topics[connection.id]
+                        topic.data.append(bytes(data))
+                        topic.log_ns.append(log_ns)
+                        topic.sequence.append(0)
+                except Exception as error:  # noqa: BLE001 - damage raises whatever it pleases, from sqlite3 or rosbags
+                    self.warnings.append(f"{file.name}: the rest is damaged ({_first_line(error)}).")
+        except Exception as error:
+            raise BagError(f"{file}: this sqlite3 bag cannot be read: {_first_line(error)}.") from error
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [""])[0].rstrip(".") or type(error).__name__
+
+
+def _told_beside(folder: Path, entry: str) -> dict[str, Any] | None:
+    """An entry of `custom_data` in the bag's `metadata.yaml`; None where it is not there."""
+    try:
+        document = yaml.safe_load((folder / METADATA_FILE).read_text())
+        return json_object(document["rosbag2_bagfile_information"]["custom_data"][entry])
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
+        return None
+
+
+def json_object(text: str) -> dict[str, Any] | None:
+    """A JSON object, or None where the text is none."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return None
+    return value if isinstance(value, dict) else None
+
+
+def span_ns(topics: Iterable[Topic]) -> tuple[int, int]:
+    """First and last time of recording [ns]; zeros where there is no message."""
+    edges = [(min(topic.log_ns), max(topic.log_ns)) for topic in topics if len(topic)]
+    if not edges:
+        return 0, 0
+    lows, highs = zip(*edges, strict=True)
+    return int(np.min(lows)), int(np.max(highs))

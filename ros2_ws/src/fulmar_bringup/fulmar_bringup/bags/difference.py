@@ -1,0 +1,156 @@
+"""What differs between two bags, topic by topic and field by field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fulmar_bringup.bags.comparison import Field, compare
+from fulmar_bringup.bags.contents import Bag, Topic
+from fulmar_bringup.bags.figures import provenance
+from fulmar_bringup.bags.flat import Row, columns, rows
+from fulmar_core.errors import UnknownNameError
+from fulmar_core.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS
+
+# They tell of the machine and of this very run, not of what the robot did.
+OF_THE_MACHINE = (CLOCK, DIAGNOSTICS, STATUS, METADATA)
+ORIGIN = (
+    "robot",
+    "task",
+    "controller",
+    "policy",
+    "scenario",
+    "seed",
+    "control_hz",
+    "git_revision",
+    "controller_sha256",
+)
+
+
+def differing(
+    first: Bag, second: Bag, *, tolerance: float = 0.0, only: list[str] | None = None
+) -> dict[str, Any]:
+    """Compare two bags.
+
+    Messages of one topic belong together by their stamp, or by their number where they have none; topics by their name
+    without the robot's.
+
+    Args:
+        first: One bag.
+        second: Another.
+        tolerance: Largest difference of numbers that counts as the same; 0 asks for the same bits.
+        only: Topics, relative or absolute; by default all but those that tell of the machine.
+
+    Returns:
+        Ready for JSON, with `same`.
+
+    Raises:
+        ConfigError: A topic that neither bag has.
+    """
+    one, other = _by_name(first), _by_name(second)
+    known = sorted({*one, *other})
+    wanted = (
+        [_relative(name, first, second) for name in only]
+        if only
+        else [n for n in known if n not in _machine()]
+    )
+    for name in wanted:
+        if name not in known:
+            raise UnknownNameError("topic", name, known)
+    topics = [_of_topic(name, one.get(name), other.get(name), tolerance) for name in wanted]
+    before, after = provenance(first), provenance(second)
+    return {
+        "bags": [str(first.path), str(second.path)],
+        "provenance": {key: [before[key], after[key]] for key in ORIGIN if before[key] != after[key]},
+        "topics": topics,
+        "same": all(topic["same"] for topic in topics),
+    }
+
+
+def _machine() -> set[str]:
+    return {wire.name for wire in OF_THE_MACHINE}
+
+
+def _by_name(bag: Bag) -> dict[str, Topic]:
+    return {_relative(name, bag): topic for name, topic in bag.topics.items() if len(topic)}
+
+
+def _relative(name: str, *bags: Bag) -> str:
+    for bag in bags:
+        prefix = f"/{bag.robot}/"
+        if bag.robot and name.startswith(prefix):
+            return name[len(prefix) :]
+    return name
+
+
+def _of_topic(name: str, first: Topic | None, second: Topic | None, tolerance: float) -> dict[str, Any]:
+    result: dict[str, Any] = {
+        "topic": name,
+        "counts": [len(first) if first else 0, len(second) if second else 0],
+        "only_first": 0,
+        "only_second": 0,
+        "fields": [],
+        "texts": [],
+    }
+    if first is None or second is None or first.type != second.type:
+        types = [topic.type if topic else None for topic in (first, second)]
+        return {**result, "types": types, "same": False}
+    _, stamps_1, rows_1 = rows(first)
+    _, stamps_2, rows_2 = rows(second)
+    pairs, alone_1, alone_2 = _pairs(stamps_1, stamps_2)
+    left, right = [rows_1[i] for i, _ in pairs], [rows_2[j] for _, j in pairs]
+    stamps = np.array([stamps_1[i] for i, _ in pairs], dtype=np.int64)
+    paths = [path for path in columns(left + right) if not path.startswith("header.stamp")]
+    numbers = [path for path in paths if _all(left + right, path, lambda v: not isinstance(v, str))]
+    fields = _numbers(numbers, left, right, stamps, tolerance)
+    texts = [
+        {"field": path, "differing": count}
+        for path in paths
+        if path not in numbers
+        and (count := sum(a.get(path) != b.get(path) for a, b in zip(left, right, strict=True)))
+    ]
+    return {
+        **result,
+        "only_first": alone_1,
+        "only_second": alone_2,
+        "fields": [vars(field) for field in fields if not field.same],
+        "texts": texts,
+        "same": not (alone_1 or alone_2 or texts) and all(field.same for field in fields),
+    }
+
+
+def _all(found: list[Row], path: str, holds: Callable[[Any], bool]) -> bool:
+    return all(holds(row[path]) for row in found if path in row)
+
+
+def _numbers(
+    paths: list[str], left: list[Row], right: list[Row], stamps: np.ndarray, tolerance: float
+) -> list[Field]:
+    if not left or not paths:
+        return []
+    nothing = float("nan")
+    tables = [
+        np.array([[float(row.get(path, nothing)) for path in paths] for row in found])
+        for found in (left, right)
+    ]
+    return compare("", paths, *tables, stamps, tolerance)
+
+
+def _pairs(first: list[int], second: list[int]) -> tuple[list[tuple[int, int]], int, int]:
+    """Which messages belong together, by their times; how many of each side are alone.
+
+    Where no time is common, as without stamps, they are taken in their order.
+    """
+    waiting: dict[int, list[int]] = {}
+    for index in range(len(second) - 1, -1, -1):
+        waiting.setdefault(second[index], []).append(index)
+    pairs = []
+    for index, time in enumerate(first):
+        mine = waiting.get(time)
+        if mine:
+            pairs.append((index, mine.pop()))
+    if not pairs:
+        pairs = [(i, i) for i in range(min(len(first), len(second)))]
+    return pairs, len(first) - len(pairs), len(second) - len(pairs)

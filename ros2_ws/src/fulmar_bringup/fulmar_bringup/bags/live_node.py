@@ -1,0 +1,285 @@
+"""A recorded run once more through the deployed controller node, in lock step: we are the plant."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
+
+from fulmar_bringup.bags.contents import Bag, json_object
+from fulmar_bringup.bags.course import ABSENT, Course, Told
+from fulmar_bringup.bags.rerun import Answers
+from fulmar_bringup.domains import own_domain
+from fulmar_bringup.node_table import RunPlan, controller_spec
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_core.errors import BagError, RunFailed
+from fulmar_core.topics import (
+    ACTION,
+    BLOCK,
+    GOAL_WIRES,
+    METADATA,
+    OBSERVATION,
+    OBSTACLES,
+    ODOMETRY,
+    STATUS,
+    VELOCITY_COMMAND,
+    command_wire,
+)
+from fulmar_ros.goal_messages import TYPES
+from fulmar_ros.message_reader import stamp_ns
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
+
+START_TIMEOUT_S, ANSWER_TIMEOUT_S = 30.0, 10.0
+RESEND_S = 0.5
+SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
+REASONING_S = 2.0  # for observation and action, which come best effort, after the command
+DEPTH = 50
+
+
+def without_repeats(course: Course) -> Course:
+    """The same course with each measurement once: in lock step a node answers one only once."""
+    kept = np.concatenate(([True], np.diff(course.stamp_ns) != 0))
+    rows = ("stamp_ns", "log_ns", "observations", "actions", "commands", "acted", "sample")
+    return replace(course, **{name: getattr(course, name)[kept] for name in rows})
+
+
+def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -> tuple[Answers, str | None]:
+    """Feed a recorded run to a controller node of its own, in a ROS domain of its own.
+
+    Unlike `rerun`, the node goes on from its own answers: terms that hold the previous command may differ after the
+    first difference.
+
+    Args:
+        bag: Where the messages themselves are.
+        course: Of that bag, from `without_repeats`.
+        controller: Name of the controller.
+        policy: Folder of a bundle; empty where there is none.
+
+    Returns:
+        Its answers and the SHA-256 that it reports.
+
+    Raises:
+        BagError: The bag lacks odometry that was answered.
+        RunFailed: The node refuses to start, ends, or does not answer.
+    """
+    missing = int(np.sum(course.sample == ABSENT))
+    if missing:
+        raise BagError(
+            f"{bag.path}: lacks the odometry of {missing} steps, which a node must have. Use --through direct."
+        )
+    plan = RunPlan(
+        robot=course.robot.name,
+        task=course.task.name,
+        controller=controller,
+        backend="mock",
+        control_hz=course.settings.control_rate(course.robot),
+        policy=os.path.abspath(policy) if policy else "",
+        lockstep=True,
+        goals="streamed" if course.settings.goals_streamed else "",
+    )
+    with own_domain() as environment:
+        group = ProcessGroup(environment)
+        try:
+            group.start(controller_spec(plan, subscribers=1))
+            return _exchange(bag, course, group)
+        finally:
+            group.stop_all()
+
+
+@dataclass
+class _Heard:
+    """What the node has said, by stamp [ns]."""
+
+    changed: threading.Condition = field(default_factory=threading.Condition)
+    commands: dict[int, np.ndarray] = field(default_factory=dict)
+    observations: dict[int, np.ndarray] = field(default_factory=dict)
+    actions: dict[int, np.ndarray] = field(default_factory=dict)
+    names: tuple[str, ...] = ()
+    status: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, Any] = field(default_factory=dict)
+    error: Exception | None = None
+
+
+def _exchange(bag: Bag, course: Course, group: ProcessGroup) -> tuple[Answers, str | None]:
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node("plant", namespace=f"/{course.robot.name}")
+        heard = _Heard()
+        wires = _Wires(node, course, heard)
+
+        def fail(error: Exception) -> None:
+            heard.error = error
+
+        with spinning(node, fail):
+            return _feed(bag, course, group, wires, heard)
+    finally:
+        rclpy.try_shutdown()
+
+
+class _Wires:
+    """Our endpoints: those of a plant and of an operator."""
+
+    def __init__(self, node: Node, course: Course, heard: _Heard) -> None:
+        self._node, self._heard = node, heard
+        goal = GOAL_WIRES[course.task.goal_topic]
+        self.odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+        self.goal = node.create_publisher(TYPES[goal.name], goal.name, publisher_qos(goal))
+        self.obstacles = node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
+        self.block = node.create_publisher(PoseStamped, BLOCK.name, publisher_qos(BLOCK))
+        wire = command_wire(course.robot)
+        by_velocity = wire is VELOCITY_COMMAND
+        self._listen(TwistStamped if by_velocity else JointState, wire, self._hear_command)
+        self._listen(JointState, OBSERVATION, self._hear_observation)
+        self._listen(JointState, ACTION, self._hear_action)
+        self._listen(DiagnosticArray, STATUS, self._hear_status)
+        self._listen(String, METADATA, self._hear_metadata)
+
+    def _listen(self, kind: type, wire: Any, callback: Callable[[Any], None]) -> None:
+        qos = subscriber_qos(wire, reliable=True, depth=DEPTH)
+
+        def locked(message: Any) -> None:
+            with self._heard.changed:
+                callback(message)
+                self._heard.changed.notify_all()
+
+        self._node.create_subscription(kind, wire.name, locked, qos)
+
+    def _hear_command(self, message: Any) -> None:
+        if isinstance(message, TwistStamped):
+            values = [message.twist.linear.x, message.twist.angular.z]
+        else:
+            values = list(message.effort)
+        self._heard.commands.setdefault(stamp_ns(message.header.stamp), np.array(values))
+
+    def _hear_observation(self, message: Any) -> None:
+        self._heard.names = tuple(message.name)
+        self._heard.observations[stamp_ns(message.header.stamp)] = np.array(message.position)
+
+    def _hear_action(self, message: Any) -> None:
+        self._heard.actions[stamp_ns(message.header.stamp)] = np.array(message.effort)
+
+    def _hear_status(self, message: Any) -> None:
+        for status in message.status:
+            self._heard.status = {pair.key: pair.value for pair in status.values}
+
+    def _hear_metadata(self, message: Any) -> None:
+        self._heard.metadata = json_object(message.data) or {}
+
+    @property
+    def matched(self) -> bool:
+        """Whether the node hears our odometry, and we hear all that it says of a step."""
+        said = (OBSERVATION.name, ACTION.name)
+        return bool(self.odometry.get_subscription_count()) and all(
+            self._node.count_publishers(name) for name in said
+        )
+
+
+def _feed(
+    bag: Bag, course: Course, group: ProcessGroup, wires: _Wires, heard: _Heard
+) -> tuple[Answers, str | None]:
+    def wait(condition: Callable[[], bool], limit_s: float, what: str) -> None:
+        until = time.monotonic() + limit_s
+        with heard.changed:
+            while not heard.changed.wait_for(condition, 0.05):
+                if heard.error is not None:
+                    raise RunFailed(f"the replay failed: {heard.error!r}") from heard.error
+                end = group.ended()
+                if end is not None:
+                    raise RunFailed(f"{end.text}; its own words are above")
+                if time.monotonic() > until:
+                    raise RunFailed(f"the controller node {what} within {limit_s:g} s")
+
+    wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
+    time.sleep(SETTLE_S)
+    raw = _raw_messages(bag, course)
+    told = {name: course.before(getattr(course, name)) for name in ("goals", "obstacles", "blocks")}
+    count, width = len(course), len(course.robot.actuators.names)
+    actions, commands = np.full((count, width), np.nan), np.full((count, width), np.nan)
+    shown: list[np.ndarray | None] = [None] * count
+    acted = np.zeros(count, dtype=bool)
+    for step in range(count):
+        stamp = int(course.stamp_ns[step])
+        _tell(step, told, raw, wires, wait, heard, streamed=course.settings.goals_streamed)
+        data = raw["odometry"][int(course.sample[step])]
+        answered = _answered(heard, stamp)
+        until = time.monotonic() + ANSWER_TIMEOUT_S
+        while not answered:
+            if time.monotonic() > until:
+                raise RunFailed(
+                    f"the controller node did not answer step {step} within {ANSWER_TIMEOUT_S:g} s"
+                )
+            wires.odometry.publish(data)
+            with heard.changed:
+                answered = heard.changed.wait_for(lambda stamp=stamp: stamp in heard.commands, RESEND_S)
+            if not answered and group.ended() is not None:
+                wait(lambda: False, 0.0, "ended")
+        expects = bool(course.acted[step])
+        with heard.changed:
+            both = heard.changed.wait_for(
+                lambda stamp=stamp: stamp in heard.observations and stamp in heard.actions,
+                REASONING_S if expects else 0.0,
+            )
+        commands[step] = heard.commands[stamp]
+        if both:
+            acted[step] = True
+            shown[step], actions[step] = heard.observations[stamp], heard.actions[stamp]
+    terms = len(heard.names)
+    observations = np.array([np.full(terms, np.nan) if row is None else row for row in shown])
+    answers = Answers(
+        observations.reshape(count, terms), heard.names, actions, commands, acted, tuple([""] * count)
+    )
+    return answers, heard.metadata.get("sha256")
+
+
+def _answered(heard: _Heard, stamp: int) -> bool:
+    with heard.changed:
+        return stamp in heard.commands
+
+
+def _raw_messages(bag: Bag, course: Course) -> dict[str, list[bytes]]:
+    return {
+        "odometry": bag.odometry().data,
+        "goals": bag.of(GOAL_WIRES[course.task.goal_topic]).data,
+        "obstacles": bag.of(OBSTACLES).data,
+        "blocks": bag.of(BLOCK).data,
+    }
+
+
+def _tell(
+    step: int,
+    told: dict[str, dict[int, list[Told]]],
+    raw: dict[str, list[bytes]],
+    wires: _Wires,
+    wait: Callable[[Callable[[], bool], float, str], None],
+    heard: _Heard,
+    *,
+    streamed: bool,
+) -> None:
+    """Publish what was told before a step, as the very bytes that were recorded, and wait until it is known."""
+    publishers = {"obstacles": wires.obstacles, "goals": wires.goal, "blocks": wires.block}
+    echoes = {"obstacles": "obstacles_stamp_ns", "goals": "goal_stamp_ns"}
+    for name, publisher in publishers.items():
+        for each in told[name].get(step, ()):
+            publisher.publish(raw[name][each.index])
+            if name in echoes and not (streamed and name == "goals"):
+                known = str(each.stamp_ns)
+                wait(
+                    lambda name=name, known=known: heard.status.get(echoes[name]) == known,
+                    START_TIMEOUT_S,
+                    f"did not take its {name}",
+                )

@@ -1,0 +1,170 @@
+"""What each estimator tells at every tick, and how far that is from the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from fulmar_bringup.benchmark.estimator.drive import TICK_S, Drive
+from fulmar_bringup.benchmark.estimator.thirty_poses import ThirtyPoses
+from fulmar_core.estimation.estimator import Estimator
+from fulmar_core.estimation.settings import EstimatorSettings
+from fulmar_core.robot import Limits
+from fulmar_core.rotation import from_yaw
+from fulmar_core.sensors.imu import ImuSample
+
+MEAN, POSES_ALONE, WITH_IMU = "mean of 30 poses", "Fulmar, poses alone", "Fulmar, poses and inertial unit"
+SETTLE_S = 2.0  # before anything is judged: every method has its buffer full then
+LONGEST_DELAY_S = 1.2
+RATES_HZ = (200.0, 25.0)
+DELAY_LIMIT_S, RMSE_SHARE_LIMIT = 0.020, 0.5  # what is required of the estimator, beside the mean
+
+
+@dataclass(frozen=True)
+class Figures:
+    """How far one method is from the truth at the time when it tells, over all drives."""
+
+    pose_rate_hz: float
+    method: str
+    velocity_rmse_m_s: float
+    yaw_rate_rmse_rad_s: float
+    delay_ms: float  # by which the true velocity must be shifted to fit best
+    gain_error: float  # of the velocity, once shifted: 0.034 is 3.4 % too fast [-]
+
+
+def tell_by_mean(drive: Drive, every: int, latency_s: float) -> np.ndarray:
+    """What the mean of 30 poses tells at each tick, shape (n, 3); NaN before it tells anything."""
+    method, late = ThirtyPoses(), round(latency_s / TICK_S)
+    yaw = drive.measured_place.copy()
+    yaw[:, 2] = np.unwrap(yaw[:, 2])
+    told = np.full((len(drive.time_s), 3), np.nan)
+    for tick in range(len(told)):
+        captured = tick - late
+        if captured >= 0 and captured % every == 0:
+            method.see_pose(float(drive.time_s[captured]), yaw[captured])
+        motion = method.motion()
+        if motion is not None:
+            told[tick] = motion
+    return told
+
+
+def tell_by_filter(
+    drive: Drive, every: int, latency_s: float, settings: EstimatorSettings, limits: Limits, *, with_imu: bool
+) -> np.ndarray:
+    """What the estimator tells at each tick, shape (n, 3); poses are stamped when they come, `latency_s` late."""
+    estimator, late = Estimator(settings, limits), round(latency_s / TICK_S)
+    told = np.full((len(drive.time_s), 3), np.nan)
+    newest = np.full(3, np.nan)
+    for tick in range(len(told)):
+        now_ns, captured, heard = round(1e9 * float(drive.time_s[tick])), tick - late, False
+        if with_imu:
+            sample = ImuSample(drive.force[tick], np.array([0.0, 0.0, drive.turn_rate[tick]]))
+            heard = not estimator.see_imu(sample, now_ns)
+        if captured >= 0 and captured % every == 0:
+            x, y, yaw = drive.measured_place[captured]
+            heard |= not estimator.see_pose(np.array([x, y, 0.0]), from_yaw(np.asarray(yaw)), now_ns)
+        estimate = estimator.estimate() if heard else None
+        if estimate is not None:
+            newest = np.array(
+                [*estimate.state.velocity_in_world[:2], estimate.state.angular_velocity_in_body[2]]
+            )
+        told[tick] = newest
+    return told
+
+
+def told_by(
+    method: str, drive: Drive, rate_hz: float, latency_s: float, settings: EstimatorSettings, limits: Limits
+) -> np.ndarray:
+    """What a method tells of a drive at each tick, with poses at a rate [Hz]; shape (n, 3)."""
+    every = round(1.0 / (rate_hz * TICK_S))
+    if method == MEAN:
+        return tell_by_mean(drive, every, latency_s)
+    return tell_by_filter(drive, every, latency_s, settings, limits, with_imu=method == WITH_IMU)
+
+
+def compare(
+    all_drives: list[Drive],
+    settings: EstimatorSettings,
+    limits: Limits,
+    latency_s: float,
+    progress: Callable[[], None],
+) -> list[Figures]:
+    """Every method at every rate, on the same drives."""
+    found = []
+    for rate_hz in RATES_HZ:
+        for method in (MEAN, POSES_ALONE, WITH_IMU):
+            told = [told_by(method, drive, rate_hz, latency_s, settings, limits) for drive in all_drives]
+            found.append(_figures(rate_hz, method, all_drives, told))
+            progress()
+    return found
+
+
+def verdict(found: list[Figures]) -> list[dict[str, object]]:
+    """What is required at each rate, and whether it was found."""
+    lines = []
+    for rate_hz in RATES_HZ:
+        at_rate = {row.method: row for row in found if row.pose_rate_hz == rate_hz}
+        ours, mean = at_rate[WITH_IMU], at_rate[MEAN]
+        share = ours.velocity_rmse_m_s / mean.velocity_rmse_m_s
+        lines.append(
+            {
+                "pose_rate_hz": rate_hz,
+                "rmse_share": share,
+                "rmse_share_limit": RMSE_SHARE_LIMIT,
+                "delay_ms": ours.delay_ms,
+                "delay_limit_ms": 1e3 * DELAY_LIMIT_S,
+                "passed": share <= RMSE_SHARE_LIMIT and abs(ours.delay_ms) < 1e3 * DELAY_LIMIT_S,
+            }
+        )
+    return lines
+
+
+def as_json(found: list[Figures]) -> list[dict[str, object]]:
+    """The figures, ready for JSON."""
+    return [asdict(row) for row in found]
+
+
+def _figures(rate_hz: float, method: str, all_drives: list[Drive], told: list[np.ndarray]) -> Figures:
+    begin = round((SETTLE_S + LONGEST_DELAY_S) / TICK_S)
+    errors = np.concatenate(
+        [one[begin:] - drive.motion[begin:] for one, drive in zip(told, all_drives, strict=True)]
+    )
+    shift, gain = _best_shift(all_drives, told, begin)
+    return Figures(
+        pose_rate_hz=rate_hz,
+        method=method,
+        velocity_rmse_m_s=float(np.sqrt(np.mean(np.sum(errors[:, :2] ** 2, axis=1)))),
+        yaw_rate_rmse_rad_s=float(np.sqrt(np.mean(errors[:, 2] ** 2))),
+        delay_ms=1e3 * shift * TICK_S,
+        gain_error=gain - 1.0,
+    )
+
+
+def _best_shift(all_drives: list[Drive], told: list[np.ndarray], begin: int) -> tuple[float, float]:
+    """Ticks by which the true velocity is shifted for the least squared error, with the best gain, and that gain.
+
+    Found between ticks by a parabola through the three best.
+    """
+    told_velocity = np.concatenate([one[begin:, :2].ravel() for one in told])
+    most = round(LONGEST_DELAY_S / TICK_S)
+    least = -round(0.05 / TICK_S)
+    costs, gains = [], []
+    for shift in range(least, most + 1):
+        true = np.concatenate([_shifted(drive.motion[:, :2], shift, begin).ravel() for drive in all_drives])
+        gain = float(true @ told_velocity / (true @ true))
+        costs.append(float(np.mean((told_velocity - gain * true) ** 2)))
+        gains.append(gain)
+    best = int(np.argmin(costs))
+    if not 0 < best < len(costs) - 1:
+        return float(least + best), gains[best]
+    before, here, after = costs[best - 1 : best + 2]
+    curve = before - 2.0 * here + after
+    return least + best + (0.5 * (before - after) / curve if curve > 0.0 else 0.0), gains[best]
+
+
+def _shifted(values: np.ndarray, shift: int, begin: int) -> np.ndarray:
+    """Rows from `begin` on, as they were `shift` ticks before; at the end, a shift ahead repeats the last."""
+    rows = np.clip(np.arange(begin, len(values)) - shift, 0, len(values) - 1)
+    return values[rows]

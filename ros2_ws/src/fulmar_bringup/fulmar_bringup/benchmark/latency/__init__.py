@@ -1,0 +1,1 @@
+"""How long a state's journey through the controller and back takes, and what it costs."""

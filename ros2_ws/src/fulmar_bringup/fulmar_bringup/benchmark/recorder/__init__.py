@@ -1,0 +1,1 @@
+"""What recording costs and what it loses: `fulmar benchmark recorder`."""

@@ -1,0 +1,167 @@
+"""What recording costs the control loop: latency with a recorder and without one, in turns, in one run.
+
+The plant runs here, as `fulmar run` has it, on its own deadlines; its controller is a process of its own. At four times
+real time its odometry comes 200 times a second and the commands that answer it 50 times. Without a recorder there is
+none: the process is started for each stretch that is recorded, and what it costs to start does not count.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rclpy.lifecycle import TransitionCallbackReturn
+
+from fulmar_bringup.benchmark.recorder.recorders import recorders
+from fulmar_bringup.domains import own_domain
+from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
+from fulmar_bringup.processes import ProcessGroup, command_line
+from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode
+from fulmar_core.errors import RunFailed
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from fulmar_core.topics import SIMULATION_START_NS
+from fulmar_ros.deadline import Spread
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.runtime import settle_memory, spinning
+from sim_nodes.sim_node import make_backend
+
+ODOMETRY_HZ, COMMAND_HZ = 200.0, 50.0
+ALLOWED = 1.05  # 99th percentile with a recorder, as a multiple of the one without
+SETTLE_S = 2.0  # after a recorder came or went
+RESAMPLED = 2000
+TURNS = (True, False, False, True)  # drift of the machine falls on both alike
+
+
+def cost_of_recording(
+    plan: RunPlan,
+    *,
+    stretches: int,
+    stretch_s: float,
+    out: Path,
+    progress: Callable[[], None],
+) -> dict[str, Any]:
+    """Measure.
+
+    Args:
+        plan: Robot and task; its rates are set here.
+        stretches: With a recorder, and as many without, >= 1.
+        stretch_s: Length of each [s].
+        out: Folder of the bags.
+        progress: Told of each stretch.
+
+    Returns:
+        Figures by name, ready for JSON.
+
+    Raises:
+        RunFailed: The nodes do not get ready.
+    """
+    physics_hz = 1.0 / load_robot(plan.robot).timing.physics_dt
+    rate = ODOMETRY_HZ / physics_hz
+    plan = replace(plan, rate=rate, control_hz=COMMAND_HZ / rate, supervised=True)
+    measured: dict[bool, list[np.ndarray]] = {True: [], False: []}
+    with own_domain(), _running(plan) as plant:
+        for number in range(2 * stretches):
+            recorded = TURNS[number % len(TURNS)]
+            bags = {out / f"cost_{number}": plan} if recorded else {}
+            with recorders(bags) as started:
+                time.sleep(SETTLE_S)
+                plant.wires.latency_ms = Spread()
+                time.sleep(stretch_s)
+                measured[recorded].append(plant.wires.latency_ms.values())
+                for recorder in started:
+                    recorder.stop()
+            progress()
+    return _figures(measured)
+
+
+@contextlib.contextmanager
+def _running(plan: RunPlan) -> Iterator[PlantNode]:
+    """A plant in this process and its controller, at work until the context ends."""
+    task = load_task(plan.task)
+    group = ProcessGroup()
+    try:
+        group.start(controller_spec(plan))
+        with supervisor(plan.robot, task) as overseer:
+            plant = PlantNode(make_backend, lambda _code: None, cli_args=command_line(plant_spec(plan))[3:])
+            if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                raise RunFailed("the plant could not be configured")
+            with spinning(plant, overseer.fail):
+                _begin(plan, plant, overseer, group)
+                try:
+                    yield plant
+                finally:
+                    plant.stop()
+    finally:
+        group.stop_all()
+
+
+def _begin(plan: RunPlan, plant: PlantNode, overseer: Supervisor, group: ProcessGroup) -> None:
+    """Give a goal, then start the plant."""
+    until = time.monotonic() + START_TIMEOUT_S
+
+    def alive() -> None:
+        end = group.ended()
+        if end is not None:
+            raise RunFailed(f"{end.text}: {group.last_words('controller')}")
+        if time.monotonic() > until:
+            raise RunFailed(f"the nodes did not get ready within {START_TIMEOUT_S:g} s.")
+
+    episode = draw_episode(
+        load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario), seed=plan.seed, number=0
+    )
+    overseer.give_goal(episode.goal, time_ns=SIMULATION_START_NS, alive=alive)
+    settle_memory()
+    if plant.trigger_activate() != TransitionCallbackReturn.SUCCESS:
+        raise RunFailed("the plant could not be activated")
+    overseer.wait_until(lambda: overseer.controller.values.get("mode") == "active", alive)
+
+
+def _figures(measured: dict[bool, list[np.ndarray]]) -> dict[str, Any]:
+    ratio = _p99(measured[True]) / _p99(measured[False])
+    low, high = _interval(measured)
+    return {
+        "odometry_hz": ODOMETRY_HZ,
+        "command_hz": COMMAND_HZ,
+        "recorded": _spread(measured[True]),
+        "not_recorded": _spread(measured[False]),
+        "p99_ratio": ratio,
+        "p99_ratio_95": [low, high],
+        "allowed": ALLOWED,
+        "passed": ratio <= ALLOWED,
+    }
+
+
+def _spread(stretches: list[np.ndarray]) -> dict[str, float]:
+    values = np.concatenate(stretches)
+    p50, p99 = np.percentile(values, (50, 99))
+    return {
+        "commands": len(values),
+        "p50_ms": float(p50),
+        "p99_ms": float(p99),
+        "max_ms": float(values.max()),
+    }
+
+
+def _p99(stretches: list[np.ndarray]) -> float:
+    return float(np.percentile(np.concatenate(stretches), 99))
+
+
+def _interval(measured: dict[bool, list[np.ndarray]]) -> tuple[float, float]:
+    """95 % interval of the ratio, from stretches drawn again and again: samples of one stretch hang together."""
+    rng = np.random.default_rng(1)
+
+    def drawn(recorded: bool) -> float:
+        stretches = measured[recorded]
+        return _p99([stretches[i] for i in rng.integers(0, len(stretches), len(stretches))])
+
+    ratios = [drawn(True) / drawn(False) for _ in range(RESAMPLED)]
+    low, high = np.percentile(ratios, (2.5, 97.5))
+    return float(low), float(high)

@@ -1,0 +1,66 @@
+"""`fulmar bag export`: bags for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.console import console, output, print_json
+from fulmar_core.errors import ConfigError, UnknownNameError
+
+FORMATS = ("csv", "npz", "lerobot")
+
+
+def export(
+    bags: Annotated[list[Path], typer.Argument(metavar="BAG...", help="Bags; several only for lerobot.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            metavar="csv|npz|lerobot",
+            help="csv: a table for each topic. npz: NumPy arrays, one for each field. lerobot: a dataset, one episode "
+            "for each bag, one frame for each control step.",
+        ),
+    ] = "csv",
+    out: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Folder, or the .npz file; beside the bag by default.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
+
+    The dataset follows version 2.1 of LeRobot's format: `meta/info.json`, tasks, episodes and their statistics as JSON
+    lines, and a parquet file for each episode, with `observation.state` and `action` as the controller saw and said
+    them. It needs the extra 'datasets'.
+    """
+    from fulmar_bringup.bags.contents import open_bag
+    from fulmar_bringup.bags.tables import write_csv, write_npz
+
+    if to not in FORMATS:
+        raise UnknownNameError("--to", to, FORMATS)
+    if len(bags) > 1 and to != "lerobot":
+        raise ConfigError(f"--to {to} takes one bag, {len(bags)} were given. Export them one by one.")
+    opened = [open_bag(bag) for bag in bags]
+    for warning in (warning for bag in opened for warning in bag.warnings):
+        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    beside = bags[0] if bags[0].is_dir() else bags[0].parent
+    if to == "csv":
+        files = write_csv(opened[0], out or beside / "csv")
+    elif to == "npz":
+        path = out or beside / f"{beside.resolve().name}.npz"
+        files = [write_npz(opened[0], path.with_suffix(".npz"))]
+    else:
+        from fulmar_bringup.bags.course import course_of
+        from fulmar_bringup.bags.lerobot import write_lerobot
+
+        courses = [course_of(bag) for bag in opened]
+        titles = [course.task.title for course in courses]
+        files = [write_lerobot(courses, titles, out or beside / "lerobot")]
+    if as_json:
+        print_json({"bags": [str(bag) for bag in bags], "to": to, "files": [str(file) for file in files]})
+        return
+    for file in files:
+        output.print(str(file), markup=False, soft_wrap=True)

@@ -1,0 +1,67 @@
+"""`fulmar bag plot`: a bag to look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.commands.arguments import BagArgument, JsonOption
+from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.extras import require
+
+
+def plot(
+    bag: BagArgument,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="A page (.html) or a .png picture; may be repeated. By default both, beside the bag.",
+        ),
+    ] = None,
+    odometry: Annotated[
+        str | None, typer.Option(metavar="TOPIC", help="Which odometry, where a bag has several.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a bag: trajectory, errors, actuators, latencies.
+
+    A run of Fulmar is drawn with its goal and tolerances, as by `fulmar report`. Any other bag with odometry is drawn
+    without: its path, its speed, its actuators, and how late its messages came.
+    """
+    require("matplotlib")
+    from fulmar_bringup.bags.contents import open_bag
+    from fulmar_bringup.bags.pictures import write_pictures
+
+    opened = open_bag(bag)
+    for warning in opened.warnings:
+        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    beside = bag if bag.is_dir() else bag.parent
+    files = out or [beside / "plot.html", beside / "plot.png"]
+    if _has_a_task(bag) and odometry is None:
+        from fulmar_bringup.bag_reader import read_run
+        from fulmar_bringup.report import write_report
+
+        record = read_run(bag)
+        written = [write_report([record], file) for file in files]
+    else:
+        written = [write_pictures(opened, file, odometry) for file in files]
+    if as_json:
+        print_json({"bag": str(bag), "files": [str(file) for file in written]})
+        return
+    for file in written:
+        output.print(str(file), markup=False, soft_wrap=True)
+
+
+def _has_a_task(bag: Path) -> bool:
+    """Whether this is a run that can be judged."""
+    from fulmar_bringup.bag_reader import read_run
+    from fulmar_bringup.run_judgement import judge
+    from fulmar_core.errors import FulmarError
+
+    try:
+        return judge(read_run(bag)) is not None
+    except FulmarError:
+        return False

@@ -1,0 +1,113 @@
+"""`fulmar benchmark estimator`: the state estimator beside the mean of 30 poses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fulmar_bringup.commands.arguments import JsonOption, SeedOption
+from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.progress import step_bar
+from fulmar_core.exit_codes import FAILED
+
+
+def estimator(
+    robot: Annotated[
+        str, typer.Option(metavar="R", help="A name from `fulmar list robots`.")
+    ] = "floating_platform",
+    settings: Annotated[
+        str, typer.Option(metavar="NAME", help="A name from configs/estimators, or a .yaml file.")
+    ] = "mocap_imu",
+    latency_ms: Annotated[
+        float,
+        typer.Option(metavar="MS", min=0.0, max=500.0, help="How late poses come; the estimator is told."),
+    ] = 10.0,
+    drives: Annotated[int, typer.Option(metavar="N", min=1, help="How many drives.")] = 3,
+    seconds: Annotated[float, typer.Option(metavar="S", min=10.0, help="How long each drive is.")] = 40.0,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw one drive into a PNG file.")
+    ] = None,
+    seed: SeedOption = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare the state estimator with the mean of 30 poses that RoboRAN deploys, on the same data.
+
+    A robot is driven about in the core's dynamics at 200 Hz; its poses, at 200 Hz and at 25 Hz, and its inertial
+    readings have the noise of the robot's YAML. Every figure is about what a controller is told at the very instant,
+    against the truth at that instant. Exit code 1 if the estimator's velocity error is more than half the mean's, or
+    20 ms late.
+
+    Try:
+
+    fulmar benchmark estimator --picture estimator.png
+    """
+    import dataclasses
+
+    from fulmar_bringup.extras import require
+    from fulmar_core.robot import load_robot
+
+    require("filterpy", *(["matplotlib"] if picture else []))
+    from fulmar_bringup.benchmark.estimator.comparison import MEAN, RATES_HZ, compare, verdict
+    from fulmar_bringup.benchmark.estimator.comparison import as_json as rows_of
+    from fulmar_bringup.benchmark.estimator.drive import drives as drive_about
+    from fulmar_core.estimation.settings import load_estimator
+
+    the_robot = load_robot(robot)
+    believed = dataclasses.replace(load_estimator(settings), latency_s=latency_ms / 1e3)
+    done = iter(range(1, 3 * len(RATES_HZ) + 1))
+    with step_bar("estimating", 3 * len(RATES_HZ)) as progress:
+        driven = drive_about(the_robot, count=drives, seconds=seconds, seed=seed)
+        found = compare(driven, believed, the_robot.limits, latency_ms / 1e3, lambda: progress(next(done)))
+    lines = verdict(found)
+    figures: dict[str, Any] = {
+        "robot": robot,
+        "settings": settings,
+        "latency_ms": latency_ms,
+        "drives": drives,
+        "seconds": seconds,
+        "rows": rows_of(found),
+        "required": lines,
+    }
+    if picture is not None:
+        from fulmar_bringup.benchmark.estimator.picture import draw
+        from fulmar_bringup.report.style import as_png
+
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        picture.write_bytes(as_png(draw(driven[0], found, believed, the_robot.limits, latency_ms / 1e3)))
+        console.print(f"drawn: {picture}", markup=False)
+    if as_json:
+        print_json(figures)
+    else:
+        _print(figures, MEAN)
+    if not all(line["passed"] for line in lines):
+        raise typer.Exit(FAILED)
+
+
+def _print(figures: dict[str, Any], mean: str) -> None:
+    table = Table(
+        title=f"{figures['robot']} · {figures['drives']} drives of {figures['seconds']:g} s · "
+        f"poses {figures['latency_ms']:g} ms late"
+    )
+    table.add_column("poses")
+    table.add_column("method")
+    for column in ("velocity off, mm/s", "turn rate off, mrad/s", "late, ms", "gain"):
+        table.add_column(column, justify="right")
+    for row in figures["rows"]:
+        table.add_row(
+            f"{row['pose_rate_hz']:g} Hz" if row["method"] == mean else "",
+            row["method"],
+            f"{1e3 * row['velocity_rmse_m_s']:.1f}",
+            f"{1e3 * row['yaw_rate_rmse_rad_s']:.1f}",
+            f"{row['delay_ms']:.1f}",
+            f"{100.0 * row['gain_error']:+.1f} %",
+        )
+    output.print(table)
+    for line in figures["required"]:
+        output.print(
+            f"{line['pose_rate_hz']:g} Hz: velocity error {line['rmse_share']:.2f} of the mean's "
+            f"(at most {line['rmse_share_limit']:g}), {line['delay_ms']:.1f} ms late "
+            f"(less than {line['delay_limit_ms']:g}): {'met' if line['passed'] else 'missed'}"
+        )

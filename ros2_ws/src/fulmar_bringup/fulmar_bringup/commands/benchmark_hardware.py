@@ -1,0 +1,91 @@
+"""`fulmar benchmark hardware`: closed loops through the protocols of real devices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.console import output, print_json
+from fulmar_bringup.progress import work_bar
+from fulmar_core.exit_codes import FAILED
+
+
+def hardware(
+    only: Annotated[
+        str | None,
+        typer.Option(
+            "--hardware",
+            metavar="F,...",
+            help="Files of configs/hardware, with commas between; all by default.",
+        ),
+    ] = None,
+    episodes: Annotated[int, typer.Option(metavar="N", min=1, help="Episodes of each device.")] = 40,
+    seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=5.0, help="Length of an episode; the task's own by default."),
+    ] = None,
+    jobs: Annotated[
+        int,
+        typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each."),
+    ] = 3,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep what came of each episode, and do not repeat what is there."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Drive emulated devices to their goals, through driver and wire protocol, in real time, with the shipped policies.
+
+    Each episode is `fulmar run --backend hardware --emulate` with a seed of its own. Success is that of `fulmar run`,
+    judged by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
+    With --out, a campaign that was broken off goes on where it was. The exit code is 1 where a device reaches its goal
+    too rarely.
+
+    Try:
+
+    fulmar benchmark hardware --hardware turtlebot2 --episodes 8 --seconds 25
+    """
+    from fulmar_bringup.benchmark.closed_loops import Campaign, measure
+    from fulmar_bringup.benchmark.hardware import cases_of
+    from fulmar_bringup.extras import require
+    from fulmar_bringup.system import modules_of
+
+    cases = cases_of([name.strip() for name in only.split(",")] if only else None)
+    for case in cases:
+        require(*modules_of("policy", "hardware", hardware=case.name, emulated=True))
+    total = len(cases) * episodes
+    with work_bar("driving") as moved:
+        found = measure(cases, Campaign(episodes, seconds, jobs, out), lambda done: moved(done, total))
+    if as_json:
+        print_json({"cases": found, "jobs": jobs, "passed": all(case["passed"] for case in found)})
+    else:
+        _print(found)
+    if not all(case["passed"] for case in found):
+        raise typer.Exit(FAILED)
+
+
+def _print(found: list[dict[str, Any]]) -> None:
+    table = Table(title="goals reached through emulated devices")
+    for column in ("hardware", "driver", "task"):
+        table.add_column(column)
+    for column in ("reached", "share", "required", "watchdog trips"):
+        table.add_column(column, justify="right")
+    for case in found:
+        table.add_row(
+            case["hardware"],
+            case["driver"],
+            case["task"],
+            f"{case['succeeded']}/{case['episodes']}",
+            f"{case['share']:.3f}",
+            f"{case['required']:.2f}",
+            str(case["watchdog_trips"]),
+        )
+    output.print(table)
+    for case in found:
+        for missed in case["missed"]:
+            why = missed["failure"] or f"{missed['final_position_error_m']:.2f} m off"
+            output.print(f"  {case['hardware']}, seed {missed['seed']}: {why}", markup=False)

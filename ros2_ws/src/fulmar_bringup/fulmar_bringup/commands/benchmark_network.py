@@ -1,0 +1,74 @@
+"""`fulmar benchmark network`: goals reached although the controller is behind a bad cable."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.console import output, print_json
+from fulmar_bringup.progress import work_bar
+from fulmar_core.errors import ConfigError
+from fulmar_core.exit_codes import FAILED
+
+
+def network(
+    robot: Annotated[
+        str, typer.Option(metavar="R", help="A name from `fulmar list robots`.")
+    ] = "floating_platform",
+    task: Annotated[str, typer.Option(metavar="T", help="A name from `fulmar list tasks`.")] = "go_to_pose",
+    episodes: Annotated[int, typer.Option(metavar="N", min=1)] = 40,
+    seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=5.0, help="Length of an episode; the task's own by default."),
+    ] = None,
+    loss: Annotated[float, typer.Option(metavar="SHARE", min=0.0, max=1.0, help="Of all frames.")] = 0.1,
+    delay_ms: Annotated[float, typer.Option(metavar="MS", min=0.0, help="Of each frame.")] = 20.0,
+    jitter_ms: Annotated[float, typer.Option(metavar="MS", min=0.0, help="More or less than that.")] = 10.0,
+    copies: Annotated[int, typer.Option(metavar="N", min=1, max=3, help="Of each command.")] = 3,
+    jobs: Annotated[
+        int, typer.Option(metavar="N", min=1, max=16, help="Systems beside each other, three processes each.")
+    ] = 2,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep what came of each episode, and do not repeat what is there."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Drive a robot in MuJoCo, in real time, by a controller on another host, over a cable that loses and delays.
+
+    The hosts are network namespaces, which needs root. Each episode is `fulmar run` with a seed of its own, also for
+    the fate of frames, in both directions and from discovery on. A pause that trips the watchdog fails the episode.
+    The exit code is 1 where fewer than 95 % reach their goal.
+
+    Try:
+
+    fulmar benchmark network --episodes 4 --seconds 20
+    """
+    from fulmar_bringup.benchmark.closed_loops import Campaign, measure
+    from fulmar_bringup.benchmark.network import NetworkCase
+    from fulmar_bringup.extras import require
+    from fulmar_bringup.faults.two_hosts import Quality, why_not
+    from fulmar_bringup.system import modules_of
+
+    if why_not():
+        raise ConfigError(f"{why_not()}.")
+    require(*modules_of("policy", "mujoco"))
+    name = f"{robot}_{task}_{loss:g}_{delay_ms:g}_{jitter_ms:g}_x{copies}"
+    case = NetworkCase(name, robot, task, Quality(loss, delay_ms / 1e3, jitter_ms / 1e3), copies)
+    with work_bar("driving") as moved:
+        campaign = Campaign(episodes, seconds, jobs, out)
+        (figures,) = measure([case], campaign, lambda done: moved(done, episodes))
+    if as_json:
+        print_json(figures)
+    else:
+        output.print(
+            f"{figures['succeeded']} of {figures['episodes']} episodes reached their goal "
+            f"({figures['share']:.3f}, required {figures['required']:.2f})"
+        )
+        for missed in figures["missed"]:
+            output.print(f"  seed {missed['seed']}: {missed['failure'] or 'missed the goal'}", markup=False)
+    if not figures["passed"]:
+        raise typer.Exit(FAILED)

@@ -1,0 +1,50 @@
+"""`fulmar swap`: go on with another policy, while a robot is driven by one."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.commands.arguments import JsonOption, RobotArgument
+from fulmar_bringup.console import output, print_json
+from fulmar_core.errors import RunFailed
+from fulmar_core.exit_codes import FAILED
+
+FIND_S, LOAD_S = 5.0, 20.0
+
+
+def swap(
+    robot: RobotArgument,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A policy bundle, on the robot's own disk.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Let a running robot go on with another policy.
+
+    It is loaded and warmed up beside the one that runs, and takes over between two commands. A bundle that is damaged,
+    for another robot, task or rate, or not signed where that is asked for, is refused, and the policy that runs goes
+    on. Exit code 1 then.
+
+    Try:
+
+    fulmar swap floating_platform runs/bundles/go_to_pose
+    """
+    from fulmar_bringup.robot_operator import operator
+
+    with operator() as person:
+        sent = str(folder.absolute())
+        status = person.say_swap(robot, sent, find_s=FIND_S)
+        until = time.monotonic() + LOAD_S
+        while not status.get("swap", "").startswith(("done", "refused")):
+            if time.monotonic() > until:
+                raise RunFailed(f"the controller of '{robot}' did not answer within {LOAD_S:g} s.")
+            time.sleep(0.02)
+    done = status["swap"].startswith("done")
+    if as_json:
+        print_json({"robot": robot, "policy": sent, "done": done, "said": status["swap"]})
+    else:
+        output.print(status["swap"], markup=False)
+    if not done:
+        raise typer.Exit(FAILED)

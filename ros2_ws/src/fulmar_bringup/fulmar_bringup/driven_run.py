@@ -1,0 +1,48 @@
+"""A bag as the estimators of `fulmar_core.identification` see it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fulmar_bringup.bag_reader import read_run
+from fulmar_core.errors import ConfigError
+from fulmar_core.identification.drive import Drive, drive_of
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.rotation import yaw_of
+
+
+def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive]:
+    """Read the measured poses and what the actuators did.
+
+    Args:
+        path: Bag folder, or the MCAP file in it.
+        load: Number of the ballast that was aboard; 0 for none.
+
+    Returns:
+        The robot and its run. The simulator's own truth is not looked at, even where the bag has it.
+
+    Raises:
+        BagError: There is no bag, or it cannot be read.
+        ConfigError: It does not say which robot it is of, or has no poses or commands of it.
+    """
+    record = read_run(path)
+    robot = load_robot(str(record.info.get("robot", "")))
+    # What was applied knows of limits and watchdog; a bag without it has at least what was asked for.
+    actuation = record.applied if len(record.applied) else record.commanded
+    width = len(robot.actuators.names)
+    if len(actuation) and actuation.effort.shape[1] != width:
+        raise ConfigError(
+            f"{path}: commands have {actuation.effort.shape[1]} values, '{robot.name}' takes {width}."
+        )
+    odometry = record.odom
+    return robot, drive_of(
+        str(path),
+        odometry.stamp_s,
+        odometry.position[:, :2],
+        np.asarray(yaw_of(odometry.quat_xyzw)),
+        actuation.stamp_s,
+        actuation.effort,
+        load=load,
+    )

@@ -1,0 +1,1 @@
+"""Faults done to a live system, and what it makes of them."""

@@ -1,0 +1,154 @@
+"""A person's side of a system that runs already: asks its services, from a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Callable, Iterator
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger
+
+from fulmar_bringup.processes import child_environment
+from fulmar_core.errors import RunFailed
+from fulmar_core.safety.estop import REPUBLISH_HZ
+from fulmar_core.topics import ESTOP, STATUS, SWAP
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
+
+FIND_S, ANSWER_S, SAY_S = 3.0, 2.0, 1.0
+LOOK_S, SETTLE_S = 0.05, 0.3
+
+
+class Operator:
+    """Finds robots by what they offer, and asks."""
+
+    def __init__(self, node: Node) -> None:
+        """Ask through a node that spins already."""
+        self._node = node
+
+    def robots_with(self, service: str, robot: str | None, *, wait_s: float) -> list[str]:
+        """Namespaces that offer a service, as soon as one does; only that of one robot, if it is named."""
+        return self._found(
+            lambda: [
+                name.removesuffix(f"/{service}")
+                for name, _ in self._node.get_service_names_and_types()
+                if name.endswith(f"/{service}")
+            ],
+            robot,
+            wait_s,
+        )
+
+    def plants(self, robot: str | None, *, wait_s: float) -> list[str]:
+        """Namespaces in which a plant runs; arguments as of `robots_with`."""
+        return self._found(
+            lambda: [space for name, space in self._node.get_node_names_and_namespaces() if name == "plant"],
+            robot,
+            wait_s,
+        )
+
+    def ask(self, service: str) -> tuple[bool, str]:
+        """Call a Trigger service by its full name.
+
+        Returns:
+            Whether it was done, and what was said.
+
+        Raises:
+            RunFailed: No answer comes.
+        """
+        client = self._node.create_client(Trigger, service)
+        if not client.wait_for_service(ANSWER_S):
+            raise RunFailed(f"nobody answers on {service}.")
+        future = client.call_async(Trigger.Request())
+        until = time.monotonic() + ANSWER_S
+        while not future.done():
+            if time.monotonic() > until:
+                raise RunFailed(f"{service} did not answer within {ANSWER_S:g} s.")
+            time.sleep(0.005)
+        return future.result().success, future.result().message
+
+    def say_stop(self, space: str) -> bool:
+        """Say on the wire itself that the e-stop is pressed, for those who have no e-stop node.
+
+        Returns:
+            Whether somebody hears it.
+        """
+        publisher = self._node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
+        until = time.monotonic() + FIND_S
+        while not publisher.get_subscription_count() and time.monotonic() < until:
+            publisher.publish(Bool(data=True))
+            time.sleep(LOOK_S)
+        heard = bool(publisher.get_subscription_count())
+        until = time.monotonic() + SAY_S
+        while time.monotonic() < until:
+            publisher.publish(Bool(data=True))
+            time.sleep(1.0 / REPUBLISH_HZ)
+        return heard
+
+    def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
+        """Ask a controller to go on with another policy.
+
+        Args:
+            robot: Whose controller.
+            folder: The bundle, on the robot's own disk.
+            find_s: How long to look for the controller [s].
+
+        Returns:
+            What the controller says of itself from then on; `swap` tells what came of it.
+
+        Raises:
+            RunFailed: There is no controller.
+        """
+        status: dict[str, str] = {}
+
+        def hear(message: DiagnosticArray) -> None:
+            values = {pair.key: pair.value for pair in message.status[0].values} if message.status else {}
+            if folder in values.get("swap", ""):
+                status.update(values)
+
+        publisher = self._node.create_publisher(String, f"/{robot}/{SWAP.name}", publisher_qos(SWAP))
+        until = time.monotonic() + find_s
+        while not publisher.get_subscription_count():
+            if time.monotonic() > until:
+                raise RunFailed(f"no controller of '{robot}' is heard in this ROS domain.")
+            time.sleep(LOOK_S)
+        time.sleep(SETTLE_S)  # a match is seen here a moment before the other side is ready
+        publisher.publish(String(data=folder))
+        publisher.wait_for_all_acked(Duration(seconds=ANSWER_S))
+        time.sleep(SETTLE_S)  # what it says from now on is about this request
+        qos = subscriber_qos(STATUS, reliable=True)
+        self._node.create_subscription(DiagnosticArray, f"/{robot}/{STATUS.name}", hear, qos)
+        return status
+
+    def _found(self, look: Callable[[], list[str]], robot: str | None, wait_s: float) -> list[str]:
+        until = time.monotonic() + wait_s
+        while True:
+            found = sorted(set(look()))
+            if robot is not None:
+                found = [space for space in found if space == f"/{robot}"]
+            if time.monotonic() > until or (found and robot is not None):
+                return found
+            if found:  # who is found first is rarely alone: the others get a moment
+                until = min(until, time.monotonic() + SETTLE_S)
+            time.sleep(LOOK_S)
+
+
+@contextlib.contextmanager
+def operator() -> Iterator[Operator]:
+    """An operator whose node spins until the context ends."""
+    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    os.environ[key] = child_environment()[key]
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    errors: list[Exception] = []
+    node = rclpy.create_node(f"operator_{os.getpid()}")
+    try:
+        with spinning(node, errors.append):
+            yield Operator(node)
+    finally:
+        rclpy.try_shutdown()

@@ -1,0 +1,135 @@
+"""Planar motion as an extended Kalman filter: nine states, moved on by an inertial unit, corrected by poses.
+
+filterpy does the filtering; here are the model and its derivatives. The accelerometer drives the velocities as an
+input (Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508, section 5, in the plane),
+the gyroscope measures the turn rate.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+
+from fulmar_core.estimation.settings import EstimatorSettings
+
+STATES = 9
+X, Y, YAW, VX, VY, RATE, BIAS_X, BIAS_Y, BIAS_RATE = range(STATES)
+POSE, MOTION = [X, Y, YAW], [VX, VY, RATE]
+SPREAD_AT_START = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.05, 0.05, 0.02)  # m, rad, m/s, rad/s, m/s², rad/s
+_POSE_ROWS, _GYRO_ROW = np.eye(STATES)[POSE], np.eye(STATES)[[RATE]] + np.eye(STATES)[[BIAS_RATE]]
+
+Snapshot = tuple[np.ndarray, np.ndarray]
+
+
+class MotionFilter(ExtendedKalmanFilter):  # type: ignore[misc]
+    """Position, heading, velocity and turn rate, with the biases of the inertial unit.
+
+    `x` holds (x, y) [m], yaw [rad], (v_x, v_y) in the world [m/s], turn rate [rad/s], then the biases of the
+    accelerometer along the body's axes [m/s²] and of the gyroscope [rad/s].
+    """
+
+    def __init__(self, settings: EstimatorSettings, pose: np.ndarray) -> None:
+        """Begin at rest at a pose (x [m], y [m], yaw [rad]), knowing little else."""
+        super().__init__(dim_x=STATES, dim_z=3)
+        self._settings = settings
+        self.x = np.zeros(STATES)
+        self.x[POSE] = pose
+        spread = np.array(SPREAD_AT_START)
+        spread[POSE] = settings.position_std, settings.position_std, settings.heading_std
+        self.P = np.diag(spread**2)
+        self._pose_noise = np.diag(spread[POSE] ** 2)
+        self._gyro_noise = np.array([[settings.gyroscope_std**2]])
+
+    def move_on(self, seconds: float, force: np.ndarray | None) -> None:
+        """Predict.
+
+        Args:
+            seconds: How far, >= 0 [s].
+            force: Specific force along the body's level x and y in that time, shape (2,); None if nobody measured
+                it [m/s²].
+        """
+        if seconds <= 0.0:
+            return
+        s, t = self._settings, seconds
+        push = 0.0 if force is not None else s.manoeuvre
+        noise = s.acceleration_noise if force is not None else push
+        self._prepare(t, force, noise)
+        self.predict(u=(t, force))
+
+    def predict_x(self, u: Any = 0) -> None:
+        """Move the state on, exactly for an acceleration that stays the same in the world; see `move_on`."""
+        t, force = u
+        a = self._acceleration(force)
+        self.x = self.x.copy()
+        self.x[[X, Y]] += t * self.x[[VX, VY]] + 0.5 * t * t * a
+        self.x[[VX, VY]] += t * a
+        self.x[YAW] += t * self.x[RATE]
+
+    def see_turn_rate(self, turn_rate: float) -> None:
+        """Correct by a reading of the gyroscope [rad/s]."""
+        self.update(
+            np.array([turn_rate]),
+            lambda _x: _GYRO_ROW,
+            lambda x: np.array([x[RATE] + x[BIAS_RATE]]),
+            R=self._gyro_noise,
+        )
+
+    def distance2(self, pose: np.ndarray) -> float:
+        """Squared Mahalanobis distance of a pose (x, y, yaw) from what is expected [-]."""
+        y = self._pose_error(pose, self.x[POSE])
+        spread = self.P[np.ix_(POSE, POSE)] + self._pose_noise
+        return float(y @ np.linalg.solve(spread, y))
+
+    def see_pose(self, pose: np.ndarray) -> None:
+        """Correct by a pose (x [m], y [m], yaw [rad])."""
+        self.update(
+            pose, lambda _x: _POSE_ROWS, lambda x: x[POSE], R=self._pose_noise, residual=self._pose_error
+        )
+
+    def snapshot(self) -> Snapshot:
+        """State and covariance, to go back to."""
+        return self.x, self.P  # filterpy replaces both, and changes neither in place
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back."""
+        self.x, self.P = snapshot
+
+    def _acceleration(self, force: np.ndarray | None) -> np.ndarray:
+        """In the world, shape (2,) [m/s²]."""
+        if force is None:
+            return np.zeros(2)
+        ahead, left = force[0] - self.x[BIAS_X], force[1] - self.x[BIAS_Y]
+        c, s = math.cos(self.x[YAW]), math.sin(self.x[YAW])
+        return np.array([c * ahead - s * left, s * ahead + c * left])
+
+    def _prepare(self, t: float, force: np.ndarray | None, acceleration_noise: float) -> None:
+        """Derivative of the motion, and what noise adds to it."""
+        F = np.eye(STATES)
+        F[X, VX] = F[Y, VY] = F[YAW, RATE] = t
+        half = 0.5 * t * t
+        if force is not None:
+            ax, ay = self._acceleration(force)
+            c, s = math.cos(self.x[YAW]), math.sin(self.x[YAW])
+            for row, gain in (([X, Y], half), ([VX, VY], t)):
+                F[row, YAW] = gain * np.array([-ay, ax])
+                F[row, BIAS_X] = -gain * np.array([c, s])
+                F[row, BIAS_Y] = -gain * np.array([-s, c])
+        self.F = F
+        Q = np.zeros((STATES, STATES))
+        speeds = ((X, VX, acceleration_noise), (Y, VY, acceleration_noise), (YAW, RATE, self._settings.spin))
+        for place, speed, density in speeds:
+            q = density**2
+            Q[place, place], Q[speed, speed] = q * t**3 / 3.0, q * t
+            Q[place, speed] = Q[speed, place] = q * t * t / 2.0
+        Q[BIAS_X, BIAS_X] = Q[BIAS_Y, BIAS_Y] = self._settings.accelerometer_drift**2 * t
+        Q[BIAS_RATE, BIAS_RATE] = self._settings.gyroscope_drift**2 * t
+        self.Q = Q
+
+    @staticmethod
+    def _pose_error(measured: np.ndarray, expected: np.ndarray) -> np.ndarray:
+        error: np.ndarray = measured - expected
+        error[2] = math.remainder(error[2], 2.0 * math.pi)
+        return error

@@ -1,0 +1,125 @@
+"""From driven runs of one robot to its calibration: the model of its family, what sets the scale, and the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.calibration import Calibration, Measured
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.identification.boat import BoatModel
+from fulmar_core.identification.drive import Drive
+from fulmar_core.identification.fit import Fit, fit
+from fulmar_core.identification.model import Known, Model
+from fulmar_core.identification.platform import PlatformModel, ballast_name
+from fulmar_core.identification.wheels import WheelModel
+from fulmar_core.robot import Robot
+
+EXACT = 1e-6  # relative standard deviation of what is said to be known without an error
+SIGMAS = 1.96  # half a 95 % interval, in standard deviations
+
+
+@dataclass(frozen=True)
+class Weight:
+    """A ballast as it was weighed."""
+
+    mass: float  # [kg]
+    error: float = 0.0  # half of the interval that holds the mass with 95 % confidence [kg]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What a robot's runs told."""
+
+    fit: Fit
+    scale: str  # what the scale of forces rests on, in a sentence
+    trusted: bool  # whether that was measured; False: it is the robot's YAML
+
+
+def identify(
+    robot: Robot,
+    drives: Sequence[Drive],
+    *,
+    known: Sequence[Known] = (),
+    ballasts: Mapping[int, Weight] | None = None,
+) -> Identified:
+    """Estimate everything that a robot's runs tell.
+
+    Args:
+        robot: The nominal robot.
+        drives: Its runs; `load` says which ballast was aboard.
+        known: Quantities that were measured otherwise.
+        ballasts: Of each load that appears in the runs.
+
+    Returns:
+        Estimates with 95 % intervals, and what they rest on.
+
+    Raises:
+        ConfigError: There is no model for the robot, a known quantity is none of its unknowns, or the runs are too
+            short or too poor.
+    """
+    ballasts = dict(ballasts or {})
+    model, scale, trusted, known = _prepared(robot, list(known), ballasts)
+    names = [unknown.name for unknown in model.unknowns]
+    for each in known:
+        if each.name not in names:
+            raise UnknownNameError("quantity", each.name, names)
+    noise = robot.sensors.odometry
+    found = fit(
+        model,
+        drives,
+        known,
+        dt=robot.timing.physics_dt,
+        noise=(max(noise.position.std, 1e-4), max(noise.heading.std, 1e-4)),
+    )
+    return Identified(found, scale, trusted)
+
+
+def calibration_of(robot: Robot, identified: Identified, runs: Sequence[str] = ()) -> Calibration:
+    """What a simulation can take over: everything but the ballasts."""
+    allowed = {field.name for field in fields(Calibration)}
+    measured = {
+        name: Measured(found.value, found.low, found.high)
+        for name, found in identified.fit.estimates.items()
+        if name in allowed
+    }
+    return Calibration(robot=robot.name, runs=tuple(runs), **measured)
+
+
+def _prepared(
+    robot: Robot, known: list[Known], ballasts: Mapping[int, Weight]
+) -> tuple[Model, str, bool, list[Known]]:
+    """Model, what sets the scale, whether that was measured, and everything known."""
+    if isinstance(robot.actuators, Thrusters):
+        for load, weight in ballasts.items():
+            std = max(weight.error / SIGMAS, EXACT * weight.mass)
+            known.append(Known(ballast_name(load), weight.mass, std))
+        model = PlatformModel(robot, {load: weight.mass for load, weight in ballasts.items()})
+        named = sorted({each.name for each in known} & {"mass", "thrust"})
+        if named or ballasts:
+            said = [f"a known {name}" for name in named] + (["a ballast of known mass"] if ballasts else [])
+            return model, f"mass and thrust rest on {' and '.join(said)}", True, known
+        low, high = robot.uncertainty.mass
+        known.append(Known("mass", robot.body.mass, (high - low) / (2.0 * SIGMAS)))
+        scale = (
+            f"mass and thrust rest on the mass of the robot's YAML, {low:g} to {high:g} kg, since motion shows only "
+            "their ratio: weigh the robot (--known mass=KG+-KG), or record another run with a ballast "
+            "(--ballast BAG=KG+-KG)"
+        )
+        return model, scale, False, known
+    if ballasts:
+        raise ConfigError(
+            f"--ballast is for robots with thrusters; '{robot.name}' has {robot.actuators.kind}."
+        )
+    if isinstance(robot.actuators, Propellers) and robot.hydrodynamics is not None:
+        scale = "mass, inertia and drag rest on the thrust curve of the robot's YAML"
+        return BoatModel(robot), scale, True, known
+    if isinstance(robot.actuators, DifferentialDrive):
+        return WheelModel(robot), "speeds need no scale", True, known
+    raise ConfigError(
+        f"there is no model to identify '{robot.name}' ({robot.actuators.kind}) by; "
+        "there is one for thrusters, propellers on water and differential_drive."
+    )

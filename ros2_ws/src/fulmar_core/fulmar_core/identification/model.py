@@ -1,0 +1,88 @@
+"""What a fit needs to know of a family of robots: its unknowns, and where they would have taken the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Protocol
+
+import numpy as np
+
+from fulmar_core.counter_rng import Draws
+from fulmar_core.disturbances.scenario import Scenario, draw_world
+from fulmar_core.disturbances.world import World
+from fulmar_core.identification.windows import Windows
+from fulmar_core.robot import Robot
+
+Values = Mapping[str, np.ndarray]  # each unknown in its own unit, shape (copies, 1)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number to estimate."""
+
+    name: str
+    start: float  # where the search begins; the nominal value
+    unit: str
+    positive: bool = True  # searched by its logarithm: it has a size, and so has its relative error
+    scale: float = 1.0  # its usual size, for one that may be 0 or less
+
+    def to_search(self, value: float) -> float:
+        """The number that the fit works with."""
+        return float(np.log(value)) if self.positive else value / self.scale
+
+    def from_search(self, place: np.ndarray) -> np.ndarray:
+        """Values of such numbers."""
+        return np.exp(place) if self.positive else place * self.scale
+
+
+@dataclass(frozen=True)
+class Known:
+    """A number that was measured otherwise: by weighing, from a data sheet."""
+
+    name: str  # of an unknown
+    value: float
+    std: float  # standard deviation of its error, > 0
+
+
+class Model(Protocol):
+    """One family of robots.
+
+    Attributes:
+        unknowns: The same for all windows.
+        own: How many numbers each window has for itself: its first state, and what pushes during it.
+        spans_s: Lengths of windows, from the first fit to the last one: short ones find their way from far off.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    own: int
+    spans_s: tuple[float, ...]
+
+    def predict(self, values: Values, own: np.ndarray, windows: Windows) -> np.ndarray:
+        """Poses at all grid points.
+
+        Args:
+            values: The unknowns.
+            own: Each window's own numbers, of which the first six are its first state, shape (own, copies, windows).
+            windows: Their commands and times.
+
+        Returns:
+            Shape (steps + 1, 3, copies, windows) [m, m, rad].
+        """
+        ...
+
+    def own_of(self, states: np.ndarray) -> np.ndarray:
+        """Each window's own numbers to begin with, shape (own, w), from its first state, shape (6, w)."""
+        ...
+
+
+def nominal_world(robot: Robot, **instead: np.ndarray) -> World:
+    """A still world around the nominal robot.
+
+    Args:
+        robot: The robot.
+        instead: Arrays that take the place of nominal values.
+    """
+    calm = Scenario("calm", sensor_noise=False, body="nominal")
+    nominal = draw_world(robot, calm, Draws(0, np.zeros(1), np.zeros(1)))
+    return World(*(instead.get(field.name, getattr(nominal, field.name)) for field in fields(World)))

@@ -1,0 +1,66 @@
+"""Two driven wheels: how far the body goes and turns for what it is told.
+
+Commands are speeds, so nothing here has the scale of a force: wheels that are larger than the base believes make every
+speed larger by one factor, and a wheel base that is narrower makes turn rates larger by another one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.dynamics.rolling import SERVO_S
+from fulmar_core.identification.held_input import followed, for_each_copy
+from fulmar_core.identification.model import Unknown, Values
+from fulmar_core.identification.windows import Windows
+from fulmar_core.robot import Robot
+
+
+class WheelModel:
+    """Unknowns: factors on speed and turn rate, lag of the wheels' servos, delay."""
+
+    own = 6
+    spans_s: tuple[float, ...] = (3.0, 8.0, 15.0)
+
+    def __init__(self, robot: Robot) -> None:
+        """Prepare.
+
+        Args:
+            robot: The nominal robot; its limits and slew are taken for true.
+        """
+        assert isinstance(robot.actuators, DifferentialDrive)
+        self._drive = robot.actuators
+        response = robot.actuators.response
+        self.unknowns: tuple[Unknown, ...] = (
+            Unknown("wheel_scale", 1.0, "-"),
+            Unknown("turn_scale", 1.0, "-"),
+            Unknown("lag", max(response.lag_s, SERVO_S), "s"),
+            Unknown("delay", response.delay_s, "s", positive=False),
+        )
+
+    def own_of(self, states: np.ndarray) -> np.ndarray:
+        """See `Model.own_of`: pose, speed ahead, slip across (none), turn rate."""
+        x, y, yaw, vx, vy, rate = states
+        ahead = np.cos(yaw) * vx + np.sin(yaw) * vy
+        return np.stack((x, y, yaw, ahead, np.zeros_like(x), rate))
+
+    def predict(self, values: Values, own: np.ndarray, windows: Windows) -> np.ndarray:
+        """See `Model.predict`.
+
+        The recursion of `rolling_step` without its limits of force, which a run on a floor does not reach: the servos
+        are linear then, and slopes exist everywhere.
+        """
+        targets = for_each_copy(
+            lambda delay: followed(windows, delay, self._drive.response.slew), values["delay"]
+        )
+        x, y, yaw, speed, _, rate = own
+        share = np.minimum(windows.dt / values["lag"], 1.0)
+        poses = np.empty((windows.steps + 1, 3, *own.shape[1:]))
+        poses[0] = x, y, yaw
+        for step in range(windows.steps):
+            speed = speed + share * (targets[step, 0] * values["wheel_scale"] - speed)
+            rate = rate + share * (targets[step, 1] * values["turn_scale"] - rate)
+            yaw = yaw + windows.dt * rate
+            x, y = x + windows.dt * speed * np.cos(yaw), y + windows.dt * speed * np.sin(yaw)
+            poses[step + 1] = x, y, yaw
+        return poses

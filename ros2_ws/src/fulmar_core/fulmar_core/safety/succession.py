@@ -1,0 +1,94 @@
+"""Which controller has its turn: the one that was asked for, a better one while it runs, or the fallback."""
+
+from __future__ import annotations
+
+import threading
+from typing import Generic, TypeVar
+
+from fulmar_core.safety.command_gate import REJECTIONS_TO_LATCH, Rejections
+
+T = TypeVar("T")
+
+
+class Succession(Generic[T]):
+    """Changes happen between two control steps only; `propose` may be called from any thread.
+
+    Attributes:
+        current: Whose turn it is.
+        fell_back: Why it is the fallback's; empty if it is not.
+    """
+
+    def __init__(
+        self,
+        first: T | None,
+        fallback: T | None = None,
+        *,
+        refused: str = "",
+        to_latch: int = REJECTIONS_TO_LATCH,
+    ) -> None:
+        """Begin.
+
+        Args:
+            first: Who was asked for; None if it was refused.
+            fallback: Who takes over when that fails.
+            refused: Why there is no first.
+            to_latch: So many refused commands in a row end a controller's turn.
+        """
+        current = first if first is not None else fallback
+        if current is None:
+            raise ValueError("neither a controller nor a fallback")
+        self.current: T = current
+        self.fell_back = "" if first is not None else refused
+        self._fallback, self._to_latch = fallback, to_latch
+        self._rejections = Rejections(to_latch)
+        self._past_rejections = 0
+        self._lock = threading.Lock()
+        self._next: T | None = None
+
+    @property
+    def rejections(self) -> int:
+        """Commands that were refused so far, of whomever."""
+        return self._past_rejections + self._rejections.total
+
+    def propose(self, candidate: T) -> None:
+        """Let somebody take over at the next `turn`."""
+        with self._lock:
+            self._next = candidate
+
+    def turn(self) -> bool:
+        """Between two steps: let the candidate take over, if there is one.
+
+        Returns:
+            Whether `current` is another now.
+        """
+        if self._next is None:
+            return False
+        with self._lock:
+            candidate, self._next = self._next, None
+        assert candidate is not None
+        self._change(candidate, "")
+        return True
+
+    def judge(self, problem: str | None) -> str | None:
+        """Note the verdict on a command of `current`.
+
+        Args:
+            problem: Why it was refused, or None.
+
+        Returns:
+            The fault to latch, or None; where a fallback is left it takes over instead.
+        """
+        fault = self._rejections.note(problem)
+        return None if fault and self.fall_back(fault) else fault
+
+    def fall_back(self, reason: str) -> bool:
+        """Let the fallback take over at once; false if there is none, or if it has failed itself."""
+        if self._fallback is None or self.current is self._fallback:
+            return False
+        self._change(self._fallback, reason)
+        return True
+
+    def _change(self, successor: T, reason: str) -> None:
+        self._past_rejections += self._rejections.total
+        self._rejections = Rejections(self._to_latch)
+        self.current, self.fell_back = successor, reason

@@ -1,0 +1,142 @@
+"""A person's hand on a robot: wishes to commands, and the dead-man switch. No ROS, no clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.controllers.valve_allocation import ValveAllocation
+from fulmar_core.robot import Robot
+
+VALVE_COST = 0.02  # of an open valve, where a full wish has a cost of 1: small wishes open nothing
+KEY_HOLDS_NS = 600_000_000  # a key that is held repeats within this time, also after its first, longer wait
+JOY_LASTS_NS = 300_000_000  # a gamepad that is silent for longer is gone
+MOST_AXES = 64  # a gamepad with more is none
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a person asks for, each from -1 to 1 of what the robot can."""
+
+    ahead: float = 0.0
+    left: float = 0.0
+    turn: float = 0.0  # to the left
+
+    @property
+    def parts(self) -> tuple[float, float, float]:
+        """All three."""
+        return self.ahead, self.left, self.turn
+
+
+NOTHING = Wish()
+
+
+def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:
+    """From wishes to commands of a robot, shape (n,), within its limits; no wish is the safe command."""
+    actuators = robot.actuators
+    if isinstance(actuators, Thrusters):
+        return _valves(robot, actuators)
+    if isinstance(actuators, Propellers):
+        signs = np.sign(actuators.lever_arms)
+        return lambda wish: np.asarray(actuators.limited(np.asarray(wish.ahead) + signs * wish.turn))
+    assert isinstance(actuators, DifferentialDrive | Ackermann)
+    return lambda wish: np.asarray(actuators.limited(np.array([wish.ahead, wish.turn]) * actuators.scale))
+
+
+def _valves(robot: Robot, thrusters: Thrusters) -> Callable[[Wish], np.ndarray]:
+    full = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
+    table = ValveAllocation(thrusters, weight=np.diag(1.0 / full**2), valve_cost=VALVE_COST)
+    return lambda wish: np.asarray(table.best(full * np.array(wish.parts)))
+
+
+class Keyboard:
+    """Keys that are held down, as a terminal tells them: by repeating them."""
+
+    WISHES = {  # noqa: RUF012 - a table
+        "w": ("ahead", 1.0),
+        "s": ("ahead", -1.0),
+        "a": ("turn", 1.0),
+        "d": ("turn", -1.0),
+        "q": ("left", 1.0),
+        "e": ("left", -1.0),
+    }
+
+    def __init__(self) -> None:
+        """Begin with no key down."""
+        self._held: dict[str, tuple[float, int]] = {}
+
+    def press(self, key: str, now_ns: int) -> bool:
+        """Note a key at this time of a steady clock [ns]; whether it wishes anything. The space bar lets go of all."""
+        if key == " ":
+            self._held.clear()
+        if key not in self.WISHES:
+            return False
+        axis, value = self.WISHES[key]
+        self._held[axis] = value, now_ns + KEY_HOLDS_NS
+        return True
+
+    def wish(self, now_ns: int) -> Wish | None:
+        """What the keys that are down wish; None if none is: the dead man let go."""
+        held = {axis: value for axis, (value, until_ns) in self._held.items() if now_ns <= until_ns}
+        return Wish(**held) if held else None
+
+
+@dataclass(frozen=True)
+class JoyLayout:
+    """Which axes and buttons of a gamepad mean what, counted from 0; by default those of an Xbox pad."""
+
+    ahead_axis: int = 1
+    left_axis: int = 0
+    turn_axis: int = 3
+    deadman_button: int = 4  # left shoulder: nothing moves without it
+    give_back_button: int = 5  # right shoulder
+
+    @property
+    def axes(self) -> tuple[int, int, int]:
+        """Of the three wishes."""
+        return self.ahead_axis, self.left_axis, self.turn_axis
+
+
+class Gamepad:
+    """The newest state of a gamepad."""
+
+    def __init__(self, layout: JoyLayout) -> None:
+        """Begin with nothing pressed."""
+        self._layout = layout
+        self._wish: Wish | None = None
+        self._until_ns = 0
+        self.gives_back = False
+
+    def see(self, axes: Sequence[float], buttons: Sequence[int], now_ns: int) -> str:
+        """Note a message at this time of a steady clock [ns].
+
+        Returns:
+            Why it is not believed, which counts as letting go; empty if it is.
+        """
+        problem = self._problem(axes, buttons)
+        held = not problem and bool(buttons[self._layout.deadman_button])
+        self.gives_back = not problem and not held and bool(buttons[self._layout.give_back_button])
+        self._wish = Wish(*(min(1.0, max(-1.0, float(axes[i]))) for i in self._layout.axes)) if held else None
+        self._until_ns = now_ns + JOY_LASTS_NS
+        return problem
+
+    def wish(self, now_ns: int) -> Wish | None:
+        """What it wishes; None if the dead-man button is not held, or the pad is silent."""
+        return self._wish if now_ns <= self._until_ns else None
+
+    def _problem(self, axes: Sequence[float], buttons: Sequence[int]) -> str:
+        if not max(self._layout.axes) < len(axes) <= MOST_AXES:
+            return f"the gamepad has {len(axes)} axes, at least {1 + max(self._layout.axes)} are needed"
+        most = max(self._layout.deadman_button, self._layout.give_back_button)
+        if not most < len(buttons) <= MOST_AXES:
+            return f"the gamepad has {len(buttons)} buttons, at least {1 + most} are needed"
+        if not all(math.isfinite(axes[i]) for i in self._layout.axes):
+            return "an axis of the gamepad is not finite"
+        return ""

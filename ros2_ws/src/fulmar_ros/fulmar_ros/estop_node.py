@@ -1,0 +1,126 @@
+"""The node `estop`: one button for one robot, that keeps saying whether it is pressed."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from fulmar_core.robot import load_robot
+from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
+from fulmar_core.topics import (
+    DIAGNOSTICS,
+    ESTOP,
+    ESTOP_RESET,
+    ESTOP_TRIGGER,
+    TELEOP,
+    VELOCITY_COMMAND,
+    command_wire,
+)
+from fulmar_ros.health import Health
+from fulmar_ros.parameters import read_parameters
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import RequestExit, run_node
+
+FLUSH = Duration(seconds=0.3)
+
+
+@dataclass(frozen=True)
+class EstopSettings:
+    """ROS parameters of the e-stop node."""
+
+    robot: str = "floating_platform"
+    pressed: bool = False  # begin pressed: a person then resets it first
+
+
+class EstopNode(Node):
+    """Says ten times a second whether the button is pressed; whoever no longer hears it stops by itself."""
+
+    def __init__(self, _request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
+        """Begin to say it.
+
+        Args:
+            cli_args: ROS arguments of this node alone, where it shares a process.
+
+        Raises:
+            FulmarError: If a parameter or the robot's file is wrong.
+        """
+        super().__init__("estop", cli_args=cli_args)
+        settings = read_parameters(self, EstopSettings)
+        robot = load_robot(settings.robot)
+        self._button = EstopButton()
+        self._button.pressed = settings.pressed
+        self._told_s = 0.0
+        self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
+        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
+        self._health = Health(f"{robot.name}: estop", [diagnostics])
+        wire = command_wire(robot)
+        if wire is VELOCITY_COMMAND:
+            self.create_subscription(TwistStamped, wire.name, self._on_velocity, subscriber_qos(wire))
+        else:
+            self.create_subscription(
+                JointState, wire.name, lambda m: self._on_command(wire.name, m), subscriber_qos(wire)
+            )
+        self.create_subscription(
+            JointState, TELEOP.name, lambda m: self._on_command(TELEOP.name, m), subscriber_qos(TELEOP)
+        )
+        self.create_service(Trigger, ESTOP_TRIGGER, self._trigger)
+        self.create_service(Trigger, ESTOP_RESET, self._reset)
+        self.create_timer(1.0 / REPUBLISH_HZ, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._tell()
+
+    def _on_command(self, source: str, message: JointState) -> None:
+        zero = not np.any(np.asarray(message.effort, dtype=float))
+        self._button.hear_command(source, zero, time.monotonic_ns())
+
+    def _on_velocity(self, message: TwistStamped) -> None:
+        zero = message.twist.linear.x == 0.0 and message.twist.angular.z == 0.0
+        self._button.hear_command(VELOCITY_COMMAND.name, zero, time.monotonic_ns())
+
+    def _trigger(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._button.press()
+        self._tell()
+        self.get_logger().warning("e-stop pressed")
+        response.success, response.message = True, "pressed: every actuator goes to its safe state"
+        return response
+
+    def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        problem = self._button.reset(time.monotonic_ns())
+        self._tell()
+        self.get_logger().warning(f"e-stop reset {problem}" if problem else "e-stop reset: released")
+        response.success = not problem
+        response.message = problem or "released: controllers wait for a new goal"
+        return response
+
+    def _tell(self) -> None:
+        pressed = self._button.pressed
+        self._publisher.publish(Bool(data=pressed))
+        if time.monotonic() - self._told_s >= 1.0:
+            self._told_s = time.monotonic()
+            level, words = ("warn", "pressed") if pressed else ("ok", "released")
+            self._health.publish(level, words, {"pressed": str(pressed).lower()})
+
+    def stop(self) -> None:
+        """Last word before the process ends: pressed. Silence would say the same, half a second later."""
+        self._button.press()
+        self._tell()
+        self._publisher.wait_for_all_acked(FLUSH)
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    sys.exit(run_node(EstopNode))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""Reads messages into the core's types by the names of their fields alone.
+
+The node gives it messages of ROS, a bag gives it those of `rosbags`: both read the same, and no ROS is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.goal import Goal, goal_at
+from fulmar_core.rotation import yaw_of
+from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.state import RigidBodyState
+
+NS = 1_000_000_000
+FRAME, BODY_FRAME = "odom", "base_link"
+MOST_WAYPOINTS = 10_000  # more than that is a mistake, and would hold up the control loop
+MOST_OBSTACLES = 30  # ways around more would take longer to find than a control step lasts
+ADD = 0  # action of a marker that is there
+
+
+def stamp_ns(stamp: Any) -> int:
+    """Nanoseconds since the epoch of a ROS time."""
+    return int(stamp.sec * NS + stamp.nanosec)
+
+
+def turned(quat_xyzw: Sequence[float], vector: Sequence[float]) -> tuple[float, float, float]:
+    """`rotation.rotate` of one vector in plain numbers, to the last bit: arrays of three cost five times it."""
+    x, y, z, w = quat_xyzw
+    a, b, c = vector
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
+
+
+def measurement_of(message: Any) -> Measurement:
+    """Read an odometry message; nothing is checked here."""
+    p, q = message.pose.pose.position, message.pose.pose.orientation
+    v, w = message.twist.twist.linear, message.twist.twist.angular
+    quat = (q.x, q.y, q.z, q.w)
+    state = RigidBodyState(
+        np.array([p.x, p.y, p.z]),
+        np.array(quat),
+        np.array(turned(quat, (v.x, v.y, v.z))),
+        np.array([w.x, w.y, w.z]),
+    )
+    return Measurement(stamp_ns(message.header.stamp), message.header.frame_id, message.child_frame_id, state)
+
+
+def goal_of(message: Any) -> tuple[Goal | None, str]:
+    """Read a goal.
+
+    Args:
+        message: From any goal topic.
+
+    Returns:
+        The goal without a batch axis and an empty text, or None and what is wrong with the message.
+    """
+    frame = BODY_FRAME if hasattr(message, "twist") else FRAME
+    if message.header.frame_id != frame:
+        return None, f"goal frame is '{message.header.frame_id}', must be '{frame}'"
+    if hasattr(message, "twist"):
+        targets = [(message.twist.linear.x, message.twist.linear.y, message.twist.angular.z)]
+    elif hasattr(message, "point"):
+        targets = [(message.point.x, message.point.y, 0.0)]
+    else:
+        poses = message.poses if hasattr(message, "poses") else [message]
+        if not 0 < len(poses) <= MOST_WAYPOINTS:
+            return None, f"goal has {len(poses)} waypoints, must have 1 to {MOST_WAYPOINTS}"
+        targets = []
+        for pose in poses:
+            target, problem = _target(pose)
+            if target is None:
+                return None, problem
+            targets.append(target)
+    if not np.isfinite(targets).all():
+        return None, "goal holds a value that is not finite"
+    return goal_at(*targets), ""
+
+
+def _target(message: Any) -> tuple[tuple[float, float, float] | None, str]:
+    p, q = message.pose.position, message.pose.orientation
+    quat = np.array([q.x, q.y, q.z, q.w])
+    if not (np.isfinite(quat).all() and np.isfinite((p.x, p.y, p.z)).all()):
+        return None, "goal holds a value that is not finite"
+    norm = math.sqrt(float(quat @ quat))
+    if abs(norm - 1.0) > 0.01:
+        return None, f"goal quaternion has norm {norm:.3f}, must be 1"
+    return (p.x, p.y, float(yaw_of(quat / norm))), ""
+
+
+def obstacles_of(message: Any) -> tuple[np.ndarray | None, str]:
+    """Read obstacles.
+
+    Returns:
+        Discs, shape (m, 3), and an empty text, or None and what is wrong with the message.
+    """
+    if len(message.markers) > MOST_OBSTACLES:
+        return None, f"{len(message.markers)} obstacles, at most {MOST_OBSTACLES}"
+    discs = []
+    for marker in message.markers:
+        if marker.header.frame_id != FRAME:
+            return None, f"obstacle frame is '{marker.header.frame_id}', must be '{FRAME}'"
+        if marker.action == ADD:
+            discs.append((marker.pose.position.x, marker.pose.position.y, 0.5 * marker.scale.x))
+    found = np.array(discs, dtype=float).reshape(-1, 3)
+    if not np.isfinite(found).all() or (found[:, 2] < 0.0).any():
+        return None, "an obstacle holds a value that is not finite, or a negative size"
+    return found, ""

@@ -1,0 +1,92 @@
+"""What a recorder says about itself on the diagnostics, once a second and so into the bag too."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+from fulmar_core.topics import DIAGNOSTICS
+from fulmar_ros.bag_thread import SLOW_S, Account
+from fulmar_ros.fault_signs import RECORDER
+from fulmar_ros.health import Health
+from fulmar_ros.qos import publisher_qos
+
+PERIOD_S = 1.0
+LITTLE_ROOM = 200_000_000  # bytes free on the disk; below, it is told before it is full
+
+
+class RecorderHealth:
+    """Publishes the account of a recording."""
+
+    def __init__(
+        self, node: Node, robot: str, directory: Path, account: Callable[[], Account], mode: Callable[[], str]
+    ) -> None:
+        """Begin to publish.
+
+        Args:
+            node: Publishes and keeps the time.
+            robot: Name of the robot.
+            directory: The bag; its disk is watched.
+            account: Asked once a second.
+            mode: What the recorder is doing, in a word or two.
+        """
+        self._account, self._mode, self._directory = account, mode, directory
+        publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
+        self._health = Health(f"{robot}: {RECORDER}", [publisher])
+        node.create_timer(PERIOD_S, self.tell)
+
+    def tell(self) -> None:
+        """Publish what became of the messages so far."""
+        account, free = self._account(), _free_bytes(self._directory)
+        level, message = verdict(account, free)
+        values = {
+            "mode": self._mode(),
+            "received": str(account.received),
+            "recorded": str(account.recorded),
+            "dropped": str(sum(account.dropped.values())),
+            **{f"dropped {topic}": str(count) for topic, count in account.dropped.items()},
+            "waiting_bytes": str(account.waiting),
+            "slowest_write_s": f"{account.slowest_write_s:.3f}",
+            "files": str(account.files),
+            "size_bytes": str(account.size),
+            "free_bytes": str(free),
+        }
+        self._health.publish(level, message or self._mode(), values)
+
+
+def verdict(account: Account, free_bytes: int) -> tuple[str, str]:
+    """Level and words for an account.
+
+    Args:
+        account: Of a recording that goes on.
+        free_bytes: Room on its disk.
+
+    Returns:
+        `ok`, `warn` or `error`, and what is wrong; empty if nothing is.
+    """
+    dropped = sum(account.dropped.values())
+    lost = f"; {dropped} messages were dropped" if dropped else ""
+    if account.problem:
+        return "error", f"{account.problem}{lost}"
+    if dropped:
+        return (
+            "error",
+            f"the disk was full or too slow: {dropped} of {account.received} messages were dropped",
+        )
+    if account.slowest_write_s > SLOW_S:
+        return "warn", f"slow disk: it took {account.slowest_write_s:.1f} s for one batch; nothing is lost"
+    if free_bytes < LITTLE_ROOM:
+        return "warn", f"the disk has {free_bytes / 1e6:.0f} MB left"
+    return "ok", ""
+
+
+def _free_bytes(directory: Path) -> int:
+    try:
+        there = os.statvfs(directory)
+    except OSError:
+        return 0
+    return there.f_bavail * there.f_frsize

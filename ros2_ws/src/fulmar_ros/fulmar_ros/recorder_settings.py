@@ -1,0 +1,51 @@
+"""Parameters of the recorder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fulmar_core.errors import BagError, ConfigError
+from fulmar_core.recording import Recording
+
+
+@dataclass(frozen=True)
+class RecorderSettings(Recording):
+    """What is kept, where, and with what beside it."""
+
+    directory: str = ""  # bag folder to make; "" makes one under `runs/` that is named after robot and time
+    run_info: str = "{}"  # JSON object: what kind of run this is
+    attachments: str = "{}"  # JSON object: name to path of files to carry along
+
+    def run(self) -> dict[str, Any]:
+        """What kind of run this is.
+
+        Raises:
+            ConfigError: The parameter is no JSON object.
+        """
+        return _json_object("run_info", self.run_info)
+
+    def files(self) -> dict[str, bytes]:
+        """Files to carry along, by name.
+
+        Raises:
+            ConfigError: The parameter is no JSON object.
+            BagError: A file cannot be read.
+        """
+        try:
+            paths = _json_object("attachments", self.attachments)
+            return {name: Path(path).read_bytes() for name, path in paths.items()}
+        except OSError as error:
+            raise BagError(f"cannot attach {error.filename}: {error.strerror}.") from error
+
+
+def _json_object(parameter: str, text: str) -> dict[str, Any]:
+    try:
+        value = json.loads(text or "{}")
+    except json.JSONDecodeError as error:
+        raise ConfigError(f"parameter '{parameter}' of node 'recorder' is not JSON: {error}.") from error
+    if not isinstance(value, dict):
+        raise ConfigError(f"parameter '{parameter}' of node 'recorder' must be a JSON object, found {text}.")
+    return value

@@ -1,0 +1,172 @@
+"""The process that stands in for a robot's machine: a device that speaks its protocol, and MuJoCo behind it."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from fulmar_core.backend import Sample
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.exit_codes import FAILED
+from fulmar_core.priority import PLANT_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.tasks import load_task
+from fulmar_core.topics import DEVICE_STATE, MOCAP, TRUTH
+from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
+from fulmar_ros.deadline import Deadlines
+from fulmar_ros.first_episode import first_episode
+from fulmar_ros.motion_capture import MotionCapture
+from fulmar_ros.parameters import read_parameters
+from fulmar_ros.plant_settings import PlantSettings
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import RequestExit, run_node, settle_memory
+from sim_nodes.emulators.device import EmulatedDevice
+from sim_nodes.emulators.kingfisher import KingfisherEmulator
+from sim_nodes.emulators.kobuki import KobukiEmulator
+from sim_nodes.emulators.links import Link, PtyLink, TcpLink
+from sim_nodes.emulators.valves import ValveBank
+from sim_nodes.mujoco_backend import MujocoBackend
+
+DEVICES = ("valves", "kobuki", "kingfisher", "ardupilot")
+CATCH_UP = 25  # ticks at most: what a process misses beyond that is gone, as if the world had stood still
+
+
+@dataclass(frozen=True)
+class EmulatorSettings(PlantSettings):
+    """ROS parameters of an emulator; those of a plant say where it begins, and in which world."""
+
+    device: str = ""  # one of DEVICES
+    link: str = ""  # path of the pseudo-terminal or the chip to make, tcp:<port>, or udp:<port>
+    order: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # which thruster each valve line opens
+    active_low: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse devices that do not exist."""
+        super().__post_init__()
+        if self.device not in DEVICES:
+            raise ValueError(str(UnknownNameError("device", self.device, DEVICES)))
+        if not self.link:
+            raise ValueError("'link' must be a path, tcp:<port> or udp:<port>.")
+
+
+class EmulatorNode(Node):
+    """Runs device and physics in real time, and publishes what no device could know: the truth.
+
+    It publishes also what the device does by itself. That is what counts when the driver is dead.
+    """
+
+    def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
+        """Make physics and device, and start.
+
+        Raises:
+            FulmarError: A parameter or a file is wrong.
+        """
+        super().__init__("emulator", cli_args=cli_args)
+        self.settings = read_parameters(self, EmulatorSettings)
+        self._request_exit = request_exit
+        robot = load_robot(self.settings.robot)
+        scenario = load_scenario(self.settings.scenario)
+        self._backend = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
+        self._sample = self._backend.reset(first_episode(robot, self.settings), seed=self.settings.seed)
+        self.device = make_emulator(robot, self._backend, self.settings)
+        self._truth = self.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH))
+        self._state = self.create_publisher(JointState, DEVICE_STATE.name, publisher_qos(DEVICE_STATE))
+        self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
+        self._room = MotionCapture(rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
+        self._write_truth = OdometryWriter(None, frame="map")
+        self._write_pose = PoseWriter()
+        self._write_state = VectorWriter(robot.actuators.names)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._guarded, name="emulator", daemon=True)
+        settle_memory()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Take the device away."""
+        self._stop.set()
+        self._thread.join(2.0)
+        self.device.close()
+        self._backend.close()
+
+    def _guarded(self) -> None:
+        try:
+            self._run()
+        except Exception as error:  # noqa: BLE001 - whatever fails in the thread must end the process
+            self.get_logger().error(f"{type(error).__name__}: {error}")
+            self._request_exit(FAILED)
+
+    def _run(self) -> None:
+        take_priority(PLANT_PRIORITY)
+        take_priority_with_helpers(PLANT_PRIORITY)
+        dt = self._backend.robot.timing.physics_dt
+        deadlines, began_s, ticks = Deadlines(dt), time.monotonic(), 0
+        while deadlines.wait(self._stop):
+            now_s = time.monotonic()
+            command = self.device.command(now_s)
+            due = int((now_s - began_s) / dt) - ticks
+            for _ in range(max(1, min(due, CATCH_UP))):
+                self._sample = self._backend.step(command)
+            ticks += max(1, due)
+            self.device.report(self._sample, now_s)
+            stamp_ns = time.time_ns()
+            self._publish(self._sample, stamp_ns)
+            self._state.publish(self._write_state.write(command, stamp_ns))
+
+    def _publish(self, sample: Sample, stamp_ns: int) -> None:
+        if sample.truth is not None:
+            self._truth.publish(self._write_truth.write(sample.truth, stamp_ns))
+        if sample.odometry is not None:
+            for sent_ns, state in self._room.see(sample.odometry, stamp_ns):
+                self._mocap.publish(self._write_pose.write(state, sent_ns))
+
+
+def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettings) -> EmulatedDevice:
+    """The device that the parameters name.
+
+    Raises:
+        ConfigError: The link is of another kind than the device has.
+    """
+    if settings.device == "valves":
+        return ValveBank(Path(settings.link), robot, order=settings.order, active_low=settings.active_low)
+    if settings.device == "ardupilot":
+        from sim_nodes.emulators.ardupilot import ArdupilotEmulator
+
+        return ArdupilotEmulator(_number(settings.link, "udp"))
+    link: Link = (
+        TcpLink(_number(settings.link, "tcp"))
+        if settings.link.startswith("tcp:")
+        else PtyLink(Path(settings.link))
+    )
+    if settings.device == "kingfisher":
+        return KingfisherEmulator(link)
+
+    def wheels() -> tuple[float, float]:
+        data = backend.data
+        return float(data.joint("left_wheel").qpos[0]), float(data.joint("right_wheel").qpos[0])
+
+    return KobukiEmulator(link, wheels, seed=settings.seed)
+
+
+def _number(link: str, kind: str) -> int:
+    number = link.removeprefix(f"{kind}:")
+    if not number.isdecimal():
+        raise ConfigError(f"link '{link}' must be {kind}:<port>.")
+    return int(number)
+
+
+def main() -> None:
+    """Run until told to stop."""
+    sys.exit(run_node(EmulatorNode))
+
+
+if __name__ == "__main__":
+    main()

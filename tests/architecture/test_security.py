@@ -1,0 +1,176 @@
+"""What runs on a robot opens nothing that can run code, and is found by nobody who was not meant to find it."""
+
+from __future__ import annotations
+
+import ast
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from fulmar_bringup.processes import child_environment
+from fulmar_core.config import load_config
+from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.policy_bundle import GOLDEN, NETWORK, PASSPORT, read_passport, write_bundle
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.tasks import load_task
+from fulmar_core.topics import WIRES
+from policy_server.policy import Policy
+from policy_server.shipped import policies_directory
+
+ON_THE_ROBOT = (
+    "ros2_ws/src/fulmar_core/fulmar_core",
+    "ros2_ws/src/fulmar_ros/fulmar_ros",
+    "ros2_ws/src/fulmar_bringup/fulmar_bringup",
+    "policy_server",
+    "hardware_drivers",
+    "sim_nodes",
+)
+UNPICKLERS = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
+UNSAFE_CALLS = {"eval", "exec", "unsafe_load", "full_load", "load_all", "unsafe_load_all"}
+SHIPPED = policies_directory() / "floating_platform_go_to_pose"
+
+
+def sources(repository):
+    return [path for folder in ON_THE_ROBOT for path in sorted((repository / folder).rglob("*.py"))]
+
+
+def test_no_module_on_the_robot_s_path_imports_anything_that_unpickles(repository):
+    found = []
+    for path in sources(repository):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found += [f"{path}: {name}" for name in names if name.split(".")[0] in UNPICKLERS]
+    assert found == []
+
+
+def test_no_module_on_the_robot_s_path_evaluates_text_or_reads_yaml_that_makes_objects(repository):
+    found = []
+    for path in sources(repository):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call):
+                continue
+            called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            owner = getattr(getattr(node.func, "value", None), "id", "")
+            if (called in UNSAFE_CALLS and owner in ("", "yaml")) or (owner, called) == ("yaml", "load"):
+                found.append(f"{path}:{node.lineno}: {called}")
+            if (owner, called) == ("np", "load"):
+                allowed = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
+                assert allowed.get("allow_pickle") == "False", f"{path}:{node.lineno}"
+    assert found == []
+
+
+class Bomb:
+    """What runs when it is unpickled leaves a file."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.path),)
+
+
+@pytest.mark.parametrize("place", ["golden as pickle", "array of objects", "network", "passport"])
+def test_a_pickle_planted_in_a_bundle_is_refused_and_never_run(place, tmp_path):
+    folder, trap = shutil.copytree(SHIPPED, tmp_path / "bundle"), tmp_path / "trap"
+    poison = pickle.dumps(Bomb(trap))
+    passport = read_passport(folder)
+    if place == "golden as pickle":
+        (folder / GOLDEN).write_bytes(poison)
+    elif place == "array of objects":
+        with np.load(folder / GOLDEN, allow_pickle=False) as arrays:
+            values = dict(arrays)
+        values["observations"] = np.array([Bomb(trap)], dtype=object)
+        with (folder / GOLDEN).open("wb") as file:
+            np.savez(file, **values)
+    elif place == "network":
+        (folder / NETWORK).write_bytes(poison)
+    else:
+        (folder / PASSPORT).write_bytes(poison)
+    if place != "passport":  # whoever plants it sets the hashes right
+        import hashlib
+        import json
+        from dataclasses import asdict, replace
+
+        hashes = {
+            "network_sha256": hashlib.sha256((folder / NETWORK).read_bytes()).hexdigest(),
+            "golden_sha256": hashlib.sha256((folder / GOLDEN).read_bytes()).hexdigest(),
+        }
+        (folder / PASSPORT).write_text(json.dumps(asdict(replace(passport, **hashes).sealed())))
+    with pytest.raises(BundleError):
+        Policy(folder, load_robot("floating_platform"), load_task("go_to_pose"))
+    assert not trap.exists()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "name: !!python/object/apply:os.mkdir [{trap}]",
+        "!!python/object/apply:os.mkdir [{trap}]",
+        "name: !!python/name:os.mkdir",
+    ],
+)
+def test_yaml_that_asks_for_an_object_is_refused_with_its_line_and_makes_none(text, tmp_path):
+    trap = tmp_path / "trap"
+    (tmp_path / "robot.yaml").write_text(text.format(trap=trap))
+    with pytest.raises(ConfigError, match=r"robot\.yaml:1"):
+        load_config(Robot, tmp_path / "robot.yaml")
+    assert not trap.exists()
+
+
+def test_children_are_found_on_this_host_alone_unless_the_environment_asks_otherwise(monkeypatch):
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+    assert child_environment()["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    assert child_environment()["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
+
+
+def test_a_node_that_is_started_by_hand_stays_on_this_host_too():
+    code = (
+        "import os; from fulmar_ros.runtime import stay_on_this_host; stay_on_this_host();"
+        "print(os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'])"
+    )
+    env = {key: value for key, value in os.environ.items() if key != "ROS_AUTOMATIC_DISCOVERY_RANGE"}
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "LOCALHOST"
+
+
+@pytest.fixture
+def policy_file(repository):
+    return ElementTree.parse(repository / "configs/security/policy.xml").getroot()
+
+
+def test_the_policy_file_for_enclaves_names_every_wire_and_no_other_topic(policy_file):
+    named = {element.text.strip() for element in policy_file.iter("topic")}
+    own = {wire.name.lstrip("/") for wire in WIRES}
+    assert own <= {name.strip("/") for name in named}
+    assert {name.strip("/") for name in named} - own <= {"parameter_events", "rosout"}
+
+
+def test_nobody_but_the_plant_may_say_what_was_applied_and_nobody_but_operators_may_stop_or_swap(policy_file):
+    publishers: dict[str, set[str]] = {}
+    for enclave in policy_file.iter("enclave"):
+        for topics in enclave.iter("topics"):
+            if topics.get("publish") == "ALLOW":
+                for topic in topics.iter("topic"):
+                    publishers.setdefault(topic.text.strip(), set()).add(enclave.get("path"))
+    assert publishers["actuators/state"] == {"/fulmar/plant"}
+    assert publishers["estop"] == {"/fulmar/estop", "/fulmar/operator"}
+    assert publishers["controller/swap"] == {"/fulmar/operator"}
+    assert publishers["actuators/command"] == {"/fulmar/controller"}
+    assert publishers["teleop/command"] == {"/fulmar/teleop"}
+
+
+def test_a_bundle_that_is_written_anew_loses_the_signature_of_the_old_one(tmp_path):
+    from fulmar_core.policy_bundle import SIGNATURE, read_golden
+
+    folder = shutil.copytree(SHIPPED, tmp_path / "bundle")
+    (folder / SIGNATURE).write_text("{}")
+    write_bundle(folder, (folder / NETWORK).read_bytes(), read_golden(folder), read_passport(folder))
+    assert not (folder / SIGNATURE).exists()

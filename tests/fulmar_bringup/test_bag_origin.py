@@ -1,0 +1,87 @@
+"""A bag says which files, which policy and which code made it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fulmar_bringup.bag_origin import attachments, run_info
+from fulmar_bringup.node_table import RunPlan, list_nodes, recorder_spec
+from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
+from fulmar_core.recording import Recording
+
+LQR = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
+POLICY = RunPlan("floating_platform", "go_to_pose", "policy", "mujoco", 5.0)
+
+
+def names(plan, system=""):
+    return {name: Path(path).name for name, path in json.loads(attachments(plan, system)).items()}
+
+
+def test_a_run_of_a_law_carries_its_files_and_its_gains():
+    assert names(LQR) == {
+        "robot.yaml": "floating_platform.yaml",
+        "task.yaml": "go_to_pose.yaml",
+        "scenario.yaml": "nominal.yaml",
+        "system.yaml": "mujoco_lqr.yaml",
+        "controller.yaml": "floating_platform_lqr.yaml",
+    }
+
+
+def test_a_run_of_a_policy_carries_its_passport():
+    path = Path(json.loads(attachments(POLICY))["passport.json"])
+    assert json.loads(path.read_text())["task"] == "go_to_pose"
+
+
+def test_the_given_bundle_goes_before_the_shipped_one(tmp_path):
+    plan = RunPlan("floating_platform", "go_to_pose", "policy", "mujoco", 5.0, policy=str(tmp_path))
+    assert json.loads(attachments(plan))["passport.json"] == str(tmp_path / "passport.json")
+
+
+@pytest.mark.parametrize(
+    ("robot", "file"),
+    [("turtlebot2", "turtlebot2_polar.yaml"), ("kingfisher", "kingfisher_line_of_sight.yaml")],
+)
+def test_the_law_of_a_family_carries_its_gains(robot, file):
+    assert names(RunPlan(robot, "go_to_pose", "classical", "mock", 10.0))["controller.yaml"] == file
+
+
+def test_a_calibration_in_use_is_carried_and_named(tmp_path, monkeypatch):
+    calibration = tmp_path / "measured.yaml"
+    save_calibration(Calibration("floating_platform", mass=Measured(5.3, 5.2, 5.4)), calibration)
+    monkeypatch.setenv(VARIABLE, str(calibration))
+    assert names(LQR)["calibration.yaml"] == "measured.yaml"
+    assert json.loads(run_info(LQR))["calibration"] == str(calibration)
+
+
+def test_an_excited_run_has_no_gains_to_carry():
+    assert "controller.yaml" not in names(RunPlan("turtlebot2", "go_to_pose", "excite", "mujoco", 10.0))
+
+
+def test_a_launched_system_says_as_much_as_a_run():
+    recorder = list_nodes(system="mujoco_lqr")[0]
+    assert json.loads(recorder.parameters["attachments"]) == json.loads(attachments(LQR))
+    info = json.loads(recorder.parameters["run_info"])
+    assert (info["robot"], info["controller"], info["control_hz"]) == ("floating_platform", "lqr", 50.0)
+    assert "git_revision" in info
+
+
+def test_run_information_is_the_plan_and_what_else_is_known():
+    info = json.loads(run_info(LQR, {"command": "fulmar run"}))
+    assert info["command"] == "fulmar run"
+    assert info["recording"]["mode"] == "whole"
+    assert "supervised" not in info
+
+
+def test_the_recorder_is_told_what_differs_from_its_own_defaults():
+    plan = RunPlan(
+        "floating_platform",
+        "go_to_pose",
+        "lqr",
+        "mujoco",
+        50.0,
+        recording=Recording(mode="ring", split_s=60.0),
+    )
+    assert recorder_spec(plan).parameters == {"mode": "ring", "split_s": 60.0}

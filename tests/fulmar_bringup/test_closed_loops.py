@@ -1,0 +1,66 @@
+"""Campaigns of runs: what is kept is not repeated, and what failed counts."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fulmar_bringup.benchmark.closed_loops import FIRST_SEED, Campaign, Command, Episode, measure
+from fulmar_bringup.benchmark.hardware import CASES, cases_of
+from fulmar_core.errors import UnknownNameError
+
+
+@dataclass(frozen=True)
+class Recounted:
+    """A case whose run is another program: it notes its seed and prints what a run prints."""
+
+    name: str
+    notes: Path
+    robot: str = "turtlebot2"
+    task: str = "go_to_position"
+
+    def prepared(self, seed: int) -> contextlib.AbstractContextManager[Command]:
+        said = {
+            "success": seed % 2 == 0,
+            "failure": None,
+            "final_position_error_m": 0.1,
+            "watchdog_trips": 0,
+            "latency_ms": {"p99": 1.0},
+        }
+        script = f"echo {seed} >> {self.notes}; echo '{json.dumps(said)}'"
+        return contextlib.nullcontext(Command(("sh", "-c", script), (), {}))
+
+    def about(self) -> dict[str, Any]:
+        return {"device": "none"}
+
+
+def test_a_campaign_counts_what_succeeds_and_names_what_does_not(tmp_path: Path) -> None:
+    case = Recounted("mine", tmp_path / "notes")
+    (figures,) = measure([case], Campaign(4, 10.0, 2), lambda _done: None)
+    assert (figures["episodes"], figures["succeeded"], figures["share"]) == (4, 2, 0.5)
+    assert figures["passed"] is False
+    assert [missed["seed"] for missed in figures["missed"]] == [1, 3]
+    assert figures["device"] == "none"
+
+
+def test_a_campaign_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> None:
+    case, kept = Recounted("mine", tmp_path / "notes"), tmp_path / "kept"
+    kept.mkdir()
+    done = Episode(FIRST_SEED, True, None, 0.01, 0, 1.0)
+    (kept / f"mine_10s_{FIRST_SEED}.json").write_text(json.dumps(asdict(done)))
+    (figures,) = measure([case], Campaign(2, 10.0, 1, kept), lambda _done: None)
+    assert figures["succeeded"] == 2
+    assert case.notes.read_text().split() == ["2"]
+    measure([case], Campaign(2, 10.0, 1, kept), lambda _done: None)
+    assert case.notes.read_text().split() == ["2"]
+
+
+def test_a_device_without_an_emulator_is_told_with_the_nearest() -> None:
+    assert [case.name for case in cases_of(None)] == [case.name for case in CASES]
+    with pytest.raises(UnknownNameError, match="Did you mean 'kingfisher'"):
+        cases_of(["kingfishr"])

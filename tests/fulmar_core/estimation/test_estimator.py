@@ -1,0 +1,250 @@
+"""From late, noisy and wrong poses and inertial readings to one estimate."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.estimation.estimator import TO_BEGIN_ANEW, Estimator
+from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.robot import load_robot
+from fulmar_core.rotation import from_yaw
+from fulmar_core.sensors.imu import ImuSample
+
+pytest.importorskip("filterpy")
+LIMITS = load_robot("floating_platform").limits
+SETTINGS = load_estimator("mocap_imu")
+MS = 1_000_000
+BEGIN = 1_000 * MS
+REST = np.array([0.0, 0.0, 9.81])
+
+
+class Track:
+    """A body that speeds up along x at 0.2 m/s² while it turns at 0.3 rad/s, from 2 s on."""
+
+    ACCELERATION, RATE = 0.2, 0.3
+
+    def __init__(self, **changes: float) -> None:
+        self.estimator = Estimator(dataclasses.replace(SETTINGS, **changes), LIMITS)
+        self.rng = np.random.default_rng(1)
+
+    def at(self, t: float) -> tuple[float, float, float]:
+        """x, v_x and yaw."""
+        s = max(0.0, t - 2.0)
+        return 0.5 * self.ACCELERATION * s * s, self.ACCELERATION * s, self.RATE * s
+
+    def pose(self, t: float, *, stamp_s: float | None = None, off: float = 0.0, noise: float = 0.001) -> str:
+        x, _, yaw = self.at(t)
+        place = np.array([x + off, 0.0, 0.0]) + noise * self.rng.standard_normal(3)
+        stamp = BEGIN + round(1e9 * (t if stamp_s is None else stamp_s))
+        return self.estimator.see_pose(place, from_yaw(np.asarray(yaw)), stamp)
+
+    def imu(self, t: float) -> str:
+        moving = t > 2.0
+        yaw = self.at(t)[2]
+        a = self.ACCELERATION if moving else 0.0
+        force = np.array([a * math.cos(yaw), -a * math.sin(yaw), 0.0]) + REST
+        rate = np.array([0.0, 0.0, self.RATE if moving else 0.0])
+        return self.estimator.see_imu(ImuSample(force, rate), BEGIN + round(1e9 * t))
+
+    def run(self, until: float, *, late_s: float = 0.0, every: int = 8, begin: float = 0.005) -> int:
+        """Readings at 200 Hz, a pose with every `every`th, stamped and sent `late_s` after its capture.
+
+        Returns:
+            How many poses were not believed.
+        """
+        refused = 0
+        for tick in range(round(begin / 0.005), round(until / 0.005) + 1):
+            t = 0.005 * tick
+            assert self.imu(t) == ""
+            captured = t - late_s
+            if captured > 0.0 and tick % every == 0:
+                refused += bool(self.pose(captured, stamp_s=t))
+        return refused
+
+    def velocity(self) -> np.ndarray:
+        estimate = self.estimator.estimate()
+        assert estimate is not None, self.estimator.problem
+        return estimate.state.velocity_in_world
+
+
+def test_velocity_is_right_to_centimetres_while_poses_come_at_25_hz():
+    track = Track()
+    assert track.run(4.0) == 0
+    assert track.velocity()[0] == pytest.approx(0.4, abs=0.015)
+    estimate = track.estimator.estimate()
+    assert estimate.stamp_ns == BEGIN + 4_000 * MS
+    assert float(estimate.state.yaw) == pytest.approx(0.6, abs=0.01)
+    assert estimate.state.angular_velocity_in_body[2] == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_constant_latency_that_is_known_is_taken_off():
+    told, untold = Track(latency_s=0.1), Track(latency_s=0.0)
+    assert told.run(4.0, late_s=0.1) == 0
+    assert untold.run(4.0, late_s=0.1) > 0  # what it sees and what it feels do not go together
+    true = told.at(4.0)[0]
+    assert told.estimator.estimate().state.position_in_world[0] == pytest.approx(true, abs=0.005)
+    assert abs(untold.estimator.estimate().state.position_in_world[0] - true) > 0.02
+
+
+def test_poses_that_come_before_or_after_the_reading_of_their_time_give_one_and_the_same_estimate():
+    first, second = Track(), Track()
+    for track, pose_first in ((first, True), (second, False)):
+        for tick in range(1, 600):
+            t = 0.005 * tick
+            steps = [lambda t=t, track=track: track.imu(t)]
+            if tick % 8 == 0:
+                steps.insert(0 if pose_first else 1, lambda t=t, track=track: track.pose(t, noise=0.0))
+            for step in steps:
+                assert step() == ""
+    assert first.velocity() == pytest.approx(second.velocity(), abs=1e-12)
+
+
+def test_an_outlier_is_refused_and_does_not_move_the_estimate():
+    track = Track()
+    assert track.run(3.0) == 0
+    before = track.velocity()
+    assert "gate" in track.pose(3.001, off=0.3)
+    assert track.estimator.outliers == 1
+    assert track.velocity() == pytest.approx(before, abs=1e-3)
+
+
+def test_outliers_that_agree_with_one_another_are_believed_in_the_end():
+    track = Track()
+    assert track.run(3.0) == 0
+    answers = [track.pose(3.001 + 0.005 * i, off=0.3) for i in range(TO_BEGIN_ANEW)]
+    assert all("gate" in answer for answer in answers[:-1])
+    assert answers[-1] == ""
+    assert track.estimator.epoch == 1
+
+
+def test_a_gap_is_bridged_by_the_inertial_unit_and_then_declared_stale():
+    track = Track()
+    assert track.run(3.0) == 0
+    spread = track.estimator.estimate().motion_covariance[0, 0]
+    for tick in range(601, 600 + round(SETTINGS.bridge_s / 0.005)):
+        track.imu(0.005 * tick)
+    bridged = track.estimator.estimate()
+    t = 0.005 * tick
+    assert bridged.state.position_in_world[0] == pytest.approx(track.at(t)[0], abs=0.01)
+    assert bridged.motion_covariance[0, 0] > spread  # and it says that it knows less
+    for more in range(tick + 1, tick + 5):
+        track.imu(0.005 * more)
+    assert track.estimator.estimate() is None
+    assert "no believable pose" in track.estimator.problem
+    assert track.pose(0.005 * more) == ""
+    assert track.estimator.estimate() is not None
+
+
+def test_without_an_inertial_unit_poses_alone_give_a_velocity():
+    track = Track()
+    for tick in range(1, 161):
+        assert track.pose(0.025 * tick) == ""
+    assert track.velocity()[0] == pytest.approx(0.4, abs=0.05)
+
+
+def test_nothing_is_told_before_the_velocity_is_known():
+    track = Track()
+    assert track.estimator.estimate() is None
+    track.pose(0.01)
+    assert track.estimator.estimate() is None
+    assert "velocity" in track.estimator.problem
+
+
+def test_a_bias_of_the_accelerometer_is_found():
+    track = Track()
+    for tick in range(1, 4000):
+        t = 0.005 * tick
+        track.estimator.see_imu(
+            ImuSample(REST + np.array([0.05, 0.0, 0.0]), np.zeros(3)), BEGIN + round(1e9 * t)
+        )
+        if tick % 8 == 0:
+            track.estimator.see_pose(np.zeros(3), from_yaw(np.asarray(0.0)), BEGIN + round(1e9 * t))
+    assert abs(track.velocity()[0]) < 0.003
+
+
+@pytest.mark.parametrize(
+    ("position", "quat", "words"),
+    [
+        ([math.nan, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], "not finite"),
+        ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 2.0], "norm"),
+        ([0.0, 0.0, 0.0], [0.0, math.inf, 0.0, 1.0], "not finite"),
+    ],
+)
+def test_a_senseless_pose_is_refused_with_its_reason(position, quat, words):
+    track = Track()
+    assert words in track.estimator.see_pose(np.array(position), np.array(quat), BEGIN)
+
+
+def test_a_jump_of_time_begins_a_new_epoch_and_is_told_once():
+    track = Track()
+    assert track.run(3.0) == 0
+    stamp = BEGIN - 100_000 * MS
+    assert "new epoch" in track.estimator.see_pose(np.zeros(3), from_yaw(np.asarray(0.0)), stamp)
+    assert track.estimator.see_pose(np.zeros(3), from_yaw(np.asarray(0.0)), stamp + MS) == ""
+    assert track.estimator.epoch == 1
+
+
+def test_stamps_that_do_not_advance_are_refused():
+    track = Track()
+    assert track.pose(1.0) == ""
+    assert "did not advance" in track.pose(1.0)
+
+
+def test_covariances_are_true_to_the_errors():
+    """Of the velocity, over many drives: the mean squared error in units of what is stated is about 1."""
+    ratios = []
+    for seed in range(12):
+        track = Track(position_std=0.001, heading_std=0.001)
+        track.rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(100 + seed)
+        for tick in range(1, 700):
+            t = 0.005 * tick
+            force = REST + 0.0086 * rng.standard_normal(3)
+            track.estimator.see_imu(ImuSample(force, np.zeros(3)), BEGIN + round(1e9 * t))
+            if tick % 8 == 0:
+                place = 0.001 * track.rng.standard_normal(3)
+                track.estimator.see_pose(place, from_yaw(np.asarray(0.0)), BEGIN + round(1e9 * t))
+        estimate = track.estimator.estimate()
+        error = estimate.state.velocity_in_world[:2]
+        ratios.append(float(error @ np.linalg.solve(estimate.motion_covariance[:2, :2], error)) / 2.0)
+    assert np.mean(ratios) < 2.0  # never surer than it may be
+
+
+numbers = st.floats(allow_nan=True, allow_infinity=True, width=32)
+events = st.lists(
+    st.tuples(st.booleans(), st.lists(numbers, min_size=7, max_size=7), st.integers(-(2**62), 2**62)),
+    max_size=12,
+)
+
+
+@given(events=events)
+@hypothesis_settings(max_examples=60, deadline=None)
+def test_whatever_comes_an_estimate_is_finite_or_none(events):
+    estimator = Estimator(SETTINGS, LIMITS)
+    for is_pose, values, stamp in events:
+        with np.errstate(all="ignore"):
+            if is_pose:
+                estimator.see_pose(np.array(values[:3]), np.array(values[3:]), stamp)
+            else:
+                estimator.see_imu(ImuSample(np.array(values[:3]), np.array(values[3:6])), stamp)
+            estimate = estimator.estimate()
+        if estimate is not None:
+            state = estimate.state
+            parts = state.position_in_world, state.quat_xyzw, state.velocity_in_world
+            assert all(np.isfinite(part).all() for part in parts)
+
+
+def test_settings_without_meaning_are_refused_with_their_line(tmp_path):
+    fields = dataclasses.asdict(SETTINGS) | {"gate": 0.0}
+    text = "\n".join(f"{key}: {value}" for key, value in fields.items() if key != "title") + "\ntitle: t\n"
+    (tmp_path / "bad.yaml").write_text(text)
+    with pytest.raises(ConfigError, match="gate"):
+        load_estimator(str(tmp_path / "bad.yaml"))

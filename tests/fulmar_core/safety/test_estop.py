@@ -1,0 +1,107 @@
+"""The emergency stop: who hears it, and who owns the button; with injected time."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from fulmar_core.safety.estop import QUIET_NS, TIMEOUT_NS, EstopButton, EstopWatch
+
+MS = 1_000_000
+
+
+def test_where_none_is_asked_for_and_none_is_heard_everything_may_move():
+    assert EstopWatch(required=False).reason(0) == ""
+
+
+def test_where_one_is_required_nothing_moves_before_it_is_heard():
+    watch = EstopWatch(required=True)
+    assert "none is heard" in watch.reason(0)
+    watch.hear(False, 5)
+    assert watch.reason(6) == ""
+
+
+def test_pressed_stops_and_released_lets_go():
+    watch = EstopWatch(required=False)
+    watch.hear(True, 0)
+    assert "pressed" in watch.reason(1)
+    watch.hear(False, TIMEOUT_NS + 1)
+    assert watch.reason(TIMEOUT_NS + 2) == ""
+
+
+def test_silence_beyond_the_timeout_stops_also_where_none_was_required():
+    watch = EstopWatch(required=False)
+    watch.hear(False, 0)
+    assert watch.reason(TIMEOUT_NS) == ""
+    assert "silent for" in watch.reason(TIMEOUT_NS + MS)
+
+
+def test_of_two_buttons_the_pressed_one_counts():
+    watch = EstopWatch(required=False)
+    for t in range(0, 2000, 100):
+        watch.hear(True, t * MS)
+        watch.hear(False, (t + 10) * MS)
+        assert watch.reason((t + 20) * MS)
+
+
+def test_the_button_stays_pressed_until_it_is_reset():
+    button = EstopButton()
+    button.press()
+    assert button.pressed
+    assert button.reset(0) == ""
+    assert not button.pressed
+
+
+def test_a_reset_is_refused_while_somebody_commands_motion():
+    button = EstopButton()
+    button.press()
+    button.hear_command("cmd_vel", False, 0)
+    assert "cmd_vel is not zero" in button.reset(QUIET_NS)
+    assert button.pressed
+    button.hear_command("cmd_vel", True, QUIET_NS)
+    assert button.reset(QUIET_NS + 1) == ""
+
+
+def test_a_source_that_has_fallen_silent_does_not_hold_a_reset_up_for_ever():
+    button = EstopButton()
+    button.press()
+    button.hear_command("cmd_vel", False, 0)
+    assert button.reset(QUIET_NS + 1) == ""
+
+
+def test_one_quiet_source_does_not_hide_another_that_is_not():
+    button = EstopButton()
+    button.press()
+    button.hear_command("teleop/command", False, 0)
+    button.hear_command("actuators/command", True, 1)
+    assert "teleop/command" in button.reset(2)
+
+
+@given(
+    st.lists(st.tuples(st.booleans(), st.integers(1, 400)), min_size=1, max_size=40),
+    st.integers(0, 2000),
+)
+@hypothesis_settings(max_examples=100, deadline=None)
+def test_nothing_moves_within_the_timeout_after_a_press_whatever_else_is_said(messages, later_ms):
+    watch, now, last_press = EstopWatch(required=False), 0, None
+    for pressed, gap_ms in messages:
+        now += gap_ms * MS
+        watch.hear(pressed, now)
+        last_press = now if pressed else last_press
+    now += later_ms * MS
+    moves = watch.reason(now) == ""
+    if moves and last_press is not None:
+        assert now - last_press > TIMEOUT_NS
+    if later_ms * MS > TIMEOUT_NS:
+        assert not moves
+
+
+@pytest.mark.parametrize("required", [True, False])
+def test_it_tells_whether_it_ever_allowed_anything(required):
+    watch = EstopWatch(required=required)
+    watch.hear(True, 0)
+    assert not watch.was_released
+    watch.hear(False, TIMEOUT_NS + 1)
+    assert watch.was_released

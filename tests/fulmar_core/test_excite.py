@@ -1,0 +1,50 @@
+"""Random commands that keep a robot where it may be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fulmar_core.controllers.excite import Excite
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.paths import config_names
+from fulmar_core.robot import load_robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import load_task
+
+TASK = load_task("go_to_position")
+
+
+def commands_of(name, *, seconds=90.0, worlds=4):
+    robot = load_robot(name)
+    simulation = BatchSimulation(robot, TASK, load_scenario("nominal"), worlds=worlds, seed=3)
+    controller = Excite(robot, TASK)
+    commands, far = [], 0.0
+    for _ in range(round(seconds * controller.control_hz)):
+        simulation.step(np.asarray(controller.act(np.asarray(simulation.observe()))))
+        commands.append(simulation.command[0])
+        goal = simulation.goal.current
+        far = max(
+            far, float(np.hypot(simulation.truth.x - goal[:, 0], simulation.truth.y - goal[:, 1]).max())
+        )
+    return robot, np.array(commands), far
+
+
+@pytest.mark.parametrize("name", config_names("robots"))
+def test_a_robot_stays_inside_its_geofence_and_uses_all_of_its_actuators(name):
+    robot, commands, far = commands_of(name)
+    assert far < robot.limits.geofence
+    used = np.abs(commands).max(axis=0) / robot.actuators.scale
+    assert (used > 0.5).all()  # two wheels cannot go and turn at full speed at once
+    changes = np.any(np.diff(commands, axis=0) != 0.0, axis=1).mean()
+    assert changes > 0.02
+
+
+def test_valves_open_alone_and_in_company():
+    _, commands, _ = commands_of("floating_platform")
+    assert set(commands.sum(axis=1)) == {1.0, 2.0, 3.0}
+
+
+def test_a_task_without_one_place_is_refused():
+    with pytest.raises(ValueError, match="stays around one place"):
+        Excite(load_robot("floating_platform"), load_task("track_velocities"))

@@ -1,0 +1,141 @@
+"""A ring keeps the last seconds in memory and writes them, and what follows, when a fault shows."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+from rosbags.rosbag2 import Reader
+
+from fulmar_ros.bag_records import bag_files
+from fulmar_ros.bag_ring import BagRing
+from fulmar_ros.bag_writer import BagWriter
+from tests.fulmar_ros.bags import INFO, START_NS, TOPIC, TYPE, word, words_by_mcap, words_by_rosbags
+
+GOAL, S = "/robot/goal", 1_000_000_000
+
+
+def new_bag(folder):
+    bag = BagWriter(folder, run_info=INFO)
+    bag.add_topic(TOPIC, TYPE, "stream")
+    bag.add_topic(GOAL, TYPE, "latched")
+    return bag
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "bag"
+
+
+@pytest.fixture
+def ring(folder):
+    return make_ring(folder)
+
+
+def make_ring(folder, **options):
+    """Three seconds before a word that says fault, two after it."""
+    return BagRing(
+        lambda: new_bag(folder),
+        before_s=3.0,
+        after_s=2.0,
+        latched={GOAL: 1},
+        fault_in=lambda _topic, data: "it broke" if b"fault" in data else "",
+        **options,
+    )
+
+
+def hear(ring, seconds, topic=TOPIC, text="word"):
+    """One word a second."""
+    for second in seconds:
+        ring.write(topic, word(f"{text} {second}"), log_ns=START_NS + second * S)
+
+
+def test_without_a_fault_nothing_reaches_the_disk(ring, folder):
+    hear(ring, range(100))
+    ring.close()
+    assert not folder.exists()
+    assert ring.messages == 0
+    assert ring.kept_s == 3.0
+
+
+def test_a_fault_writes_what_came_before_and_after_it(ring, folder):
+    hear(ring, range(10))
+    hear(ring, [10], text="fault")
+    hear(ring, range(11, 20))
+    ring.close()
+    expected = ["word 7", "word 8", "word 9", "fault 10", "word 11", "word 12"]
+    assert words_by_rosbags(folder) == words_by_mcap(folder) == expected
+    with Reader(folder) as reader:
+        assert reader.message_count == 6
+
+
+def test_a_fault_that_lasts_is_written_once_and_to_its_end(ring, folder):
+    hear(ring, range(5))
+    hear(ring, range(5, 9), text="fault")
+    hear(ring, range(9, 20))
+    ring.close()
+    expected = ["word 2", "word 3", "word 4", *(f"fault {n}" for n in range(5, 9)), "word 9", "word 10"]
+    assert words_by_rosbags(folder) == expected
+    assert len(ring.faults) == 1
+
+
+def test_each_fault_has_a_file_of_its_own_and_no_message_is_in_two(ring, folder):
+    hear(ring, [0], text="fault")
+    hear(ring, range(1, 30))
+    hear(ring, [30], text="fault")
+    hear(ring, range(31, 40))
+    ring.close()
+    assert len(bag_files(folder)) == 2
+    words = words_by_mcap(folder)
+    assert words == [
+        *("fault 0", "word 1", "word 2"),
+        *("word 27", "word 28", "word 29", "fault 30", "word 31", "word 32"),
+    ]
+
+
+def test_a_second_fault_soon_after_the_first_overlaps_nothing(ring, folder):
+    hear(ring, [0], text="fault")
+    hear(ring, range(1, 4))
+    hear(ring, [4], text="fault")
+    ring.close()
+    assert words_by_mcap(folder) == ["fault 0", "word 1", "word 2", "word 3", "fault 4"]
+
+
+def test_the_goal_is_written_however_old_it_is(ring, folder):
+    hear(ring, [0, 1], topic=GOAL, text="goal")
+    hear(ring, range(2, 100))
+    hear(ring, [100], text="fault")
+    ring.close()
+    assert words_by_mcap(folder) == ["goal 1", "word 97", "word 98", "word 99", "fault 100"]
+    with Reader(folder) as reader:
+        assert reader.start_time == START_NS + 97 * S
+
+
+def test_the_goal_is_in_the_file_of_every_fault(ring, folder):
+    hear(ring, [0], topic=GOAL, text="goal")
+    hear(ring, [1], text="fault")
+    hear(ring, range(2, 30))
+    hear(ring, [30], text="fault")
+    ring.close()
+    assert words_by_mcap(folder).count("goal 0") == 2
+
+
+def test_the_bag_tells_when_and_why_it_was_written(ring, folder):
+    hear(ring, range(3))
+    hear(ring, [3], text="fault")
+    ring.close()
+    told = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert json.loads(told["custom_data"]["fulmar_faults"]) == [
+        {"time_ns": START_NS + 3 * S, "reason": "it broke"}
+    ]
+
+
+def test_a_memory_that_is_too_small_keeps_the_newest_and_says_so(folder):
+    ring = make_ring(folder, max_bytes=2 * len(word("word 0")))
+    assert not ring.cut_short
+    hear(ring, range(3))
+    assert ring.cut_short
+    hear(ring, [3], text="fault")
+    ring.close()
+    assert words_by_mcap(folder) == ["word 1", "word 2", "fault 3"]

@@ -1,0 +1,190 @@
+"""The boats' drivers against emulated boats: NMEA over a serial port and over TCP, MAVLink over UDP."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fulmar_core.errors import ConfigError, DeviceError
+from fulmar_core.planar import planar_of
+from fulmar_core.robot import load_robot
+from hardware_drivers.kingfisher_driver import KingfisherDriver
+from hardware_drivers.mavlink_driver import MavlinkDriver, state_of
+from hardware_drivers.ports import open_port
+from hardware_drivers.settings import KingfisherNmea, MavlinkBoat, Thrust
+from sim_nodes.emulators.ardupilot import ArdupilotEmulator
+from sim_nodes.emulators.kingfisher import KingfisherEmulator
+from sim_nodes.emulators.links import PtyLink, TcpLink
+from tests.hardware_drivers.bench import Bench, episode_at, until
+
+START = (3.0, -2.0, 0.7)
+THRUST = Thrust(45.0, 25.0)
+KINDS = ("serial", "tcp", "mavlink")
+
+
+@pytest.fixture(params=KINDS)
+def kind(request) -> str:
+    return request.param
+
+
+@pytest.fixture
+def bench(kind, tmp_path, unused_udp_port):
+    def device(_backend):
+        if kind == "mavlink":
+            return ArdupilotEmulator(unused_udp_port)
+        return KingfisherEmulator(PtyLink(tmp_path / "serial") if kind == "serial" else TcpLink(0))
+
+    bench = Bench("kingfisher", device, start=START)
+    yield bench
+    bench.stop()
+
+
+@pytest.fixture
+def unused_udp_port() -> int:
+    import socket
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def driver(bench, kind):
+    if kind == "mavlink":
+        made: Any = MavlinkDriver(
+            bench.robot, MavlinkBoat("mavlink_boat", bench.device.address, THRUST), patience_s=5.0
+        )
+    else:
+        settings = KingfisherNmea("kingfisher_nmea", bench.device.address, THRUST)
+        made = KingfisherDriver(bench.robot, settings, patience_s=5.0)
+    made.reset(episode_at(bench.robot, *START), seed=0)
+    yield made
+    made.close()
+
+
+def drive(driver, command, seconds):
+    """Send a command fifty times a second."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        sample = driver.step(np.array(command))
+        time.sleep(0.02)
+    return sample
+
+
+def test_the_propellers_turn_as_commanded_each_on_its_side(bench, driver):
+    until(
+        lambda: driver.step(np.array([0.8, -0.4])) and bench.command == pytest.approx([0.8, -0.4], abs=0.003)
+    )
+
+
+def test_odometry_follows_the_boat_in_ros_frames(bench, driver):
+    for command in ((1.0, 1.0), (0.3, 1.0), (0.0, 0.0)):
+        sample = drive(driver, command, 1.2)
+    found, true = planar_of(sample.odometry), planar_of(bench.sample.truth)
+    assert np.hypot(true.x - START[0], true.y - START[1]) > 0.2
+    assert np.hypot(found.x - true.x, found.y - true.y) < 0.1  # a tenth of a second old
+    assert abs(np.remainder(found.yaw - true.yaw + np.pi, 2 * np.pi) - np.pi) < np.radians(3.0)
+    assert np.hypot(found.vx - true.vx, found.vy - true.vy) < 0.1
+    assert sample.imu.specific_force[2] == pytest.approx(9.80665, abs=0.02)
+    assert 0 <= time.time_ns() - sample.stamp_ns < 250_000_000
+
+
+def test_closing_stops_the_propellers(bench, driver):
+    drive(driver, (1.0, 1.0), 0.3)
+    assert bench.command.any()
+    driver.close()
+    until(lambda: not bench.command.any(), timeout_s=0.3)
+
+
+def test_a_boat_that_falls_silent_is_an_error_not_old_odometry(bench, driver):
+    bench.device.mute = True
+    with pytest.raises(DeviceError, match=r"no report for 1\d\d\d ms"):
+        drive(driver, (0.0, 0.0), 2.0)
+
+
+@pytest.mark.parametrize("kind", ["tcp"], indirect=True)
+def test_a_connection_that_ends_is_told_at_once(bench, driver):
+    bench.device.mute = True
+    bench.device._link._drop()
+    with pytest.raises((DeviceError, OSError)):
+        drive(driver, (0.0, 0.0), 0.5)
+
+
+@pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
+def test_an_autopilot_without_its_host_holds_by_its_own_failsafe(bench, driver):
+    drive(driver, (1.0, 1.0), 0.5)
+    driver._over.set()  # as a process that was killed: neither heartbeats nor overrides
+    driver._thread.join()
+    silent = time.monotonic()
+    until(lambda: not bench.command.any())
+    assert time.monotonic() - silent < 3.2
+
+
+def test_nobody_at_the_other_end_is_refused_with_a_hint(unused_udp_port):
+    robot = load_robot("kingfisher")
+    with pytest.raises(DeviceError, match="no heartbeat"):
+        MavlinkDriver(
+            robot, MavlinkBoat("mavlink_boat", f"udpin:127.0.0.1:{unused_udp_port}", THRUST), patience_s=0.2
+        )
+
+
+def test_an_address_that_is_none_is_refused():
+    with pytest.raises(ConfigError, match="tcp://host:port"):
+        open_port("tcp://host", 0, 0.0)
+
+
+@dataclass
+class Said:
+    """A MAVLink message by its fields."""
+
+    time_boot_ms: int = 1000
+    x: float = 1.0
+    y: float = 2.0
+    z: float = 0.5
+    vx: float = 0.0
+    vy: float = 0.0
+    vz: float = 0.0
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+    rollspeed: float = 0.0
+    pitchspeed: float = 0.0
+    yawspeed: float = 0.1
+
+
+def test_north_east_down_becomes_east_north_up():
+    state = state_of(Said(), Said(), np.zeros(3))
+    assert state.position_in_world.tolist() == [2.0, 1.0, -0.5]
+    assert float(state.yaw) == pytest.approx(np.pi / 2)  # bow to the north
+    assert state.angular_velocity_in_body[2] == pytest.approx(-0.1)
+
+
+@pytest.mark.parametrize("spoilt", [{"x": float("nan")}, {"vy": float("inf")}, {"time_boot_ms": 5000}])
+def test_an_estimate_that_is_not_finite_or_not_of_one_time_is_none(spoilt):
+    assert state_of(Said(**spoilt), Said(), np.zeros(3)) is None
+
+
+@pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
+def test_noise_beside_the_autopilot_changes_nothing(bench, driver):
+    """Random datagrams, and cut and spoilt ones of the autopilot's own, from another sender."""
+    import socket
+
+    rng = np.random.default_rng(1)
+    host, _, number = bench.device.address.removeprefix("udpin:").partition(":")
+    packet = bytes(
+        bench.device._link.mav.attitude_encode(1, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0).pack(bench.device._link.mav)
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+        for _ in range(300):
+            spoilt = bytearray(packet[: rng.integers(1, len(packet))])
+            spoilt[rng.integers(len(spoilt))] ^= int(rng.integers(1, 256))
+            for data in (rng.bytes(int(rng.integers(1, 280))), bytes(spoilt)):
+                noise.sendto(data, (host, int(number)))
+    sample = drive(driver, (0.0, 0.0), 0.5)
+    place = sample.odometry.position_in_world[:2]
+    assert place == pytest.approx(START[:2], abs=0.05)
+    assert not bench.command.any()

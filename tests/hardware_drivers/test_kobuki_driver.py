@@ -1,0 +1,134 @@
+"""The Kobuki driver against the emulated base, byte for byte over a pseudo-terminal."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from fulmar_core.errors import DeviceError
+from fulmar_core.planar import planar_of
+from hardware_drivers.kobuki_driver import KobukiDriver
+from hardware_drivers.settings import Kobuki
+from sim_nodes.emulators.kobuki import TIMEOUT_S, KobukiEmulator
+from sim_nodes.emulators.links import PtyLink
+from tests.hardware_drivers.bench import Bench, episode_at, until
+
+START = (1.0, -0.5, 2.0)
+
+
+class RollingWheels:
+    """Angles of the wheels of a base that never slips, summed up from its speeds."""
+
+    def __init__(self, backend) -> None:
+        self.backend, self.angles = backend, np.zeros(2)
+
+    def roll(self) -> None:
+        state = self.backend._state[0]
+        ahead, _ = state.velocity_in_body
+        motion = np.array([float(ahead), float(state.yaw_rate)])
+        self.angles += 0.02 * self.backend.robot.actuators.wheel_speeds(motion)
+
+    def __call__(self) -> tuple[float, float]:
+        return float(self.angles[0]), float(self.angles[1])
+
+
+@pytest.fixture
+def bench(tmp_path):
+    link, wheels = PtyLink(tmp_path / "serial"), []
+
+    def device(backend):
+        wheels.append(RollingWheels(backend))
+        return KobukiEmulator(link, wheels[0])
+
+    bench = Bench("turtlebot2", device, start=START, each_tick=lambda: wheels[0].roll())
+    yield bench
+    bench.stop()
+
+
+@pytest.fixture
+def driver(bench):
+    driver = KobukiDriver(bench.robot, Kobuki("kobuki", bench.device.address), patience_s=5.0)
+    driver.reset(episode_at(bench.robot, *START), seed=0)
+    yield driver
+    driver.close()
+
+
+def drive(driver, command, seconds):
+    """Send a command fifty times a second."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        sample = driver.step(np.array(command))
+        time.sleep(0.02)
+    return sample
+
+
+def test_odometry_follows_the_base_through_an_arc(bench, driver):
+    for command in ((0.4, 0.0), (0.3, 0.8), (-0.3, -0.5), (0.0, 0.0)):
+        sample = drive(driver, command, 1.0)
+    found, true = planar_of(sample.odometry), planar_of(bench.sample.truth)
+    assert np.hypot(true.x - START[0], true.y - START[1]) > 0.2
+    assert np.hypot(found.x - true.x, found.y - true.y) < 0.02
+    assert abs(np.remainder(found.yaw - true.yaw + np.pi, 2 * np.pi) - np.pi) < np.radians(1.0)
+
+
+def test_samples_carry_the_time_of_capture_and_no_accelerometer(driver):
+    first, second = driver.step(np.zeros(2)), drive(driver, (0.0, 0.0), 0.3)
+    assert 0 <= time.time_ns() - second.stamp_ns < 100_000_000
+    assert second.stamp_ns > first.stamp_ns
+    assert np.isnan(second.imu.specific_force).all()
+
+
+@pytest.mark.parametrize("what", ["bumpers", "cliffs"])
+def test_what_touches_stops_the_base_which_may_only_back_off(bench, driver, what):
+    drive(driver, (0.3, 0.0), 0.6)
+    setattr(bench.device, what, 2)
+    until(lambda: not driver.step(np.array([0.3, 0.5])).applied.any())
+    until(lambda: not bench.command.any())
+    assert driver.step(np.array([-0.1, 0.5])).applied.tolist() == [-0.1, 0.0]
+    assert "only backs off" in driver.health()["warning"]
+
+
+def test_a_wheel_in_the_air_stops_everything(bench, driver):
+    bench.device.wheel_drops = 1
+    until(lambda: not driver.step(np.array([-0.3, 0.0])).applied.any())
+    assert "hangs in the air" in driver.health()["warning"]
+
+
+def test_closing_stops_the_base(bench, driver):
+    drive(driver, (0.3, 0.0), 0.3)
+    assert bench.command.any()
+    driver.close()
+    until(lambda: not bench.command.any(), timeout_s=0.5 * TIMEOUT_S)
+
+
+def test_a_silent_driver_leaves_the_base_to_its_own_timeout(bench, driver):
+    drive(driver, (0.3, 0.0), 0.3)
+    silent = time.monotonic()
+    until(lambda: not bench.command.any())
+    assert 0.8 * TIMEOUT_S < time.monotonic() - silent < TIMEOUT_S + 0.3
+
+
+def test_a_base_that_falls_silent_is_an_error_not_old_odometry(bench, driver):
+    bench.device.mute = True
+    with pytest.raises(DeviceError, match=r"no report for 3\d\d ms"):
+        drive(driver, (0.0, 0.0), 1.0)
+
+
+def test_a_port_where_nobody_speaks_is_refused_with_a_hint(tmp_path):
+    link = PtyLink(tmp_path / "serial")
+    with pytest.raises(DeviceError, match=r"said nothing that can be read.*Is it switched on"):
+        KobukiDriver(_robot(), Kobuki("kobuki", link.address), patience_s=0.3)
+    link.close()
+
+
+def test_a_port_that_does_not_exist_is_refused_with_a_hint(tmp_path):
+    with pytest.raises(DeviceError, match=r"cannot be opened.*Is the device connected"):
+        KobukiDriver(_robot(), Kobuki("kobuki", str(tmp_path / "none")), patience_s=0.0)
+
+
+def _robot():
+    from fulmar_core.robot import load_robot
+
+    return load_robot("turtlebot2")

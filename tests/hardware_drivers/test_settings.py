@@ -1,0 +1,55 @@
+"""Hardware files: those that are shipped, and mistakes in others."""
+
+from __future__ import annotations
+
+import pytest
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.paths import config_names
+from hardware_drivers.settings import hardware_of, load_hardware
+
+TURTLEBOT = "title: t\nrobot: turtlebot2\ndriver:\n  kind: kobuki\n  port: /dev/ttyUSB0\n"
+
+
+@pytest.mark.parametrize("name", config_names("hardware"))
+def test_every_shipped_file_fits_its_robot(name):
+    assert name in hardware_of(load_hardware(name).robot)
+
+
+@pytest.mark.parametrize(
+    ("robot", "first"),
+    [("floating_platform", "zero_g_lab"), ("turtlebot2", "turtlebot2"), ("kingfisher", "kingfisher")],
+)
+def test_a_robot_s_own_file_comes_first(robot, first):
+    assert hardware_of(robot)[0] == first
+
+
+def test_the_asymmetry_of_a_boat_s_thrust_is_declared():
+    thrust = load_hardware("kingfisher").driver.thrust
+    assert (thrust.ahead, thrust.astern) == (45.0, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("kobuki", "kobuky", r":4: 'kind' = 'kobuky' is not known. Did you mean 'kobuki'\?"),
+        ("turtlebot2", "kingfisher", "driver 'kobuki' cannot move 'kingfisher', which has propellers"),
+        ("turtlebot2", "turtlebot3", "unknown robot 'turtlebot3'. Did you mean 'turtlebot2'?"),
+        ("/dev/ttyUSB0", "[1]", "'port' must be a single value"),
+        ("  port", "  prot", ":5: unknown key 'prot'. Did you mean 'port'?"),
+    ],
+)
+def test_a_mistake_is_told_with_its_place(tmp_path, old, new, says):
+    path = tmp_path / "mine.yaml"
+    path.write_text(TURTLEBOT.replace(old, new))
+    with pytest.raises(ConfigError, match=says.replace("'?", r"'\?") if r"\?" not in says else says):
+        load_hardware(str(path))
+
+
+def test_too_few_valves_are_refused(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "title: t\nrobot: floating_platform\ndriver: {kind: valve_topic, topic: /v, order: [1, 0]}\n"
+    )
+    with pytest.raises(ConfigError, match="'order' has 2 entries, the robot has 8 thrusters"):
+        load_hardware(str(path))

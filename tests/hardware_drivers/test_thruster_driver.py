@@ -1,0 +1,147 @@
+"""Valves and bearing at the pins: polarity, order, times, and what is left when the driver goes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import gpiod
+import numpy as np
+import pytest
+
+from fulmar_core.errors import DeviceError
+from fulmar_core.robot import load_robot
+from hardware_drivers.gpio import output_lines
+from hardware_drivers.settings import Bearing, GpioValves, load_hardware
+from hardware_drivers.thruster_driver import ThrusterDriver
+from sim_nodes.emulators.valves import ValveBank
+from tests.hardware_drivers.bench import episode_at
+
+ROBOT = load_robot("floating_platform")
+
+
+@pytest.fixture(params=[True, False], ids=["active low", "active high"])
+def rig(tmp_path, request):
+    lab = load_hardware("zero_g_lab").driver
+    bank = ValveBank(tmp_path / "gpio", ROBOT, order=lab.order, active_low=request.param)
+    settings = replace(
+        lab,
+        port=bank.address,
+        active_low=request.param,
+        min_on_s=0.0,
+        bearing=replace(lab.bearing, linger_s=0.0, idle_off_s=0.0),
+    )
+    yield bank, settings
+    bank.close()
+
+
+def started(settings) -> ThrusterDriver:
+    driver = ThrusterDriver(ROBOT, settings, patience_s=0.0)
+    driver.reset(episode_at(ROBOT, 0.0, 0.0, 0.0), seed=0)
+    return driver
+
+
+@pytest.mark.parametrize("thruster", range(8))
+def test_each_thruster_opens_its_own_valve_and_no_other(rig, thruster):
+    bank, settings = rig
+    command = np.eye(8)[thruster]
+    sample = started(settings).step(command)
+    assert bank.command(0.0).tolist() == command.tolist()
+    assert sample.applied.tolist() == command.tolist()
+    assert sample.odometry is None
+
+
+def test_taking_the_lines_opens_nothing(rig):
+    bank, settings = rig
+    ThrusterDriver(ROBOT, settings, patience_s=0.0)
+    assert set(bank.levels().tolist()) == {int(settings.active_low)}
+
+
+def test_without_air_no_valve_opens_and_the_driver_says_so(rig):
+    bank, settings = rig
+    driver = started(settings)
+    driver.step(np.ones(8))
+    assert driver.set_bearing(False) == ""
+    assert not driver.step(np.ones(8)).applied.any()
+    assert set(bank.levels().tolist()) == {int(settings.active_low)}
+    assert "bearing is off" in driver.health()["warning"]
+
+
+def test_the_safe_state_closes_valves_and_keeps_the_platform_afloat(rig):
+    bank, settings = rig
+    driver = started(settings)
+    driver.step(np.ones(8))
+    driver.make_safe()
+    assert not bank.command(0.0).any()
+    assert driver.bearing_on
+    assert bank.levels()[-1] == int(not settings.active_low)
+
+
+def test_closing_closes_everything_once_and_for_all(rig):
+    bank, settings = rig
+    driver = started(settings)
+    driver.step(np.ones(8))
+    driver.close()
+    driver.close()
+    assert set(bank.levels().tolist()) == {int(settings.active_low)}
+    assert driver.set_bearing(True)  # refused, with a reason
+
+
+def test_a_bearing_that_nobody_needs_is_switched_off(rig, monkeypatch):
+    _bank, settings = rig
+    now = [0]
+    monkeypatch.setattr("hardware_drivers.thruster_driver.time.monotonic_ns", lambda: now[0])
+    driver = started(replace(settings, bearing=replace(settings.bearing, idle_off_s=60.0)))
+    driver.step(np.ones(8))
+    for second in (59, 61):
+        now[0] = second * 10**9
+        driver.step(np.zeros(8))
+    assert not driver.bearing_on
+
+
+def test_a_driver_that_dies_leaves_its_valves_as_they_were(rig):
+    """That is copper, not code: no process can close a valve after its own death."""
+    bank, settings = rig
+    driver = started(settings)
+    driver.step(np.eye(8)[3])
+    del driver
+    assert bank.command(1e9).tolist() == np.eye(8)[3].tolist()
+
+
+def test_libgpiod_is_asked_for_outputs_that_begin_inactive(monkeypatch):
+    asked = {}
+
+    def request_lines(path, consumer, config):
+        asked.update(path=path, consumer=consumer, config=config)
+
+    monkeypatch.setattr(gpiod, "request_lines", request_lines)
+    output_lines("/dev/gpiochip0", ["PZ.06", "17"], active_low=True)
+    ((lines, settings),) = asked["config"].items()
+    assert (asked["path"], lines) == ("/dev/gpiochip0", ("PZ.06", 17))
+    assert settings.direction is gpiod.line.Direction.OUTPUT
+    assert settings.output_value is gpiod.line.Value.INACTIVE
+    assert settings.active_low is True
+
+
+def test_a_chip_that_is_not_there_is_named_with_what_to_do():
+    with pytest.raises(DeviceError, match=r"/dev/gpiochip99: lines A, B cannot be taken .*gpioinfo"):
+        output_lines("/dev/gpiochip99", ["A", "B"], active_low=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"order": (0, 1, 2, 3, 4, 5, 6, 6)}, "must hold each of 0 to 7 once"),
+        ({"lines": ("A",) * 8}, "a line of their own"),
+        ({"min_on_s": 0.5}, "min_on_s must be from 0 to 0.2 s"),
+    ],
+)
+def test_wiring_that_cannot_be_is_refused(change, says):
+    fields = {
+        "kind": "gpio_valves",
+        "port": "x",
+        "lines": tuple("ABCDEFGH"),
+        "order": tuple(range(8)),
+        "bearing": Bearing("I"),
+    }
+    with pytest.raises(ValueError, match=says):
+        GpioValves(**{**fields, **change})

@@ -1,0 +1,119 @@
+"""The estimator on the wires, and a robot that finds its goal by nothing but poses and inertial readings."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
+
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY
+from fulmar_ros.convert import PoseWriter, stamp_of
+from fulmar_ros.estimator_node import EstimatorNode
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
+from tests.conftest import RosDomain
+from tests.ros.cli import json_of, run_in_real_time
+from tests.ros.neighbour import NAMESPACE, Neighbour, until
+from tests.states import planar_state
+
+pytest.importorskip("filterpy")
+MS = 1_000_000
+
+
+class Sources:
+    """Motion capture and inertial unit in the test's hand."""
+
+    def __init__(self, neighbour: Neighbour) -> None:
+        node = neighbour.node
+        self.neighbour = neighbour
+        self.odometry: list[Odometry] = []
+        self.poses = node.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
+        self.readings = node.create_publisher(Imu, IMU.name, publisher_qos(IMU))
+        node.create_subscription(
+            Odometry, ODOMETRY.name, self.odometry.append, subscriber_qos(ODOMETRY, reliable=True, depth=50)
+        )
+        self.now_ns = 1_000 * MS
+        until(lambda: bool(self.poses.get_subscription_count() and self.readings.get_subscription_count()))
+
+    def tick(self, *, pose: bool = True, x: float = 0.0, frame: str = "odom", bad: bool = False) -> None:
+        """20 ms of a robot at rest."""
+        self.now_ns += 20 * MS
+        reading = Imu()
+        reading.header.stamp = stamp_of(self.now_ns)
+        reading.linear_acceleration.z = float("nan") if bad else 9.81
+        self.readings.publish(reading)
+        if pose:
+            message = PoseWriter().write(planar_state(x, 0.0, 0.5), self.now_ns)
+            message.header.frame_id = frame
+            self.poses.publish(message)
+
+    def until_odometry(self) -> None:
+        count = len(self.odometry)
+        until(lambda: self.tick() or len(self.odometry) > count + 3)  # type: ignore[func-returns-value]
+
+    @property
+    def said(self) -> tuple[str, dict[str, str]]:
+        return self.neighbour.said.get("estimator", ("", {"last_refusal": ""}))
+
+
+@pytest.fixture
+def sources(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[Sources]:
+    monkeypatch.setattr(sys, "argv", ["estimator_node"])
+    node = EstimatorNode(lambda _code: None, cli_args=["--ros-args", "-r", f"__ns:={NAMESPACE}"])
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        yield Sources(neighbour)
+        node.stop()
+
+
+def test_odometry_has_frames_the_stamp_of_what_it_is_about_and_covariances(sources: Sources) -> None:
+    sources.until_odometry()
+    message = sources.odometry[-1]
+    assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
+    assert message.header.stamp.sec * 1000 * MS + message.header.stamp.nanosec <= sources.now_ns
+    covariance = np.array(message.twist.covariance).reshape(6, 6)
+    assert 0.0 < covariance[0, 0] < 0.15**2
+    assert 0.0 < np.array(message.pose.covariance).reshape(6, 6)[5, 5] < 0.1
+    assert abs(message.twist.twist.linear.x) < 0.2
+
+
+def test_a_gap_is_bridged_and_then_silence_says_that_it_is_stale(sources: Sources) -> None:
+    sources.until_odometry()
+    last_pose_ns = sources.now_ns
+    for _ in range(60):
+        sources.tick(pose=False)
+        time.sleep(0.005)
+    until(lambda: "no believable pose" in sources.said[0])
+    stamps = [m.header.stamp.sec * 1000 * MS + m.header.stamp.nanosec for m in sources.odometry]
+    assert 100 * MS < max(stamps) - last_pose_ns <= 250 * MS
+    sources.until_odometry()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"), [({"frame": "camera"}, "'camera'"), ({"bad": True}, "not finite")]
+)
+def test_senseless_messages_are_refused_and_told(
+    sources: Sources, spoil: dict[str, object], words: str
+) -> None:
+    sources.until_odometry()
+    until(lambda: sources.tick(**spoil) or words in sources.said[1]["last_refusal"])  # type: ignore[arg-type, func-returns-value]
+    assert all(np.isfinite(m.twist.twist.linear.x) for m in sources.odometry)
+
+
+def test_a_platform_reaches_its_pose_by_estimated_odometry_alone(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """The loop over the estimator, in real time: plant, motion capture and inertial unit, estimator, policy."""
+    asked = ("floating_platform", "--controller", "policy", "--start", "0.3,0.2,10", "--goal", "0,0,0")
+    done = run_in_real_time(
+        *asked, "--duration", "9", "--estimator", "mocap_imu", env=ros_domain.env, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    summary = json_of(done.stdout)
+    assert summary["success"]

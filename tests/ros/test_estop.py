@@ -1,0 +1,136 @@
+"""The e-stop on the wires: pressed, silent, reset; and what plant and controller do about it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from fulmar_bringup import robot_operator
+from fulmar_bringup.commands.estop import estop
+from fulmar_core.errors import RunFailed
+from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
+from fulmar_ros.estop_node import EstopNode
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import spinning
+from tests.conftest import RosDomain
+from tests.ros.cli import fulmar
+from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, open_valves, until
+
+
+@pytest.fixture
+def button(neighbour: Neighbour) -> Iterator[EstopNode]:
+    node = EstopNode(lambda _code: None, cli_args=["--ros-args", "-r", f"__ns:={NAMESPACE}"])
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        yield node
+        node.stop()
+
+
+def ask(neighbour: Neighbour, service: str) -> Trigger.Response:
+    client = neighbour.node.create_client(Trigger, service)
+    assert client.wait_for_service(8.0)
+    future = client.call_async(Trigger.Request())
+    until(future.done)
+    return future.result()
+
+
+def drive(neighbour: Neighbour) -> bool:
+    neighbour.command(open_valves(neighbour.robot))
+    return bool(neighbour.applied[-1].any())
+
+
+def test_a_trigger_closes_the_valves_while_commands_go_on(
+    neighbour: Neighbour, plant: PlantNode, button: EstopNode
+) -> None:
+    until(lambda: drive(neighbour))
+    assert ask(neighbour, ESTOP_TRIGGER).success
+    until(lambda: not drive(neighbour))
+    for _ in range(30):
+        time.sleep(0.02)
+        assert not drive(neighbour)
+    until(lambda: "e-stop: pressed" in neighbour.said["plant"][0])
+
+
+def test_a_reset_is_refused_while_commands_are_not_zero_and_done_when_they_are(
+    neighbour: Neighbour, plant: PlantNode, button: EstopNode
+) -> None:
+    until(lambda: drive(neighbour))
+    ask(neighbour, ESTOP_TRIGGER)
+    drive(neighbour)
+    time.sleep(0.1)
+    refused = ask(neighbour, ESTOP_RESET)
+    assert not refused.success
+    assert "not zero" in refused.message
+    neighbour.command([0.0] * 8)
+    time.sleep(0.1)
+    assert ask(neighbour, ESTOP_RESET).success
+    until(lambda: drive(neighbour))
+
+
+def test_an_e_stop_whose_process_dies_stops_the_robot_by_its_silence(
+    neighbour: Neighbour, plant: PlantNode
+) -> None:
+    """A publisher that falls silent without a last word, as one that was killed."""
+    publisher = neighbour.node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
+
+    def alive() -> bool:
+        publisher.publish(Bool(data=False))
+        return drive(neighbour)
+
+    until(alive)
+    since = time.monotonic()
+    until(lambda: not drive(neighbour))
+    assert 0.3 < time.monotonic() - since < 0.8
+    until(lambda: "silent" in neighbour.said["plant"][0])
+
+
+def test_a_controller_forgets_its_goal_so_that_nothing_moves_by_itself_after_a_reset(
+    stream: Stream, button: EstopNode
+) -> None:
+    neighbour = stream.neighbour
+    until(lambda: neighbour.commands[-1].any())
+    ask(neighbour, ESTOP_TRIGGER)
+    until(lambda: not neighbour.commands[-1].any())
+    until(lambda: "e-stop" in neighbour.said["controller"][1]["reason"])
+    time.sleep(0.6)
+    until(lambda: ask(neighbour, ESTOP_RESET).success)
+    until(lambda: "no goal yet" in neighbour.said["controller"][1]["reason"])
+    assert not neighbour.commands[-1].any()
+    neighbour.give_goal()
+    until(lambda: neighbour.commands[-1].any())
+
+
+def test_the_command_stops_a_robot_and_resets_it(
+    neighbour: Neighbour, plant: PlantNode, button: EstopNode, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    until(lambda: drive(neighbour))
+    done = fulmar("estop", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    until(lambda: not drive(neighbour))
+    neighbour.command([0.0] * 8)
+    time.sleep(0.6)
+    done = fulmar("estop", "floating_platform", "--reset", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    until(lambda: drive(neighbour))
+
+
+def test_the_command_stops_a_robot_that_has_no_e_stop_node(
+    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    until(lambda: drive(neighbour))
+    done = fulmar("estop", "floating_platform", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    until(lambda: not drive(neighbour))
+    time.sleep(0.6)
+    assert not drive(neighbour)
+
+
+def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain, monkeypatch) -> None:
+    monkeypatch.setattr(robot_operator, "FIND_S", 0.2)
+    with pytest.raises(RunFailed, match="ROS_DOMAIN_ID"):
+        estop()

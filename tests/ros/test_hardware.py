@@ -1,0 +1,329 @@
+"""Driver nodes on emulated devices: whole runs, dead drivers, the bearing, and adapters to other stacks."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from queue import SimpleQueue
+
+import numpy as np
+import psutil
+import pytest
+from geometry_msgs.msg import Twist
+from mcap.reader import make_reader
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray
+from std_srvs.srv import SetBool
+
+from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.emulation import emulation_of
+from fulmar_bringup.node_table import RunPlan, emulator_spec, plant_spec
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.system import default_hardware
+from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
+from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.runtime import spinning
+from hardware_drivers.adapter_node import AdapterNode
+from hardware_drivers.driver_node import DriverNode
+from hardware_drivers.settings import load_hardware
+from tests.conftest import RosDomain
+from tests.ros.cli import fulmar, json_of
+from tests.ros.neighbour import Neighbour, until
+
+STARTS_S = 40.0
+OWN_TIMEOUT_S = {"turtlebot2": 0.6, "kingfisher": 0.5, "kingfisher_ardupilot": 1.5}
+
+
+class Rig:
+    """An emulator and a driver, each a process, and what the emulated device does by itself."""
+
+    def __init__(self, neighbour: Neighbour, hardware: str, folder: Path) -> None:
+        self.neighbour, self.robot = neighbour, neighbour.robot.name
+        self.device: list[np.ndarray] = []
+        qos = subscriber_qos(DEVICE_STATE, reliable=True, depth=50)
+        neighbour.node.create_subscription(JointState, DEVICE_STATE.name, self._heard, qos)
+        found = load_hardware(hardware)
+        emulation = emulation_of(found, folder)
+        plan = RunPlan(self.robot, "go_to_position", "policy", "hardware", 10.0)
+        plan = replace(plan, hardware=default_hardware(self.robot, hardware), emulated=True)
+        self.group = ProcessGroup()
+        self.group.start(emulator_spec(plan, emulation))
+        self.group.start(plant_spec(plan, port=emulation.port))
+
+    def _heard(self, message: JointState) -> None:
+        self.device.append(np.array(message.effort))
+
+    @property
+    def driver(self) -> psutil.Process:
+        return self.group.process("plant")
+
+    def command(self) -> None:
+        """As hard as it goes, in the wire of the robot."""
+        if self.robot == "turtlebot2":
+            message = self.neighbour.twist(0.4, 0.0)
+            self.neighbour.drive.publish(message)
+        else:
+            self.neighbour.command([1.0] + [0.0] * (len(self.neighbour.robot.actuators.names) - 1))
+        time.sleep(0.03)
+
+    def until_it_moves(self) -> None:
+        until(lambda: self.command() or (bool(self.device) and self.device[-1].any()), STARTS_S)
+
+
+@pytest.fixture
+def rig(neighbour: Neighbour, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rig]:
+    made = Rig(neighbour, request.param, tmp_path)
+    yield made
+    made.group.stop_all()
+
+
+DEVICES = [("turtlebot2", "turtlebot2"), ("kingfisher", "kingfisher"), ("kingfisher", "kingfisher_ardupilot")]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize(("neighbour", "rig"), DEVICES, indirect=True, ids=[name for _, name in DEVICES])
+def test_a_killed_driver_leaves_the_device_to_its_own_watchdog(rig: Rig, request) -> None:
+    """SIGKILL while it drives: the emulator's own last command is a stop, at its own time."""
+    own_s = OWN_TIMEOUT_S[request.node.callspec.id]
+    rig.until_it_moves()
+    rig.driver.send_signal(signal.SIGKILL)
+    dead = time.monotonic()
+    assert rig.device[-1].any()
+    until(lambda: not rig.device[-1].any())
+    assert time.monotonic() - dead < own_s + 0.3
+    time.sleep(0.5)
+    assert not rig.device[-1].any()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
+def test_a_killed_driver_of_valves_leaves_them_open_and_a_new_one_closes_them(rig: Rig, tmp_path) -> None:
+    """Copper has no watchdog: what the page says of valves is so. A driver that starts again begins closed."""
+    rig.until_it_moves()
+    rig.driver.send_signal(signal.SIGKILL)
+    time.sleep(1.0)
+    assert rig.device[-1].any()
+    (hardware, pins) = load_hardware("zero_g_lab"), tmp_path / "gpio"
+    from hardware_drivers.devices import make_device
+
+    device = make_device(rig.neighbour.robot, hardware, port=f"file://{pins}", patience_s=1.0)
+    until(lambda: not rig.device[-1].any())
+    device.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
+def test_a_driver_that_is_told_to_end_closes_its_valves_first(rig: Rig, number: signal.Signals) -> None:
+    rig.until_it_moves()
+    rig.driver.send_signal(number)
+    until(lambda: not rig.device[-1].any(), timeout_s=1.0)
+    assert rig.driver.wait(10.0) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
+def test_silence_closes_the_valves_and_the_state_shows_it(rig: Rig) -> None:
+    """The driver's watchdog of 0.2 s at 10 Hz; the bearing stays on."""
+    rig.until_it_moves()
+    silent = time.monotonic()
+    until(lambda: not rig.device[-1].any())
+    assert time.monotonic() - silent < 0.2 + 0.02 + 0.15
+    until(lambda: not rig.neighbour.applied[-1].any())
+    until(lambda: rig.neighbour.said["plant"][1].get("air_bearing") == "on")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
+def test_the_bearing_has_a_service_and_a_state_of_its_own(rig: Rig) -> None:
+    """Off: valves stay closed whatever is commanded, and the applied state shows it. On again: they open."""
+    states: list[bool] = []
+    node = rig.neighbour.node
+    node.create_subscription(
+        Bool, AIR_BEARING.name, lambda message: states.append(message.data), subscriber_qos(AIR_BEARING)
+    )
+    enable = node.create_client(SetBool, "air_bearing/enable")
+    rig.until_it_moves()
+    assert enable.wait_for_service(10.0)
+    for on in (False, True):
+        answer = enable.call_async(SetBool.Request(data=on))
+        until(answer.done)
+        assert answer.result().success
+        until(lambda on=on: rig.command() or bool(rig.neighbour.applied[-1].any()) is on)
+        until(lambda on=on: states[-1] is on)
+
+
+RUNS = (  # with as many seconds as each needs to get there and stay for four
+    ("floating_platform", "go_to_pose", "zero_g_lab", "11"),
+    ("turtlebot2", "go_to_position", "turtlebot2", "9"),
+    ("kingfisher", "go_to_position", "kingfisher", "16"),
+    ("kingfisher", "go_to_position", "kingfisher_ardupilot", "16"),
+)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp_path: Path) -> None:
+    """Driver, protocol, controller and recorder as on the robot; judged by where the emulated robot really is."""
+    with reserved_domains(2) as domains, ThreadPoolExecutor(2) as pool:
+        free: SimpleQueue[int] = SimpleQueue()
+        for domain in domains:
+            free.put(domain)
+
+        def run(case: tuple[str, str, str, str]) -> subprocess.CompletedProcess[str]:
+            robot, task, hardware, seconds = case
+            domain = free.get()
+            env = {**ros_domain.env, "ROS_DOMAIN_ID": str(domain)}
+            asked = (
+                "run",
+                robot,
+                "--task",
+                task,
+                "--backend",
+                "hardware",
+                "--hardware",
+                hardware,
+                "--emulate",
+            )
+            more = ("--start", "0,0,0", "--goal", "0.5,0.1,10", "--duration", seconds, "--record", hardware)
+            try:
+                return fulmar(*asked, *more, "--json", env=env, cwd=tmp_path)
+            finally:
+                free.put(domain)
+
+        done = list(pool.map(run, RUNS))
+    for (robot, _task, hardware, _seconds), ended in zip(RUNS, done, strict=True):
+        summary = json_of(ended.stdout)
+        assert summary["failure"] is None, (hardware, ended.stderr)
+        assert summary["success"], hardware
+        with next((tmp_path / hardware).glob("*.mcap")).open("rb") as stream:
+            reader = make_reader(stream)
+            topics = {channel.topic for channel in reader.get_summary().channels.values()}
+            attached = {attachment.name for attachment in reader.iter_attachments()}
+        assert {f"/{robot}/odom", f"/{robot}/actuators/state", f"/{robot}/emulator/actuators"} <= topics
+        assert "hardware.yaml" in attached
+
+
+@pytest.fixture
+def heard(neighbour: Neighbour):
+    """Starts a node in this process, and keeps what comes on a topic of another stack."""
+    messages: list = []
+
+    def listen(kind: type, topic: str) -> list:
+        neighbour.node.create_subscription(kind, topic, messages.append, 10)
+        return messages
+
+    return listen
+
+
+def running(make, namespace: str, *parameters: str):
+    arguments = ["--ros-args", "-r", f"__ns:=/{namespace}"]
+    arguments += [word for parameter in parameters for word in ("-p", parameter)]
+    node = make(lambda _code: None, cli_args=arguments)
+    return node, spinning(node, lambda error: pytest.fail(repr(error)))
+
+
+def test_our_commands_reach_the_lab_s_valve_node_and_silence_closes_its_valves(neighbour, heard) -> None:
+    """Entry i after the bearing is thruster ORDER[i]; the node beyond has no watchdog, ours stands before it."""
+    messages = heard(Int16MultiArray, "/spacer_floating_platform/valves/input")
+    node, spin = running(DriverNode, "floating_platform", "hardware:=zero_g_lab_valve_node")
+    with spin:
+        first = [1.0] + [0.0] * 7
+        until(lambda: neighbour.command(first) or (bool(messages) and any(messages[-1].data[1:])))
+        assert messages[-1].data.tolist() == [1, 0, 0, 0, 0, 1, 0, 0, 0]
+        until(lambda: not any(messages[-1].data[1:]))
+        assert messages[-1].data[0] == 1
+        node.stop()
+
+
+@pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)
+def test_our_commands_reach_a_base_that_takes_plain_twists(neighbour, heard) -> None:
+    messages = heard(Twist, "/commands/velocity")
+    node, spin = running(DriverNode, "turtlebot2", "robot:=turtlebot2", "hardware:=turtlebot2_kobuki_node")
+    with spin:
+        until(
+            lambda: (
+                neighbour.drive.publish(neighbour.twist(0.3, -0.4))
+                or (bool(messages) and (messages[-1].linear.x, messages[-1].angular.z) == (0.3, -0.4))
+            )
+        )
+        until(lambda: messages[-1].linear.x == 0.0)
+        node.stop()
+
+
+@pytest.mark.parametrize("neighbour", ["kingfisher"], indirect=True)
+def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> None:
+    messages = heard(Float32MultiArray, "/action")
+    node, spin = running(DriverNode, "kingfisher", "robot:=kingfisher", "hardware:=kingfisher_action")
+    with spin:
+        until(
+            lambda: (
+                neighbour.command([0.5, -1.0]) or (bool(messages) and list(messages[-1].data) == [0.5, -1.0])
+            )
+        )
+        until(lambda: not any(messages[-1].data))
+        node.stop()
+
+
+@pytest.mark.parametrize(
+    ("data", "commanded"),
+    [
+        ([1, 1, 0, 0, 0, 1, 0, 0, 0], [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        ([1, 2, 0, 0, 0, 0, 0, 0, 0], None),
+        ([1] * 8, None),
+    ],
+)
+def test_the_lab_s_controllers_command_our_valves_through_the_adapter(neighbour, data, commanded) -> None:
+    _node, spin = running(AdapterNode, "floating_platform", "hardware:=zero_g_lab_valve_node")
+    publisher = neighbour.node.create_publisher(Int16MultiArray, "/spacer_floating_platform/valves/input", 1)
+    good = Int16MultiArray(data=[1] + [0] * 8)
+    with spin:
+        until(lambda: publisher.publish(good) or bool(neighbour.commands))
+        neighbour.commands.clear()
+        for _ in range(10):
+            publisher.publish(Int16MultiArray(data=data))
+            time.sleep(0.02)
+        found = [command for command in neighbour.commands if command.any()]
+        assert all(command.tolist() == commanded for command in found)
+        assert bool(found) is (commanded is not None)
+
+
+@pytest.mark.parametrize("neighbour", ["kingfisher"], indirect=True)
+@pytest.mark.parametrize(
+    ("data", "taken"), [([0.5, -0.25], True), ([0.5], False), ([float("nan"), 0.0], False)]
+)
+def test_roboran_s_boats_command_ours_through_the_adapter(neighbour, data, taken) -> None:
+    _node, spin = running(AdapterNode, "kingfisher", "hardware:=kingfisher_action")
+    publisher = neighbour.node.create_publisher(Float32MultiArray, "/action", 1)
+    with spin:
+        until(lambda: publisher.publish(Float32MultiArray(data=[0.0, 0.0])) or bool(neighbour.commands))
+        for _ in range(10):
+            publisher.publish(Float32MultiArray(data=data))
+            time.sleep(0.02)
+        assert any(command.any() for command in neighbour.commands) is taken
+
+
+def test_a_driver_whose_device_is_not_there_says_what_to_do(ros_domain: RosDomain, tmp_path) -> None:
+    """Exit code 2 of the node, 1 of a run; one line each."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("title: t\nrobot: turtlebot2\ndriver: {kind: kobuki, port: /dev/ttyNONE}\n")
+    group = ProcessGroup()
+    plan = RunPlan("turtlebot2", "go_to_position", "policy", "hardware", 10.0, hardware=str(path))
+    spec = plant_spec(plan)
+    group.start(replace(spec, parameters={**spec.parameters, "connect_s": 0.1}))
+    try:
+        until(lambda: group.ended() is not None, STARTS_S)
+        assert group.ended().returncode == 2
+        assert "/dev/ttyNONE cannot be opened" in group.last_words("plant")
+    finally:
+        group.stop_all()

@@ -1,0 +1,228 @@
+"""Any message to any handler: no crash, and never a command that the actuators should not get.
+
+Handlers are called directly, with real messages, on real nodes: DDS would only slow the search down.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import Imu, JointState, Joy
+from std_msgs.msg import Bool, String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from fulmar_core.robot import load_robot
+from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.estimator_node import EstimatorNode
+from fulmar_ros.estop_node import EstopNode
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.teleop_node import TeleopNode
+from tests.ros.neighbour import NAMESPACE, Neighbour
+
+FUZZ = settings(
+    max_examples=60,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+NAMES = load_robot("floating_platform").actuators.names
+floats = st.floats(allow_nan=True, allow_infinity=True)
+frames = st.sampled_from(["odom", "base_link", "map", "", "camera", "x" * 300])
+
+
+@st.composite
+def stamped(draw: st.DrawFn, message: object) -> object:
+    message.header.frame_id = draw(frames)  # type: ignore[attr-defined]
+    message.header.stamp.sec = draw(st.integers(-(2**31), 2**31 - 1))  # type: ignore[attr-defined]
+    message.header.stamp.nanosec = draw(st.integers(0, 2**32 - 1))  # type: ignore[attr-defined]
+    return message
+
+
+def fill(draw: st.DrawFn, *parts: object) -> None:
+    """Any numbers in every field of vectors, points and quaternions."""
+    for part in parts:
+        for name in part.get_fields_and_field_types():  # type: ignore[attr-defined]
+            setattr(part, name, draw(floats | st.sampled_from([0.0, 1.0])))
+
+
+@st.composite
+def odometries(draw: st.DrawFn) -> Odometry:
+    message = draw(stamped(Odometry()))
+    message.child_frame_id = draw(frames)
+    fill(draw, message.pose.pose.position, message.pose.pose.orientation)
+    fill(draw, message.twist.twist.linear, message.twist.twist.angular)
+    return message
+
+
+@st.composite
+def poses(draw: st.DrawFn) -> PoseStamped:
+    message = draw(stamped(PoseStamped()))
+    fill(draw, message.pose.position, message.pose.orientation)
+    return message
+
+
+@st.composite
+def points(draw: st.DrawFn) -> PointStamped:
+    message = draw(stamped(PointStamped()))
+    fill(draw, message.point)
+    return message
+
+
+@st.composite
+def twists(draw: st.DrawFn) -> TwistStamped:
+    message = draw(stamped(TwistStamped()))
+    fill(draw, message.twist.linear, message.twist.angular)
+    return message
+
+
+@st.composite
+def paths(draw: st.DrawFn) -> Path:
+    message = draw(stamped(Path()))
+    message.poses = draw(st.lists(poses(), max_size=3))
+    return message
+
+
+@st.composite
+def joint_states(draw: st.DrawFn) -> JointState:
+    message = draw(stamped(JointState()))
+    message.name = draw(st.just(list(NAMES)) | st.lists(st.text(max_size=12), max_size=12))
+    message.effort = draw(st.lists(floats, max_size=12) | st.lists(floats, min_size=8, max_size=8))
+    return message
+
+
+@st.composite
+def markers(draw: st.DrawFn) -> MarkerArray:
+    found = []
+    for _ in range(draw(st.integers(0, 3))):
+        marker = draw(stamped(Marker()))
+        marker.action = draw(st.integers(0, 5))
+        fill(draw, marker.pose.position, marker.scale)
+        found.append(marker)
+    return MarkerArray(markers=found)
+
+
+@st.composite
+def imus(draw: st.DrawFn) -> Imu:
+    message = draw(stamped(Imu()))
+    fill(draw, message.linear_acceleration, message.angular_velocity)
+    message.linear_acceleration_covariance[0] = draw(floats)
+    return message
+
+
+@st.composite
+def joys(draw: st.DrawFn) -> Joy:
+    axes = draw(st.lists(st.floats(width=32, allow_nan=True, allow_infinity=True), max_size=10))
+    return Joy(axes=axes, buttons=draw(st.lists(st.integers(-(2**31), 2**31 - 1), max_size=10)))
+
+
+@given(messages=st.lists(joint_states() | twists() | st.booleans(), max_size=6), by_hand=st.booleans())
+@FUZZ
+def test_a_plant_applies_nothing_but_commands_within_its_limits(
+    plant: PlantNode, messages: list[object], by_hand: bool
+) -> None:
+    wires = plant.wires
+    for message in messages:
+        if isinstance(message, bool):
+            wires._on_estop(Bool(data=message))
+        elif isinstance(message, TwistStamped):
+            wires._on_velocity(message)
+        elif by_hand:
+            wires._on_teleop(message)
+        else:
+            wires._on_command(message)
+        with wires.lock:
+            output = plant.guard.output(10**18)
+            command = plant.guard.command
+        assert not output.any()  # so much later it is safe, whatever came
+        assert command.shape == (8,)
+        assert set(command.tolist()) <= {0.0, 1.0}
+
+
+@given(
+    messages=st.lists(
+        odometries()
+        | poses()
+        | points()
+        | twists()
+        | paths()
+        | markers()
+        | st.text(max_size=20)
+        | st.booleans(),
+        max_size=6,
+    )
+)
+@FUZZ
+def test_a_controller_commands_nothing_but_finite_values_within_its_limits(
+    neighbour: Neighbour, controller: ControllerNode, messages: list[object]
+) -> None:
+    commands: list[np.ndarray] = []
+    publish = controller.wires.publish_command
+    controller.wires.publish_command = lambda command, stamp: (  # type: ignore[method-assign]
+        commands.append(np.array(command)),
+        publish(command, stamp),
+    )
+    try:
+        for message in messages:
+            if isinstance(message, Odometry):
+                controller._on_odometry(message)
+            elif isinstance(message, MarkerArray):
+                controller._on_obstacles(message)
+            elif isinstance(message, bool):
+                controller._on_estop(Bool(data=message))
+            elif isinstance(message, str):
+                controller._on_swap(String(data=message))
+            else:
+                controller._on_goal(message)
+            controller._control(controller._newest)
+    finally:
+        controller.wires.publish_command = publish  # type: ignore[method-assign]
+    for command in commands:
+        assert command.shape == (8,)
+        assert set(command.tolist()) <= {0.0, 1.0}
+
+
+@pytest.fixture
+def others(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[object, object, object]]:
+    monkeypatch.setattr(sys, "argv", ["node"])
+    space = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    nodes = (
+        EstimatorNode(lambda _code: None, cli_args=space),
+        EstopNode(lambda _code: None, cli_args=space),
+        TeleopNode(lambda _code: None, cli_args=[*space, "-p", "keyboard:=false"]),
+    )
+    yield nodes
+    for node in nodes:
+        node.destroy_node()
+
+
+@given(messages=st.lists(poses() | imus() | joint_states() | twists() | joys(), max_size=8))
+@FUZZ
+def test_estimator_e_stop_and_teleoperation_survive_anything(
+    others: tuple[EstimatorNode, EstopNode, TeleopNode], messages: list[object]
+) -> None:
+    estimator, estop, teleop = others
+    published: list[Odometry] = []
+    estimator._publisher.publish = published.append  # type: ignore[method-assign]
+    for message in messages:
+        with np.errstate(all="ignore"):
+            if isinstance(message, PoseStamped):
+                estimator._on_pose(message)
+            elif isinstance(message, Imu):
+                estimator._on_imu(message)
+            elif isinstance(message, JointState):
+                estop._on_command("actuators/command", message)
+            elif isinstance(message, TwistStamped):
+                estop._on_velocity(message)
+            else:
+                teleop._on_joy(message)
+        teleop._send()
+        estop._tell()
+    for odometry in published:
+        twist = odometry.twist.twist
+        assert np.isfinite([twist.linear.x, twist.linear.y, twist.angular.z]).all()

@@ -1,0 +1,210 @@
+"""Fallback and change of policies on the wires."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from std_msgs.msg import String
+
+from fulmar_core.bundle_signature import make_keys, sign_bundle
+from fulmar_core.errors import FulmarError
+from fulmar_core.topics import METADATA, SWAP
+from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
+from policy_server.policy import Policy
+from policy_server.policy_node import make_policy
+from policy_server.shipped import policies_directory
+from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
+
+SHIPPED = policies_directory() / "floating_platform_go_to_pose"
+OTHER_TASK = policies_directory() / "floating_platform_go_to_position"
+OTHER_ROBOT = policies_directory() / "turtlebot2_go_to_pose"
+
+Start = Callable[..., ControllerNode]
+
+
+@pytest.fixture
+def start(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
+    """Starts a policy node with parameters; stops it at the end."""
+    monkeypatch.setattr(sys, "argv", ["policy_node"])
+    nodes: list[ControllerNode] = []
+    contexts = []
+
+    def begin(**parameters: object) -> ControllerNode:
+        arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=5.0"]
+        for name, value in parameters.items():
+            arguments += ["-p", f"{name}:={value}"]
+        node = ControllerNode(make_policy, lambda _code: None, cli_args=arguments, learned=True)
+        context = spinning(node, lambda error: pytest.fail(repr(error)))
+        context.__enter__()
+        nodes.append(node)
+        contexts.append(context)
+        neighbour.give_goal()
+        until(lambda: "controller" in neighbour.said)
+        return node
+
+    yield begin
+    for node, context in zip(nodes, contexts, strict=True):
+        node.stop()
+        context.__exit__(None, None, None)
+
+
+def values(neighbour: Neighbour) -> dict[str, str]:
+    return neighbour.said["controller"][1]
+
+
+def damaged(folder: Path) -> Path:
+    bundle = shutil.copytree(SHIPPED, folder / "damaged")
+    (bundle / "policy.onnx").write_bytes((bundle / "policy.onnx").read_bytes()[:-1] + b"x")
+    return bundle
+
+
+@pytest.mark.parametrize("what", ["wrong hash", "wrong robot", "wrong task", "unsigned"])
+def test_a_policy_that_is_refused_gives_its_place_to_the_named_controller(
+    what: str, neighbour: Neighbour, start: Start, tmp_path: Path
+) -> None:
+    bundle = {"wrong hash": damaged, "wrong robot": lambda _: OTHER_ROBOT, "wrong task": lambda _: OTHER_TASK}
+    more = {}
+    if what == "unsigned":
+        make_keys(tmp_path / "private.pem", tmp_path / "public.pem")
+        more["trusted_keys"] = tmp_path / "public.pem"
+    folder = bundle.get(what, lambda _: SHIPPED)(tmp_path)
+    start(policy=folder, fallback="lqr", **more)
+    odometry = Stream(neighbour)
+    until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+    until(lambda: values(neighbour)["mode"] == "active")
+    odometry.stop()
+    assert values(neighbour)["controller"] == "lqr"
+    assert values(neighbour)["fell_back"]
+
+
+def test_without_a_fallback_it_does_not_start(neighbour: Neighbour, start: Start, tmp_path: Path) -> None:
+    with pytest.raises(FulmarError, match="SHA-256"):
+        start(policy=damaged(tmp_path))
+
+
+def test_a_rate_that_the_policy_was_not_trained_at_is_refused_too(neighbour: Neighbour, start: Start) -> None:
+    start(policy=SHIPPED, fallback="lqr", control_hz=10.0)
+    until(lambda: values(neighbour)["controller"] == "lqr")
+    assert "Hz" in values(neighbour)["fell_back"]
+
+
+def test_a_policy_whose_commands_are_refused_several_times_is_replaced(
+    neighbour: Neighbour, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good = Policy.act
+
+    def act(self: Policy, observation: np.ndarray) -> np.ndarray:
+        command = good(self, observation)
+        return np.full_like(command, np.nan) if np.any(observation) else command
+
+    monkeypatch.setattr(Policy, "act", act)
+    start(policy=SHIPPED, fallback="lqr")
+    odometry = Stream(neighbour)
+    until(lambda: values(neighbour)["controller"] == "lqr")
+    until(lambda: neighbour.commands[-1].any())
+    odometry.stop()
+    assert all(np.isfinite(command).all() for command in neighbour.commands)
+    assert int(values(neighbour)["rejections"]) >= 3
+
+
+def copy_of(folder: Path, name: str) -> Path:
+    """The shipped bundle with another note, so that its hash differs and its commands do not."""
+    from dataclasses import replace
+
+    from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
+
+    bundle = shutil.copytree(SHIPPED, folder / name)
+    passport = read_passport(bundle)
+    noted = replace(passport, training={**passport.training, "note": name})
+    write_bundle(bundle, (bundle / NETWORK).read_bytes(), read_golden(bundle), noted)
+    return bundle
+
+
+class Swapper:
+    """Asks for another policy, and notes who says that it controls."""
+
+    def __init__(self, neighbour: Neighbour) -> None:
+        self.neighbour, self.metadata = neighbour, list[dict[str, object]]()
+        self._publisher = neighbour.node.create_publisher(String, SWAP.name, publisher_qos(SWAP))
+        neighbour.node.create_subscription(
+            String,
+            METADATA.name,
+            lambda message: self.metadata.append(json.loads(message.data)),
+            subscriber_qos(METADATA),
+        )
+        until(lambda: bool(self._publisher.get_subscription_count() and self.metadata))
+        time.sleep(0.3)
+
+    def ask(self, folder: Path | str, answer: str) -> None:
+        self._publisher.publish(String(data=str(folder)))
+        until(lambda: values(self.neighbour)["swap"].startswith(answer))
+
+
+def test_a_policy_is_changed_while_it_acts_without_a_gap_or_a_stray_command(
+    neighbour: Neighbour, start: Start, tmp_path: Path
+) -> None:
+    start(policy=SHIPPED)
+    odometry = Stream(neighbour)
+    until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+    swapper = Swapper(neighbour)
+    before = values(neighbour)
+    count = len(neighbour.commands)
+    swapper.ask(copy_of(tmp_path, "second"), "done")
+    until(lambda: len(neighbour.commands) > count + 5)
+    odometry.stop()
+    after = values(neighbour)
+    assert after["sha256"] != before["sha256"]
+    assert swapper.metadata[-1]["sha256"] == after["sha256"]
+    assert after["mode"] == "active"
+    assert after["rejections"] == "0"
+    # The two are the same network: whatever happened in between would show as another command.
+    around = np.array(neighbour.commands[count - 1 : count + 5])
+    assert (around == around[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("folder", "words"),
+    [
+        (OTHER_ROBOT, "trained for robot"),
+        (OTHER_TASK, "trained for task"),
+        ("/nowhere", ""),
+        ("x" * 5000, "characters"),
+    ],
+)
+def test_a_policy_that_does_not_fit_is_refused_and_the_old_one_goes_on(
+    folder: Path | str, words: str, neighbour: Neighbour, start: Start
+) -> None:
+    start(policy=SHIPPED)
+    odometry = Stream(neighbour)
+    until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+    before = values(neighbour)["sha256"]
+    Swapper(neighbour).ask(folder, "refused")
+    assert words in values(neighbour)["swap"]
+    count = len(neighbour.commands)
+    until(lambda: len(neighbour.commands) > count + 3)
+    odometry.stop()
+    assert neighbour.commands[-1].any()
+    assert values(neighbour)["sha256"] == before
+
+
+def test_where_signatures_are_asked_for_only_a_signed_policy_takes_over(
+    neighbour: Neighbour, start: Start, tmp_path: Path
+) -> None:
+    make_keys(tmp_path / "private.pem", tmp_path / "public.pem")
+    first, second = copy_of(tmp_path, "first"), copy_of(tmp_path, "second")
+    sign_bundle(first, tmp_path / "private.pem")
+    start(policy=first, trusted_keys=tmp_path / "public.pem")
+    swapper = Swapper(neighbour)
+    swapper.ask(second, "refused")
+    assert "not signed" in values(neighbour)["swap"]
+    sign_bundle(second, tmp_path / "private.pem")
+    swapper.ask(second, "done")

@@ -1,0 +1,146 @@
+"""A person's hand on the wires: it goes before the controller, and lets go when the person does."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sensor_msgs.msg import Joy
+from std_srvs.srv import Trigger
+
+from fulmar_core.topics import GIVE_BACK, JOY
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import spinning
+from fulmar_ros.teleop_node import TeleopNode
+from tests.conftest import RosDomain
+from tests.ros.cli import FULMAR, fulmar
+from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
+
+AHEAD = [0.0, 1.0, 0.0, 0.0]
+
+
+class Pad:
+    """A gamepad in the test's hand."""
+
+    def __init__(self, neighbour: Neighbour) -> None:
+        self._publisher = neighbour.node.create_publisher(Joy, JOY.name, publisher_qos(JOY))
+        self.neighbour = neighbour
+
+    def say(self, *, held: bool, axes: list[float] = AHEAD, gives_back: bool = False) -> None:
+        self._publisher.publish(Joy(axes=axes, buttons=[0, 0, 0, 0, int(held), int(gives_back)]))
+
+    def drives(self, *, held: bool, axes: list[float] = AHEAD) -> bool:
+        """Say it, while a controller commands one valve; whether more than that valve is open."""
+        self.say(held=held, axes=axes)
+        self.neighbour.command(open_valves(self.neighbour.robot))
+        time.sleep(0.02)
+        return bool(self.neighbour.applied[-1][1:].any())
+
+
+@pytest.fixture
+def pad(neighbour: Neighbour, plant: PlantNode) -> Iterator[Pad]:
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "keyboard:=false"]
+    node = TeleopNode(lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        yield Pad(neighbour)
+        node.stop()
+
+
+def test_without_the_dead_man_button_the_controller_keeps_the_robot(pad: Pad) -> None:
+    until(lambda: pad.drives(held=False) or bool(pad.neighbour.applied[-1][0]))
+    for _ in range(20):
+        assert not pad.drives(held=False)
+    assert pad.neighbour.applied[-1][0]
+
+
+def test_a_hand_goes_before_the_controller_and_letting_go_stands_still(pad: Pad) -> None:
+    until(lambda: pad.drives(held=True))
+    until(lambda: not pad.drives(held=False) and not pad.neighbour.applied[-1].any())
+    for _ in range(30):  # the controller goes on commanding, and is not heard
+        pad.drives(held=False)
+        assert not pad.neighbour.applied[-1].any()
+
+
+def test_the_controller_gets_the_robot_back_when_the_person_says_so(pad: Pad) -> None:
+    until(lambda: pad.drives(held=True))
+    until(lambda: not pad.drives(held=False) and not pad.neighbour.applied[-1].any())
+
+    def given_back() -> bool:
+        pad.say(held=False, gives_back=True)
+        pad.neighbour.command(open_valves(pad.neighbour.robot))
+        time.sleep(0.02)
+        return bool(pad.neighbour.applied[-1][0])
+
+    until(given_back)
+
+
+def test_it_is_not_given_back_while_the_hand_moves_something(pad: Pad) -> None:
+    until(lambda: pad.drives(held=True))
+    client = pad.neighbour.node.create_client(Trigger, GIVE_BACK)
+    assert client.wait_for_service(8.0)
+    future = client.call_async(Trigger.Request())
+    until(lambda: pad.drives(held=True) and future.done())
+    assert not future.result().success
+
+
+def test_a_gamepad_that_dies_closes_the_valves(pad: Pad) -> None:
+    until(lambda: pad.drives(held=True))
+    since = time.monotonic()
+    until(lambda: not pad.neighbour.applied[-1].any())
+    assert time.monotonic() - since < 1.0
+    time.sleep(0.5)
+    pad.neighbour.command(open_valves(pad.neighbour.robot))
+    time.sleep(0.2)
+    assert not pad.neighbour.applied[-1].any()
+
+
+@pytest.mark.parametrize("axes", [[], [float("nan")] * 4, [float("inf"), float("inf"), 0.0, float("nan")]])
+def test_a_senseless_gamepad_moves_nothing(pad: Pad, axes: list[float]) -> None:
+    for _ in range(20):
+        assert not pad.drives(held=True, axes=axes)
+
+
+def test_keys_drive_and_are_the_dead_man_switch(
+    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """`fulmar teleop` on a terminal of its own: a key opens valves, no key closes them, x ends it."""
+    master, slave = os.openpty()
+    process = subprocess.Popen(
+        [*FULMAR, "teleop", "floating_platform"],
+        env=ros_domain.env,
+        cwd=tmp_path,
+        stdin=slave,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+
+        def key(letter: str) -> bool:
+            os.write(master, letter.encode())
+            time.sleep(0.05)
+            return bool(neighbour.applied[-1].any())
+
+        until(lambda: key("w"), 20.0)
+        assert (neighbour.applied[-1] != open_valves(neighbour.robot)).any()
+        os.write(master, b" ")
+        until(lambda: not neighbour.applied[-1].any())
+        until(lambda: key("d"))
+        until(lambda: not neighbour.applied[-1].any())  # nobody presses anything
+        os.write(master, b"x")
+        assert process.wait(5.0) == 0
+    finally:
+        process.kill()
+        process.wait()
+        os.close(master)
+        os.close(slave)
+
+
+def test_without_a_terminal_the_keyboard_is_refused_in_words(ros_domain: RosDomain, tmp_path: Path) -> None:
+    done = fulmar("teleop", "floating_platform", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "no terminal" in done.stderr
