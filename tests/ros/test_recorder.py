@@ -26,7 +26,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import Bool, String
 
+from fulmar_core.errors import LockstepError
 from fulmar_core.topics import DIAGNOSTICS, ESTOP, METADATA, ODOMETRY
+from fulmar_ros.patience import publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 ROBOT = "/floating_platform"
@@ -92,8 +94,8 @@ def node(ros_domain) -> Iterator[rclpy.node.Node]:
     rclpy.shutdown(context=context)
 
 
-def odometry(node):
-    publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+def odometry(node, *, lockstep: bool = False):
+    publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY, lockstep=lockstep))
     deadline = time.monotonic() + 10.0
     while not publisher.get_subscription_count():
         assert time.monotonic() < deadline, "the recorder never subscribed to the odometry"
@@ -165,6 +167,47 @@ def test_a_paused_recorder_goes_on_where_it_was(record, node):
     publish(publisher, range(50, 100))
     assert recorder.end(signal.SIGINT)[0] == 0
     assert recorder.stamps_by_rosbags() == list(range(100))
+
+
+def test_in_lock_step_a_paused_recorder_is_waited_for_and_lacks_nothing(record, node):
+    recorder = record()
+    recorder.wait_until_recording()
+    publisher = odometry(node, lockstep=True)
+    recorder.process.send_signal(signal.SIGSTOP)
+    threading.Timer(2.0, recorder.process.send_signal, (signal.SIGCONT,)).start()
+    message, begin, slowest_s = Odometry(), time.monotonic(), 0.0
+    for stamp in range(6000):  # more than the history of a publisher that keeps everything
+        message.header.stamp.sec = stamp
+        before = time.monotonic()
+        publish_patiently(publisher, message)
+        slowest_s = max(slowest_s, time.monotonic() - before)
+    assert time.monotonic() - begin > 2.0, "nothing was waited for"
+    assert slowest_s > 0.2
+    assert publisher.wait_for_all_acked(Duration(seconds=5.0))
+    assert recorder.end(signal.SIGINT)[0] == 0
+    assert recorder.stamps_by_rosbags() == list(range(6000))
+
+
+def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(record, node, monkeypatch):
+    monkeypatch.setattr("fulmar_ros.patience.PATIENCE_S", 0.3)
+    recorder = record()
+    recorder.wait_until_recording()
+    publisher = odometry(node, lockstep=True)
+    recorder.process.send_signal(signal.SIGSTOP)
+    with pytest.raises(LockstepError, match="odom: a reader has taken nothing for 0.3 s"):
+        for _ in range(6000):
+            publish_patiently(publisher, Odometry())
+
+
+def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
+    recorder = record()
+    recorder.wait_until_recording()
+    publisher = odometry(node)
+    recorder.process.send_signal(signal.SIGSTOP)
+    begin = time.monotonic()
+    for _ in range(6000):
+        publisher.publish(Odometry())
+    assert time.monotonic() - begin < 2.0
 
 
 def test_an_existing_bag_is_refused_with_one_line(record, tmp_path):

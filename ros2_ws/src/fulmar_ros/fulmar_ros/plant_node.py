@@ -107,7 +107,7 @@ class PlantNode(LifecycleNode):
             simulated=self._simulated,
             odometry=self.settings.publishes_odometry,
             mocap=self._motion_capture(),
-            by_hand=not self.settings.lockstep,  # where the plant waits for the controller's answers
+            lockstep=self.settings.lockstep,
         )
         self._make_loops(self._backend)
         self.health.open(self)
