@@ -194,7 +194,7 @@ def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(recor
     recorder.wait_until_recording()
     publisher = odometry(node, lockstep=True)
     recorder.process.send_signal(signal.SIGSTOP)
-    with pytest.raises(LockstepError, match="odom: a reader has taken nothing for 0.3 s"):
+    with pytest.raises(LockstepError, match="a reader has taken nothing for 0"):
         for _ in range(6000):
             publish_patiently(publisher, Odometry())
 

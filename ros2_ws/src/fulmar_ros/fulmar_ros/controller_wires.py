@@ -9,7 +9,6 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
@@ -40,10 +39,10 @@ from fulmar_core.topics import (
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
-from fulmar_ros.patience import PATIENCE_S, publish_patiently
+from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
-FLUSH_S = 0.3  # in real time
+LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 
 
 class ControllerWires:
@@ -83,7 +82,7 @@ class ControllerWires:
         wire = command_wire(robot)
         qos = partial(publisher_qos, lockstep=lockstep)
         self._publish = publish_patiently if lockstep else Publisher.publish
-        self._flush = Duration(seconds=PATIENCE_S if lockstep else FLUSH_S)
+        self._flush_s = FLUSH_S if lockstep else LAST_WORDS_S
         self._by_velocity = wire is VELOCITY_COMMAND
         kind = TwistStamped if self._by_velocity else JointState
         self._command = node.create_publisher(kind, wire.name, qos(wire))
@@ -97,15 +96,13 @@ class ControllerWires:
         diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self.health = Health(f"{robot.name}: controller", [status, diagnostics])
         self._actuators = robot.actuators
-        self._publishers = (
+        self._streams = [
             self._command,
             self._observation,
             self._action,
-            self._metadata,
-            status,
-            diagnostics,
             *([self._health] if self._health else []),
-        )
+        ]
+        self._publishers = (*self._streams, self._metadata, status, diagnostics)
         self._write_command = self._command_writer()
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_health = VectorWriter(robot.actuators.names)
@@ -153,8 +150,7 @@ class ControllerWires:
 
     def flush(self) -> None:
         """Wait, not for ever, until every subscriber has the last messages."""
-        for publisher in self._publishers:
-            publisher.wait_for_all_acked(self._flush)
+        flush(self._streams, self._flush_s)
 
     def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
         """Publish the very vectors behind a command, where somebody listens."""

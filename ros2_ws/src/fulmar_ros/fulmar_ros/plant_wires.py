@@ -11,7 +11,6 @@ from functools import partial
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
@@ -40,11 +39,11 @@ from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWrit
 from fulmar_ros.deadline import Spread
 from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.motion_capture import MotionCapture
-from fulmar_ros.patience import PATIENCE_S, publish_patiently
+from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
-FLUSH_S = 0.3  # in real time
+LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 REMEMBERED = 256  # odometry messages whose answer may still come
 
 
@@ -76,7 +75,7 @@ class PlantWires:
         """
         self._mocap = mocap
         self._publish = publish_patiently if lockstep else Publisher.publish
-        self._flush = Duration(seconds=PATIENCE_S if lockstep else FLUSH_S)
+        self._flush_s = FLUSH_S if lockstep else LAST_WORDS_S
         self.lock = threading.Condition()
         self.latency_ms = Spread()
         self._guard = guard
@@ -85,13 +84,9 @@ class PlantWires:
         self._clock_ns = 0
         self._captured_ns = 0
         self._qos = qos = partial(publisher_qos, lockstep=lockstep)
-        self._odometry = (
-            node.create_publisher(Odometry, ODOMETRY.name, qos(ODOMETRY)) if odometry else None
-        )
+        self._odometry = node.create_publisher(Odometry, ODOMETRY.name, qos(ODOMETRY)) if odometry else None
         self._poses = (
-            node.create_publisher(PoseStamped, MOCAP.name, qos(MOCAP))
-            if mocap is not None
-            else None
+            node.create_publisher(PoseStamped, MOCAP.name, qos(MOCAP)) if mocap is not None else None
         )
         self._imu = node.create_publisher(Imu, IMU.name, qos(IMU))
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, qos(ACTUATORS_STATE))
@@ -193,8 +188,7 @@ class PlantWires:
 
     def flush(self) -> None:
         """Wait, not for ever, until every subscriber has the last states."""
-        for publisher in self._publishers():
-            publisher.wait_for_all_acked(self._flush)
+        flush(self._publishers(), self._flush_s)
 
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""

@@ -88,7 +88,10 @@ def stay_on_this_host() -> None:
 
 def repair_losses_soon() -> None:
     """Let Fast DDS send again soon what got lost, unless the environment sets it up; call before `rclpy.init`."""
-    names = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")  # the second is its older name
+    names = (
+        "FASTDDS_DEFAULT_PROFILES_FILE",
+        "FASTRTPS_DEFAULT_PROFILES_FILE",
+    )  # the second is its older name
     if not any(name in os.environ for name in names):
         os.environ[names[0]] = str(Path(__file__).with_name("fast_dds.xml"))
 

@@ -168,7 +168,12 @@ class _Search:
         for i, _, std in self._prior:
             meat[i, i] += 1.0 / std**2
         sandwich = white @ meat @ white
-        blur = np.array([_in_search(u, float(u.from_search(at)), u.blur) for u, at in zip(self.model.unknowns, place, strict=True)])
+        blur = np.array(
+            [
+                _in_search(u, float(u.from_search(at)), u.blur)
+                for u, at in zip(self.model.unknowns, place, strict=True)
+            ]
+        )
         return np.sqrt(np.maximum(np.diag(white), np.diag(sandwich)) + blur**2), freedom
 
     def _cost(self, residual: np.ndarray, place: np.ndarray) -> float:
