@@ -210,6 +210,34 @@ def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
     assert time.monotonic() - begin < 2.0
 
 
+PUBLISHES_AND_ASKS = """
+import sys, time
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
+from fulmar_core.topics import ODOMETRY
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import repair_losses_soon
+repair_losses_soon()
+rclpy.init()
+node = rclpy.create_node("talker", namespace=sys.argv[1])
+publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+while not publisher.get_subscription_count():
+    time.sleep(0.01)
+time.sleep(0.5)
+publisher.publish(Odometry())
+print(publisher.wait_for_all_acked(Duration(seconds=1.5)))
+"""
+
+
+def test_a_publisher_learns_soon_what_has_arrived(record, ros_domain):
+    """By itself Fast DDS asks every 3 s, when the last 50 messages of a 200 Hz publisher are long gone."""
+    record().wait_until_recording()
+    asked = [sys.executable, "-c", PUBLISHES_AND_ASKS, ROBOT]
+    done = subprocess.run(asked, env=ros_domain.env, capture_output=True, text=True, timeout=30, check=True)
+    assert done.stdout == "True\n"
+
+
 def test_an_existing_bag_is_refused_with_one_line(record, tmp_path):
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "bag_0.mcap").write_bytes(b"precious")

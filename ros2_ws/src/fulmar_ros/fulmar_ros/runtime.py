@@ -88,12 +88,9 @@ def stay_on_this_host() -> None:
 
 def repair_losses_soon() -> None:
     """Let Fast DDS send again soon what got lost, unless the environment sets it up; call before `rclpy.init`."""
-    names = (
-        "FASTDDS_DEFAULT_PROFILES_FILE",
-        "FASTRTPS_DEFAULT_PROFILES_FILE",
-    )  # the second is its older name
+    names = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"  # Jazzy's, and that of later ones
     if not any(name in os.environ for name in names):
-        os.environ[names[0]] = str(Path(__file__).with_name("fast_dds.xml"))
+        os.environ |= dict.fromkeys(names, str(Path(__file__).with_name("fast_dds.xml")))
 
 
 def end_with_parent() -> None:
