@@ -146,7 +146,7 @@ def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
     publisher = odometry(node)
     begin = time.monotonic()
     sent = []
-    while time.monotonic() - begin < 3.5:
+    while time.monotonic() - begin < 2.0:
         publish(publisher, [len(sent)], period_s=0.01)
         sent.append(time.monotonic())
     recorder.end(signal.SIGKILL)
@@ -337,10 +337,10 @@ def test_a_bag_carries_the_code_and_the_packages_that_made_it(record):
 def test_a_recorder_splits_by_time(record, node):
     recorder = record("split_s:=0.5")
     recorder.wait_until_recording()
-    publish(odometry(node), range(300), period_s=0.01)
+    publish(odometry(node), range(200), period_s=0.01)
     assert recorder.end(signal.SIGINT)[0] == 0
     assert len(list(recorder.directory.glob("*.mcap"))) > 2
-    assert recorder.stamps_by_rosbags() == list(range(300))
+    assert recorder.stamps_by_rosbags() == list(range(200))
 
 
 def test_a_ring_without_a_fault_leaves_nothing(record, node):
@@ -354,20 +354,20 @@ def test_a_ring_without_a_fault_leaves_nothing(record, node):
 
 
 def test_a_ring_writes_the_goal_and_what_was_before_and_after_a_fault(record, node):
-    recorder = record("mode:=ring", "before_fault_s:=1.0", "after_fault_s:=0.5")
-    recorder.wait_until_recording("keeping 1 s for")
+    recorder = record("mode:=ring", "before_fault_s:=0.5", "after_fault_s:=0.3")
+    recorder.wait_until_recording("keeping 0.5 s for")
     metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
     stop = node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
     publisher = odometry(node)
     metadata.publish(String(data="who"))
-    publish(publisher, range(200), period_s=0.01)
+    publish(publisher, range(100), period_s=0.01)
     stop.publish(Bool(data=True))
-    publish(publisher, range(200, 400), period_s=0.01)
+    publish(publisher, range(100, 200), period_s=0.01)
     assert recorder.end(signal.SIGINT)[0] == 0
     stamps = recorder.stamps_by_rosbags()
     assert stamps == list(range(stamps[0], stamps[-1] + 1))
-    assert stamps[0] >= 50, "a second before the stop, and not the beginning"
-    assert 200 < stamps[-1] < 350, "half a second after it, and not the end"
+    assert stamps[0] >= 25, "half a second before the stop, and not the beginning"
+    assert 100 < stamps[-1] < 190, "a third of a second after it, and not the end"
     with AnyReader([recorder.directory]) as reader:
         held = [c.topic for c, _, _ in reader.messages() if c.topic == f"{ROBOT}/{METADATA.name}"]
     assert len(held) == 1

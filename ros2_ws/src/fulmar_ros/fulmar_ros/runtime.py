@@ -88,7 +88,10 @@ def stay_on_this_host() -> None:
 
 def repair_losses_soon() -> None:
     """Let Fast DDS send again soon what got lost, unless the environment sets it up; call before `rclpy.init`."""
-    names = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"  # Jazzy's, and that of later ones
+    names = (
+        "FASTRTPS_DEFAULT_PROFILES_FILE",
+        "FASTDDS_DEFAULT_PROFILES_FILE",
+    )  # Jazzy's, and that of later ones
     if not any(name in os.environ for name in names):
         os.environ |= dict.fromkeys(names, str(Path(__file__).with_name("fast_dds.xml")))
 
