@@ -147,7 +147,7 @@ def test_a_truncated_bag_is_read_up_to_the_cut_and_says_so(copy, share):
     assert done.exit_code == 0 or "damage:" in done.stdout
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 2**32 - 1), flips=st.integers(1, 12))
 def test_flipped_bits_end_in_figures_or_in_one_clear_line(tmp_path_factory, seed, flips):
     rng = random.Random(seed)

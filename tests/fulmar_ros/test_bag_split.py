@@ -9,6 +9,7 @@ import yaml
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
+from fulmar_ros.bag_part import BagPart
 from fulmar_ros.bag_records import bag_files
 from fulmar_ros.bag_recovery import recover
 from fulmar_ros.bag_writer import BagWriter
@@ -90,6 +91,17 @@ def test_a_bag_is_readable_at_every_moment_of_a_split(tmp_path):
     bag.flush()
     assert words_by_rosbags(tmp_path / "bag") == words_by_mcap(tmp_path / "bag") == WORDS
     bag.close()
+
+
+def test_a_file_has_its_name_only_when_readers_can_open_it(tmp_path):
+    """A recorder may be killed between the creation of the next file and its first flush."""
+    part = BagPart(tmp_path / "bag_1.mcap")
+    assert not list(tmp_path.glob("*.mcap"))
+    part.flush()
+    with (tmp_path / "bag_1.mcap").open("rb") as stream:
+        assert not list(make_reader(stream).iter_messages())
+    part.finish()
+    assert [path.name for path in tmp_path.iterdir()] == ["bag_1.mcap"]
 
 
 def test_the_tenth_file_comes_after_the_ninth(tmp_path):

@@ -28,7 +28,7 @@ from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_ros.goal_messages import TYPES, goal_message, obstacles_message
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import repair_losses_soon, spinning
 
 START_TIMEOUT_S = 30.0
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
@@ -166,6 +166,7 @@ def supervisor(robot: str, task: Task) -> Iterator[Supervisor]:
     """A supervisor that listens in a thread of its own until the context ends."""
     key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
     os.environ[key] = child_environment()[key]
+    repair_losses_soon()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("supervisor", namespace=f"/{robot}")
     try:

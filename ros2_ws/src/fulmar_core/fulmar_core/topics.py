@@ -26,8 +26,9 @@ SIMULATION_START_NS = 1_000_000_000
 class Wire:
     """One topic.
 
-    `delivery` is how publishers offer it: "stream" is reliable with the last 50 kept, "latched" is reliable and
-    transient-local with the last `latest`, "best_effort" keeps the last 50.
+    `delivery` is how publishers offer it: "stream" is reliable with the last 50 kept (in lock step with all that a
+    reader has not got), "latched" is reliable and transient-local with the last `latest`, "best_effort" keeps the last
+    50.
     """
 
     name: str
@@ -84,7 +85,7 @@ ACTUATORS_HEALTH = Wire(
     "actuators/health",
     "sensor_msgs/msg/JointState",
     "controller",
-    "best_effort",
+    "stream",
     "control rate, where there are thrusters",
     "share of its thrust that each valve is believed to give, 0 to 1; `effort` by actuator name",
 )
@@ -108,7 +109,7 @@ OBSERVATION = Wire(
     "controller/observation",
     "sensor_msgs/msg/JointState",
     "controller",
-    "best_effort",
+    "stream",
     "control rate",
     "the very vector that the controller was fed; names are its terms",
 )
@@ -116,7 +117,7 @@ ACTION = Wire(
     "controller/action",
     "sensor_msgs/msg/JointState",
     "controller",
-    "best_effort",
+    "stream",
     "control rate",
     "the very vector that the controller gave, before limits",
 )

@@ -6,6 +6,7 @@ piece overwrites in the same write, so that neither SIGKILL nor a full disk leav
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -22,13 +23,17 @@ def _provisional_end() -> bytes:
 
 
 PROVISIONAL_END = _provisional_end()
+BEGUN = ".begun"  # ending of a file without content
 
 
 class BagFile:
-    """What `mcap.writer.Writer` writes to; bytes wait in memory until `flush`."""
+    """What `mcap.writer.Writer` writes to; bytes wait in memory until `flush`.
+
+    It has its name from the first flush on: nobody finds a file that readers refuse because nothing is in it yet.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Create the file.
+        """Create the file, under the name that it has until it holds something.
 
         Args:
             path: Must not exist yet.
@@ -36,7 +41,10 @@ class BagFile:
         Raises:
             OSError: It exists, or cannot be created.
         """
-        self._descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o644)
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+        self._path, self._nameless = path, path.with_name(path.name + BEGUN)
+        self._descriptor = os.open(self._nameless, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o644)
         self._waiting = bytearray()
         self._on_disk = 0  # bytes, without the provisional end
 
@@ -76,14 +84,18 @@ class BagFile:
         self._append(b"")
 
     def close(self) -> None:
-        """Let go of the file; what waits is lost."""
+        """Let go of the file; what waits is lost, and so is a file that never got a name."""
         os.close(self._descriptor)
+        if not self._on_disk:
+            self._nameless.unlink(missing_ok=True)
 
     def _append(self, end: bytes) -> None:
         try:
             self._write_at(self._on_disk, bytes(self._waiting) + end)
             os.ftruncate(self._descriptor, self._on_disk + len(self._waiting) + len(end))
             os.fdatasync(self._descriptor)
+            if not self._on_disk:
+                os.rename(self._nameless, self._path)
         except OSError:
             os.ftruncate(self._descriptor, self._on_disk)
             self._write_at(self._on_disk, PROVISIONAL_END)

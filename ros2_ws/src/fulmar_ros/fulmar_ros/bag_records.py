@@ -14,7 +14,7 @@ from typing import Any
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from fulmar_core.errors import BagError
@@ -22,6 +22,7 @@ from fulmar_core.errors import BagError
 Record = Schema | Channel | Message | Metadata | Attachment
 
 _HEAD = struct.Struct("<BQ")  # opcode and length of every record
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time and publish time, before the content
 _READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
     Opcode.SCHEMA: lambda stream, _: Schema.read(stream),
     Opcode.CHANNEL: lambda stream, _: Channel.read(stream),
@@ -100,7 +101,27 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
 def _parse(opcode: int, body: bytes, where: str, damage: list[str]) -> list[Any]:
     try:
         record = _READERS[opcode](ReadDataStream(BytesIO(body)), len(body))
-        return breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
+        return _records_of(record) if isinstance(record, Chunk) else [record]
     except Exception as error:  # noqa: BLE001 - flipped bits raise whatever they please, from four libraries
         damage.append(f"{where} is damaged and was left out ({type(error).__name__}).")
         return []
+
+
+def _records_of(chunk: Chunk) -> list[Any]:
+    """What `mcap.stream_reader.breakup_chunk` gives, several times as fast: most of a bag are messages."""
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    data = stream.read(size)
+    records: list[Any] = []
+    offset = 0
+    while offset < size:
+        opcode, length = _HEAD.unpack_from(data, offset)
+        start, offset = offset + _HEAD.size, offset + _HEAD.size + length
+        if offset > size or (opcode == Opcode.MESSAGE and length < _MESSAGE.size):
+            raise ValueError(f"a record of {length} bytes does not fit.")
+        if opcode == Opcode.MESSAGE:
+            channel, sequence, log_ns, publish_ns = _MESSAGE.unpack_from(data, start)
+            content = data[start + _MESSAGE.size : offset]
+            records.append(Message(channel, log_ns, content, publish_ns, sequence))
+        elif opcode in _READERS:
+            records.append(_READERS[opcode](ReadDataStream(BytesIO(data[start:offset])), length))
+    return records

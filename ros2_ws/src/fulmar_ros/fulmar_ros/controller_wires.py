@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
+from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
@@ -38,9 +39,10 @@ from fulmar_core.topics import (
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
+from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
-FLUSH = Duration(seconds=0.3)
+LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 
 
 class ControllerWires:
@@ -74,33 +76,33 @@ class ControllerWires:
             on_block: Told where the block is.
             on_estop: Told whether the e-stop is pressed.
             on_swap: Told which policy shall go on.
-            lockstep: Ask for lost odometry again: the plant waits for its answer.
+            lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag
+                behind.
         """
         wire = command_wire(robot)
+        qos = partial(publisher_qos, lockstep=lockstep)
+        self._publish = publish_patiently if lockstep else Publisher.publish
+        self._flush_s = FLUSH_S if lockstep else LAST_WORDS_S
         self._by_velocity = wire is VELOCITY_COMMAND
         kind = TwistStamped if self._by_velocity else JointState
-        self._command = node.create_publisher(kind, wire.name, publisher_qos(wire))
-        self._observation = node.create_publisher(JointState, OBSERVATION.name, publisher_qos(OBSERVATION))
-        self._action = node.create_publisher(JointState, ACTION.name, publisher_qos(ACTION))
+        self._command = node.create_publisher(kind, wire.name, qos(wire))
+        self._observation = node.create_publisher(JointState, OBSERVATION.name, qos(OBSERVATION))
+        self._action = node.create_publisher(JointState, ACTION.name, qos(ACTION))
         self._health = None
         if can_be_watched(robot):
-            self._health = node.create_publisher(
-                JointState, ACTUATORS_HEALTH.name, publisher_qos(ACTUATORS_HEALTH)
-            )
+            self._health = node.create_publisher(JointState, ACTUATORS_HEALTH.name, qos(ACTUATORS_HEALTH))
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
         diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self.health = Health(f"{robot.name}: controller", [status, diagnostics])
         self._actuators = robot.actuators
-        self._publishers = (
+        self._streams = [
             self._command,
             self._observation,
             self._action,
-            self._metadata,
-            status,
-            diagnostics,
             *([self._health] if self._health else []),
-        )
+        ]
+        self._publishers = (*self._streams, self._metadata, status, diagnostics)
         self._write_command = self._command_writer()
         self._newest: TwistStamped | JointState | None = None
         self._write_action = VectorWriter(robot.actuators.names)
@@ -135,12 +137,12 @@ class ControllerWires:
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""
         self._newest = self._write_command.write(command, stamp)
-        self._command.publish(self._newest)
+        self._publish(self._command, self._newest)
 
     def repeat_command(self) -> None:
         """Publish the newest command once more, unless there is none since `forget_command`."""
         if self._newest is not None:
-            self._command.publish(self._newest)
+            self._publish(self._command, self._newest)
 
     def forget_command(self) -> None:
         """Have nothing to repeat."""
@@ -148,7 +150,7 @@ class ControllerWires:
 
     def publish_safe(self, stamp: int) -> None:
         """Publish the safe command; with a message of its own, so that any thread may."""
-        self._command.publish(self._command_writer().write(self._actuators.safe_command, stamp))
+        self._publish(self._command, self._command_writer().write(self._actuators.safe_command, stamp))
 
     def destroy(self, node: LifecycleNode) -> None:
         """Give every endpoint back."""
@@ -158,15 +160,15 @@ class ControllerWires:
             node.destroy_publisher(publisher)
 
     def flush(self) -> None:
-        """Wait, not for ever, until every subscriber has the last commands."""
-        self._command.wait_for_all_acked(FLUSH)
+        """Wait, not for ever, until every subscriber has the last messages."""
+        flush(self._streams, self._flush_s)
 
     def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
         """Publish the very vectors behind a command, where somebody listens."""
         if self._observation.get_subscription_count():
-            self._observation.publish(self._write_observation.write(observation, stamp))
+            self._publish(self._observation, self._write_observation.write(observation, stamp))
         if self._action.get_subscription_count():
-            self._action.publish(self._write_action.write(action, stamp))
+            self._publish(self._action, self._write_action.write(action, stamp))
 
     @property
     def health_wanted(self) -> bool:
@@ -176,7 +178,7 @@ class ControllerWires:
     def publish_actuators_health(self, effectiveness: np.ndarray, stamp: int) -> None:
         """Publish what is believed of each actuator; only where that is wanted."""
         assert self._health is not None
-        self._health.publish(self._write_health.write(effectiveness, stamp))
+        self._publish(self._health, self._write_health.write(effectiveness, stamp))
 
     def publish_metadata(self, text: str) -> None:
         """Say who controls: a JSON object."""

@@ -107,7 +107,7 @@ class PlantNode(LifecycleNode):
             simulated=self._simulated,
             odometry=self.settings.publishes_odometry,
             mocap=self._motion_capture(),
-            realtime=not self.settings.lockstep,
+            lockstep=self.settings.lockstep,
         )
         self._make_loops(self._backend)
         self.health.open(self)

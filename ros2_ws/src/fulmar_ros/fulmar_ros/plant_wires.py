@@ -6,11 +6,11 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
@@ -40,10 +40,11 @@ from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWrit
 from fulmar_ros.deadline import Spread
 from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.motion_capture import MotionCapture
+from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
-FLUSH = Duration(seconds=0.3)
+LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 REMEMBERED = 256  # odometry messages whose answer may still come
 
 
@@ -59,7 +60,7 @@ class PlantWires:
         simulated: bool,
         odometry: bool = True,
         mocap: MotionCapture | None = None,
-        realtime: bool = True,
+        lockstep: bool = False,
     ) -> None:
         """Create every endpoint.
 
@@ -70,10 +71,13 @@ class PlantWires:
             simulated: Whether truth and clock are published.
             odometry: Whether the plant says where it is; if not, somebody else does.
             mocap: Publish its poses, of which an estimator makes odometry.
-            realtime: By the clock: a person may take the actuators, and commands go before other work.
+            lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
+                clock, without it, a person may take the actuators, and commands go before other work.
         """
         self._mocap = mocap
-        self._prior = not realtime  # whether the threads that commands pass have what priority they need
+        self._prior = lockstep  # whether the threads that commands pass have what priority they need
+        self._publish = publish_patiently if lockstep else Publisher.publish
+        self._flush_s = FLUSH_S if lockstep else LAST_WORDS_S
         self.lock = threading.Condition()
         self.latency_ms = Spread()
         self.answers = 0  # states that a command has answered
@@ -83,18 +87,15 @@ class PlantWires:
         self._answered: int | None = None
         self._clock_ns = 0
         self._captured_ns = 0
-        self._odometry = (
-            node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY)) if odometry else None
-        )
+        self._qos = qos = partial(publisher_qos, lockstep=lockstep)
+        self._odometry = node.create_publisher(Odometry, ODOMETRY.name, qos(ODOMETRY)) if odometry else None
         self._poses = (
-            node.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
-            if mocap is not None
-            else None
+            node.create_publisher(PoseStamped, MOCAP.name, qos(MOCAP)) if mocap is not None else None
         )
-        self._imu = node.create_publisher(Imu, IMU.name, publisher_qos(IMU))
-        self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
-        self._truth = node.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH)) if simulated else None
-        self._clock = node.create_publisher(Clock, CLOCK.name, publisher_qos(CLOCK)) if simulated else None
+        self._imu = node.create_publisher(Imu, IMU.name, qos(IMU))
+        self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, qos(ACTUATORS_STATE))
+        self._truth = node.create_publisher(Odometry, TRUTH.name, qos(TRUTH)) if simulated else None
+        self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if simulated else None
         self._write_odometry = OdometryWriter(robot.sensors.odometry)
         self._write_pose = PoseWriter()
         self._write_truth = OdometryWriter(None, frame="map")
@@ -106,16 +107,16 @@ class PlantWires:
         wire = command_wire(robot)
         # By the clock the newest command counts. A reliable reader would hold it back while one that a network lost is
         # asked for again, which takes seconds.
-        qos = subscriber_qos(wire, reliable=not realtime)
+        commands = subscriber_qos(wire, reliable=lockstep)
         self._commands = (
-            node.create_subscription(TwistStamped, wire.name, self._on_velocity, qos)
+            node.create_subscription(TwistStamped, wire.name, self._on_velocity, commands)
             if wire is VELOCITY_COMMAND
-            else node.create_subscription(JointState, wire.name, self._on_command, qos)
+            else node.create_subscription(JointState, wire.name, self._on_command, commands)
         )
         self._operator = [node.create_subscription(Bool, ESTOP.name, self._on_estop, subscriber_qos(ESTOP))]
-        if realtime:
-            qos = subscriber_qos(TELEOP, reliable=True)
-            self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, qos))
+        if not lockstep:
+            teleop = subscriber_qos(TELEOP, reliable=True)
+            self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, teleop))
         self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
 
     def destroy(self, node: LifecycleNode) -> None:
@@ -123,10 +124,12 @@ class PlantWires:
         for subscription in (self._commands, *self._operator):
             node.destroy_subscription(subscription)
         node.destroy_service(self._give_back)
+        for publisher in self._publishers():
+            node.destroy_publisher(publisher)
+
+    def _publishers(self) -> list[Publisher]:
         made = (self._odometry, self._poses, self._imu, self._state, self._truth, self._clock, self._block)
-        for publisher in made:
-            if publisher is not None:
-                node.destroy_publisher(publisher)
+        return [publisher for publisher in made if publisher is not None]
 
     def subscribers(self) -> int:
         """Matched subscriptions of the odometry, of the poses in its place, or of the actuators' state."""
@@ -150,39 +153,39 @@ class PlantWires:
         if sample.block is not None:
             self._publish_block(sample.block, time_ns)
         if self._odometry is not None and sample.odometry is not None:
-            self._odometry.publish(self._write_odometry.write(sample.odometry, time_ns))
+            self._publish(self._odometry, self._write_odometry.write(sample.odometry, time_ns))
         if resend:
             return
         if sample.imu is not None and self._imu.get_subscription_count():
-            self._imu.publish(self._write_imu.write(sample.imu, time_ns))
+            self._publish(self._imu, self._write_imu.write(sample.imu, time_ns))
         if self._mocap is not None and self._poses is not None and sample.odometry is not None:
             for stamp, state in self._mocap.see(sample.odometry, time_ns):
-                self._poses.publish(self._write_pose.write(state, stamp))
+                self._publish(self._poses, self._write_pose.write(state, stamp))
         self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
-            self._clock.publish(Clock(clock=stamp_of(time_ns)))
+            self._publish(self._clock, Clock(clock=stamp_of(time_ns)))
             self._clock_ns = now
 
     def _publish_block(self, place: np.ndarray, time_ns: int) -> None:
         """Say where the block is; most robots push none, so that the endpoint is made when one is there."""
         if self._block is None:
-            self._block = self._node.create_publisher(PoseStamped, BLOCK.name, publisher_qos(BLOCK))
+            self._block = self._node.create_publisher(PoseStamped, BLOCK.name, self._qos(BLOCK))
         message = PoseStamped()
         message.header.frame_id, message.header.stamp = "odom", stamp_of(time_ns)
         message.pose.position.x, message.pose.position.y = float(place[0]), float(place[1])
         message.pose.orientation.w = 1.0
-        self._block.publish(message)
+        self._publish(self._block, message)
 
     def publish_truth(self, sample: Sample, time_ns: int) -> None:
         """Publish where the robot really is, if the backend knows and somebody listens."""
         if self._truth is not None and sample.truth is not None and self._truth.get_subscription_count():
-            self._truth.publish(self._write_truth.write(sample.truth, time_ns))
+            self._publish(self._truth, self._write_truth.write(sample.truth, time_ns))
 
     def publish_applied(self, command: np.ndarray, time_ns: int) -> None:
         """Publish what the actuators are doing from this time on, if somebody listens."""
         if self._state.get_subscription_count():
-            self._state.publish(self._write_state.write(command, time_ns))
+            self._publish(self._state, self._write_state.write(command, time_ns))
 
     def expect_no_answers(self) -> None:
         """Time no command any more that answers what was sent so far: the plant does not listen now."""
@@ -191,7 +194,7 @@ class PlantWires:
 
     def flush(self) -> None:
         """Wait, not for ever, until every subscriber has the last states."""
-        self._state.wait_for_all_acked(FLUSH)
+        flush(self._publishers(), self._flush_s)
 
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""

@@ -10,14 +10,21 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from fulmar_core.topics import Wire
 
 STREAM_DEPTH = 50  # a recorder that the machine holds up for as many steps still gets them all
+EVERYTHING = 0  # as depth: whatever has not been taken yet; the middleware sets an end to it at 5000
 
 
-def publisher_qos(wire: Wire) -> QoSProfile:
-    """How publishers of a wire offer it."""
+def publisher_qos(wire: Wire, *, lockstep: bool = False) -> QoSProfile:
+    """How publishers of a wire offer it.
+
+    Args:
+        wire: The wire.
+        lockstep: Overwrite nothing that a reliable reader has not got; see `publish_patiently`.
+    """
+    stream = EVERYTHING if lockstep and wire.delivery == "stream" else STREAM_DEPTH
     return _profile(
         reliable=wire.delivery != "best_effort",
         latched=wire.delivery == "latched",
-        depth=wire.latest if wire.delivery == "latched" else STREAM_DEPTH,
+        depth=wire.latest if wire.delivery == "latched" else stream,
     )
 
 
@@ -30,7 +37,7 @@ def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | Non
     Args:
         wire: The wire.
         reliable: Ask for every message again that got lost; only where publishers offer it.
-        depth: Messages that may wait for the callback, >= 1.
+        depth: Messages that may wait for the callback, >= 1, or `EVERYTHING`.
 
     Returns:
         A profile that matches `publisher_qos(wire)`.
@@ -39,13 +46,13 @@ def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | Non
     return _profile(
         reliable=latched if reliable is None else reliable and wire.delivery != "best_effort",
         latched=latched,
-        depth=depth or wire.latest,
+        depth=wire.latest if depth is None else depth,
     )
 
 
 def _profile(*, reliable: bool, latched: bool, depth: int) -> QoSProfile:
     return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
+        history=HistoryPolicy.KEEP_ALL if depth == EVERYTHING else HistoryPolicy.KEEP_LAST,
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,

@@ -20,13 +20,11 @@ from fulmar_ros.bag_writer import BagWriter, check_free
 from fulmar_ros.fault_signs import fault_finder
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.provenance import attachments
-from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.qos import EVERYTHING, subscriber_qos
 from fulmar_ros.recorder_health import RecorderHealth
 from fulmar_ros.recorder_settings import RecorderSettings
 from fulmar_ros.runtime import RequestExit, run_node
 
-# Messages of one topic that may wait for a callback; a lock-stepped run is far faster than real time.
-DEPTH = 5000
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
 LONGEST_GOODBYE_S = 5.0
 
@@ -55,7 +53,7 @@ class RecorderNode(Node):
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         for wire, topic in self._topics.items():
-            qos = subscriber_qos(wire, reliable=True, depth=DEPTH)
+            qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
             self.create_subscription(classes[wire], topic, self._keep(topic), qos, raw=True)
         self._health = RecorderHealth(
             self, self._robot, self._directory, self._thread.account, lambda: self._mode

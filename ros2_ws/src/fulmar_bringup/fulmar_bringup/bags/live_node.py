@@ -47,7 +47,7 @@ from fulmar_ros.runtime import spinning
 START_TIMEOUT_S, ANSWER_TIMEOUT_S = 30.0, 10.0
 RESEND_S = 0.5
 SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
-REASONING_S = 2.0  # for observation and action, which come best effort, after the command
+REASONING_S = 2.0  # for observation and action, which come after the command
 DEPTH = 50
 
 

@@ -227,7 +227,11 @@ class _States:
         self._pose, self._turn = seen.pose, seen.twist[:, 3:]
         # The arithmetic of `message_reader.measurement_of`, for all messages at once: equal to the last bit.
         self._velocity = rotate(seen.pose[:, 3:], seen.twist[:, :3])
+        self._last: tuple[int, RigidBodyState] | None = None
 
     def __getitem__(self, index: int) -> RigidBodyState:
-        pose = self._pose[index]
-        return RigidBodyState(pose[:3], pose[3:], self._velocity[index], self._turn[index])
+        if self._last is None or self._last[0] != index:  # one step asks for its own several times
+            pose = self._pose[index]
+            state = RigidBodyState(pose[:3], pose[3:], self._velocity[index], self._turn[index])
+            self._last = index, state
+        return self._last[1]

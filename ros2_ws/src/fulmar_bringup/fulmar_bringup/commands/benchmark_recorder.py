@@ -91,10 +91,11 @@ def told(found: dict[str, Any]) -> list[str]:
 
 def _cost(figures: dict[str, Any]) -> str:
     with_it, without = figures["recorded"], figures["not_recorded"]
-    low, high = figures["p99_ratio_95"]
+    low, high = figures["p99_ratio_of_pairs_median_95"]
     return (
         f"latency p99 {with_it['p99_ms']:.3f} ms recorded, {without['p99_ms']:.3f} ms not recorded: "
-        f"ratio {figures['p99_ratio']:.3f} (95 %: {low:.3f} to {high:.3f}; at most {figures['allowed']}); "
+        f"ratio {figures['p99_ratio']:.3f}; of neighbours {figures['p99_ratio_of_pairs_median']:.3f} in the median "
+        f"(95 %: {low:.3f} to {high:.3f}; at most {figures['allowed']}); "
         f"p50 {with_it['p50_ms']:.3f} and {without['p50_ms']:.3f} ms; "
         f"{with_it['commands'] + without['commands']} commands"
     )

@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.identification.drive import Drive
-from fulmar_core.identification.model import Known, Model
+from fulmar_core.identification.model import Known, Model, Unknown
 from fulmar_core.identification.windows import Windows, cut
 
 ROUNDS = 60  # Gauss-Newton steps of one fit
@@ -152,7 +152,7 @@ class _Search:
 
         Two answers are computed: from the noise as if it were white (inverse Fisher information), and from how much the
         windows disagree (Huber's sandwich, windows as clusters), which also counts what the model does not know. The
-        larger one is taken.
+        larger one is taken. What a model is known to err by, whatever the runs say, comes on top.
         """
         residual, slopes, own_slopes = self._last
         whole, _ = self._normal(residual, slopes, own_slopes, place)
@@ -168,7 +168,13 @@ class _Search:
         for i, _, std in self._prior:
             meat[i, i] += 1.0 / std**2
         sandwich = white @ meat @ white
-        return np.sqrt(np.maximum(np.diag(white), np.diag(sandwich))), freedom
+        blur = np.array(
+            [
+                _in_search(u, float(u.from_search(at)), u.blur)
+                for u, at in zip(self.model.unknowns, place, strict=True)
+            ]
+        )
+        return np.sqrt(np.maximum(np.diag(white), np.diag(sandwich)) + blur**2), freedom
 
     def _cost(self, residual: np.ndarray, place: np.ndarray) -> float:
         size = np.abs(residual)
@@ -264,5 +270,9 @@ def _prior(model: Model, known: Known) -> tuple[int, float, float]:
     """Which unknown a known quantity is, and its value and standard deviation as the fit works with them."""
     i = _index(model, known.name)
     unknown = model.unknowns[i]
-    size = known.value if unknown.positive else unknown.scale
-    return i, unknown.to_search(known.value), known.std / size
+    return i, unknown.to_search(known.value), _in_search(unknown, known.value, known.std)
+
+
+def _in_search(unknown: Unknown, value: float, std: float) -> float:
+    """A standard deviation around a value, as the fit works with it."""
+    return std / (value if unknown.positive else unknown.scale)

@@ -26,6 +26,7 @@ class Unknown:
     unit: str
     positive: bool = True  # searched by its logarithm: it has a size, and so has its relative error
     scale: float = 1.0  # its usual size, for one that may be 0 or less
+    blur: float = 0.0  # standard deviation of what the model itself errs by, in the unknown's unit
 
     def to_search(self, value: float) -> float:
         """The number that the fit works with."""

@@ -15,6 +15,9 @@ from fulmar_core.identification.model import Unknown, Values
 from fulmar_core.identification.windows import Windows
 from fulmar_core.robot import Robot
 
+# A servo has a second, faster lag, and wheels give way a little: which of it looks like delay is open.
+SECOND_LAG_S = 0.0025
+
 
 class WheelModel:
     """Unknowns: factors on speed and turn rate, lag of the wheels' servos, delay."""
@@ -34,8 +37,8 @@ class WheelModel:
         self.unknowns: tuple[Unknown, ...] = (
             Unknown("wheel_scale", 1.0, "-"),
             Unknown("turn_scale", 1.0, "-"),
-            Unknown("lag", max(response.lag_s, SERVO_S), "s"),
-            Unknown("delay", response.delay_s, "s", positive=False),
+            Unknown("lag", max(response.lag_s, SERVO_S), "s", blur=SECOND_LAG_S),
+            Unknown("delay", response.delay_s, "s", positive=False, blur=SECOND_LAG_S),
         )
 
     def own_of(self, states: np.ndarray) -> np.ndarray:
@@ -47,8 +50,9 @@ class WheelModel:
     def predict(self, values: Values, own: np.ndarray, windows: Windows) -> np.ndarray:
         """See `Model.predict`.
 
-        The recursion of `rolling_step` without its limits of force, which a run on a floor does not reach: the servos
-        are linear then, and slopes exist everywhere.
+        The servos of `rolling_step` without its limits of force, which a run on a floor does not reach: they are linear
+        then, and slopes exist everywhere. A simulation may move a whole step with the speed of its end; that is half a
+        step too early, and would be taken for delay here.
         """
         targets = for_each_copy(
             lambda delay: followed(windows, delay, self._drive.response.slew), values["delay"]
@@ -58,9 +62,14 @@ class WheelModel:
         poses = np.empty((windows.steps + 1, 3, *own.shape[1:]))
         poses[0] = x, y, yaw
         for step in range(windows.steps):
-            speed = speed + share * (targets[step, 0] * values["wheel_scale"] - speed)
-            rate = rate + share * (targets[step, 1] * values["turn_scale"] - rate)
-            yaw = yaw + windows.dt * rate
-            x, y = x + windows.dt * speed * np.cos(yaw), y + windows.dt * speed * np.sin(yaw)
+            faster = share * (targets[step, 0] * values["wheel_scale"] - speed)
+            turning = share * (targets[step, 1] * values["turn_scale"] - rate)
+            mean_speed, mean_rate = speed + 0.5 * faster, rate + 0.5 * turning
+            midway = yaw + 0.5 * windows.dt * mean_rate
+            x, y = (
+                x + windows.dt * mean_speed * np.cos(midway),
+                y + windows.dt * mean_speed * np.sin(midway),
+            )
+            speed, rate, yaw = speed + faster, rate + turning, yaw + windows.dt * mean_rate
             poses[step + 1] = x, y, yaw
         return poses

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,12 +80,13 @@ class InputGate:
             state.velocity_in_world,
             state.angular_velocity_in_body,
         )
-        if not all(np.isfinite(part).all() for part in parts):
+        # Four numbers at a time, a float does all this in a fifth of an array's time.
+        if not all(math.isfinite(value) for part in parts for value in part.tolist()):
             return "odom holds a value that is not finite"
-        norm = float(np.linalg.norm(state.quat_xyzw))
+        norm = math.hypot(*state.quat_xyzw.tolist())
         if abs(norm - 1.0) > 0.01:
             return f"odom quaternion has norm {norm:.3f}, must be 1"
-        speed = float(np.linalg.norm(state.velocity_in_world))
+        speed = math.hypot(*state.velocity_in_world.tolist())
         if speed > self._limits.speed:
             return f"odom speed {speed:.2f} m/s is beyond the possible {self._limits.speed:g} m/s"
         yaw_rate = abs(float(state.angular_velocity_in_body[2]))
@@ -104,11 +106,13 @@ class InputGate:
         return None if ahead_ns else "odom stamp did not advance"
 
     def _frozen_problem(self, measurement: Measurement) -> str | None:
+        if not self._frozen_after:
+            return None
         if self._last is not None and _same(self._last.state, measurement.state):
             self._equal += 1
         else:
             self._equal = 0
-        if self._frozen_after and self._equal >= self._frozen_after:
+        if self._equal >= self._frozen_after:
             return f"odom has not changed for {self._equal} messages: the sensor is stuck"
         return None
 

@@ -9,18 +9,20 @@ import numpy as np
 
 from fulmar_bringup.benchmark.identification.machines import Leg, Machine
 from fulmar_bringup.benchmark.sample_bag import SampleBag
+from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.disturbances.world import World
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import stack_goals
 from fulmar_core.observation import Observer
-from fulmar_core.planar import at_rest, planar_of, stack_planar
+from fulmar_core.planar import PlanarState, at_rest, planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import load_task
 from sim_nodes.mujoco_backend import MujocoBackend
 
 TASK = "go_to_position"
+SETTLED_S = 4.0  # of no more change: dozens of time constants
 
 
 def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int, duration_s: float) -> Path:
@@ -60,6 +62,41 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
             bag.odometry(sample.odometry, (tick + 1) * dt)
     backend.close()
     return folder
+
+
+def speeds_of_wheels(machine: Machine) -> dict[str, float]:
+    """Speed over commanded speed, straight ahead and on the spot, when it changes no more.
+
+    Not quite the factors that the machine was made with: wheels creep a little where they push.
+
+    Args:
+        machine: With two driven wheels.
+
+    Returns:
+        `wheel_scale` and `turn_scale`.
+    """
+    drive = machine.robot.actuators
+    assert isinstance(drive, DifferentialDrive)
+    speeds = np.array([0.5 * drive.max_speed, 0.0]), np.array([0.0, 0.5 * drive.max_yaw_rate])
+    ahead, turning = (_settled(machine, command) for command in speeds)
+    return {
+        "wheel_scale": float(np.hypot(ahead.vx, ahead.vy) / speeds[0][0]),
+        "turn_scale": float(turning.yaw_rate / speeds[1][1]),
+    }
+
+
+def _settled(machine: Machine, command: np.ndarray) -> PlanarState:
+    """The true state some seconds after a command was first given."""
+    backend = MujocoBackend(machine.robot)
+    episode = draw_episode(machine.robot, load_task(TASK), load_scenario("nominal"), seed=0, number=0)
+    zero = np.asarray(0.0)
+    world = _world(machine, machine.legs[0], episode.world)
+    sample = backend.reset(Episode(at_rest(zero, zero, zero), episode.goal, world), seed=0)
+    for _ in range(round(SETTLED_S / machine.robot.timing.physics_dt)):
+        sample = backend.step(command)
+    backend.close()
+    assert sample.truth is not None
+    return planar_of(sample.truth)
 
 
 def _world(machine: Machine, leg: Leg, nominal: World) -> World:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.benchmark.identification.driving import drive
+from fulmar_bringup.benchmark.identification.driving import drive, speeds_of_wheels
 from fulmar_bringup.benchmark.identification.machines import draw_machine
 from fulmar_bringup.driven_run import driven_run
+from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.identification.identify import Weight, identify
 from fulmar_core.robot import load_robot
 
@@ -38,6 +39,8 @@ def run_trial(trial: Trial) -> dict[str, Any]:
     """
     nominal = load_robot(trial.robot)
     machine = draw_machine(nominal, trial.seed, trial.number)
+    if isinstance(nominal.actuators, DifferentialDrive):
+        machine.truth.update(speeds_of_wheels(machine))
     duration_s = trial.duration_s or DURATION_S[nominal.actuators.kind]
     with tempfile.TemporaryDirectory() as scratch:
         home = (trial.bags or Path(scratch)) / f"{trial.robot}_{trial.number:02d}"

@@ -3,6 +3,9 @@
 The plant runs here, as `fulmar run` has it, on its own deadlines; its controller is a process of its own. At four times
 real time its odometry comes 200 times a second and the commands that answer it 50 times. Without a recorder there is
 none: the process is started for each stretch that is recorded, and what it costs to start does not count.
+
+What counts is the median of the ratios of neighbouring stretches: on a machine that others use, one bad stretch decides
+the 99th percentile of all of them together.
 """
 
 from __future__ import annotations
@@ -35,7 +38,7 @@ from sim_nodes.sim_node import make_backend
 
 ODOMETRY_HZ, COMMAND_HZ = 200.0, 50.0
 ALLOWED = 1.05  # 99th percentile with a recorder, as a multiple of the one without
-SETTLE_S = 2.0  # after a recorder came or went
+SETTLE_S = 2.0  # after a recorder came or went, and no longer than a stretch
 RESAMPLED = 2000
 TURNS = (True, False, False, True)  # drift of the machine falls on both alike
 
@@ -72,7 +75,7 @@ def cost_of_recording(
             recorded = TURNS[number % len(TURNS)]
             bags = {out / f"cost_{number}": plan} if recorded else {}
             with recorders(bags) as started:
-                time.sleep(SETTLE_S)
+                time.sleep(min(SETTLE_S, stretch_s))
                 plant.wires.latency_ms = Spread()
                 time.sleep(stretch_s)
                 measured[recorded].append(plant.wires.latency_ms.values())
@@ -127,6 +130,7 @@ def _begin(plan: RunPlan, plant: PlantNode, overseer: Supervisor, group: Process
 def _figures(measured: dict[bool, list[np.ndarray]]) -> dict[str, Any]:
     ratio = _p99(measured[True]) / _p99(measured[False])
     low, high = _interval(measured)
+    pairs = np.array([_p99([a]) / _p99([b]) for a, b in zip(measured[True], measured[False], strict=True)])
     return {
         "odometry_hz": ODOMETRY_HZ,
         "command_hz": COMMAND_HZ,
@@ -134,8 +138,11 @@ def _figures(measured: dict[bool, list[np.ndarray]]) -> dict[str, Any]:
         "not_recorded": _spread(measured[False]),
         "p99_ratio": ratio,
         "p99_ratio_95": [low, high],
+        "p99_ratio_of_pairs": pairs.tolist(),
+        "p99_ratio_of_pairs_median": float(np.median(pairs)),
+        "p99_ratio_of_pairs_median_95": list(_interval_of_median(pairs)),
         "allowed": ALLOWED,
-        "passed": ratio <= ALLOWED,
+        "passed": bool(np.median(pairs) <= ALLOWED),
     }
 
 
@@ -164,4 +171,11 @@ def _interval(measured: dict[bool, list[np.ndarray]]) -> tuple[float, float]:
 
     ratios = [drawn(True) / drawn(False) for _ in range(RESAMPLED)]
     low, high = np.percentile(ratios, (2.5, 97.5))
+    return float(low), float(high)
+
+
+def _interval_of_median(values: np.ndarray) -> tuple[float, float]:
+    """95 % interval of a median, from the values drawn again and again."""
+    drawn = np.random.default_rng(1).choice(values, (RESAMPLED, len(values)))
+    low, high = np.percentile(np.median(drawn, axis=1), (2.5, 97.5))
     return float(low), float(high)
