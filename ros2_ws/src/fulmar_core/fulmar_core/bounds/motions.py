@@ -17,10 +17,7 @@ from fulmar_core.robot import Robot
 # Where curved edges are cut into corners: of the fastest turn, and astern of the fastest on the spot.
 _SHARES = (0.2, 0.45, 0.7, 0.87, 1.0)
 _SHARES_ASTERN = (0.4, 0.75, 0.95)
-_SHORTER_IN_WATER, _SHORTER_ON_TWO_WHEELS = (
-    0.95,
-    0.99,
-)  # `Motions.shorter`, where it was measured for stops as well
+_SHORTER_IN_WATER = 0.95  # `Motions.shorter`, where speed is lost in turns
 _NO_DRAG = 1e-6  # of 1 kg on wheels [N per (m/s)²]: so little that `Surge` needs no equations without drag
 
 
@@ -147,7 +144,7 @@ def _on_two_wheels(drive: DifferentialDrive, straight: Surge) -> Motions:
     both = [(sign * v, w) for v, w in corners for sign in (1.0, -1.0)]
     both.append((0.0, turn))
     turns = tuple(dict.fromkeys((v, w) for v, w in both if w > 0.0))
-    return Motions(top, top, turns, straight, _SHORTER_ON_TWO_WHEELS)
+    return Motions(top, top, turns, straight)
 
 
 def _on_steered_wheels(car: Ackermann, straight: Surge) -> Motions:

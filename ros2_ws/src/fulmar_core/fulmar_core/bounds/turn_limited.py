@@ -38,11 +38,10 @@ def turn_limited_bound(
     What is relaxed only makes ways quicker; that the search finds the quickest is measured, not proven. All times are
     taken shorter by what it may miss (`Motions.shorter`), so that means over episodes err towards too many goals:
 
-    - Two wheels 1 %: two finer grids find 0.2 % and 0.4 % more goals in 32 courses of a minute (5 % in the worst), and
-      optimal control (multiple shooting) finds 0.7 % fewer in 12 of them.
     - Hulls that lose time at stops 5 %: twice as fine a grid finds 3 % more in 16 courses (22 % in the worst), and the
       better of both 4 %. Several radii cost 1.5 %, against linear programming.
-    - Others 2 %.
+    - Others 2 %. On two wheels two finer grids find 0.2 % and 0.4 % more goals in 32 courses of a minute (5 % in the
+      worst), and optimal control (multiple shooting) finds 0.7 % fewer in 12 of them.
 
     The bound at top speed holds besides. What the relaxation gives away is at most what is missing to drives that
     optimal control found with all the dynamics, inertia and slew, and that the core's batch repeats: in judged episodes
