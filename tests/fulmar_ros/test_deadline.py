@@ -8,7 +8,13 @@ import time
 
 import pytest
 
-from fulmar_core.priority import CONTROL_PRIORITY, PLANT_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_core.priority import (
+    CONTROL_PRIORITY,
+    PLANT_PRIORITY,
+    give_up_priority,
+    take_priority,
+    take_priority_with_helpers,
+)
 from fulmar_ros.deadline import Deadlines, Spread
 
 
@@ -115,3 +121,17 @@ def test_threads_that_messages_pass_take_priority_too_and_the_main_one_does_not(
     helper.join()
     assert policy == (os.SCHED_FIFO if may[0] else os.SCHED_OTHER)
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
+
+
+def test_a_thread_that_gives_up_its_priority_is_an_ordinary_one():
+    found: list[int] = []
+
+    def work() -> None:
+        take_priority(CONTROL_PRIORITY)
+        give_up_priority()
+        found.append(os.sched_getscheduler(0))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found == [os.SCHED_OTHER]

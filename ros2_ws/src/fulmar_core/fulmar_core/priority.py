@@ -43,3 +43,9 @@ def take_priority_with_helpers(priority: int) -> None:
         with contextlib.suppress(OSError, AttributeError):  # it may have ended, or we may not
             if thread != os.getpid() and os.sched_getscheduler(thread) == os.SCHED_OTHER:
                 os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+
+
+def give_up_priority() -> None:
+    """Make the calling thread an ordinary one: a thread begins with the priority of whoever started it."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -20,7 +20,7 @@ from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_core.priority import CONTROL_PRIORITY, give_up_priority, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.area import outside
@@ -280,6 +280,7 @@ class ControllerNode(LifecycleNode):
             self._loader.start()
 
     def _load(self, folder: str) -> None:
+        give_up_priority()  # the one that runs goes first
         try:
             settings = dataclasses.replace(self.settings, policy=folder)
             controller = self._make_controller(self.robot, self.task, settings)

@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
 from fulmar_core.topics import (
@@ -76,7 +77,8 @@ class EstopNode(Node):
         )
         self.create_service(Trigger, ESTOP_TRIGGER, self._trigger)
         self.create_service(Trigger, ESTOP_RESET, self._reset)
-        self.create_timer(1.0 / REPUBLISH_HZ, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._prior = False
+        self.create_timer(1.0 / REPUBLISH_HZ, self._beat, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._tell()
 
     def _on_command(self, source: str, message: JointState) -> None:
@@ -101,6 +103,12 @@ class EstopNode(Node):
         response.success = not problem
         response.message = problem or "released: controllers wait for a new goal"
         return response
+
+    def _beat(self) -> None:
+        if not self._prior:  # in the executor's thread, which is not there before
+            take_priority_with_helpers(CONTROL_PRIORITY)  # its silence stops the robot
+            self._prior = True
+        self._tell()
 
     def _tell(self) -> None:
         pressed = self._button.pressed
