@@ -56,7 +56,7 @@ def heard(ros_domain: RosDomain):
 def test_a_bag_is_played_byte_for_byte_with_its_clock(heard):
     bag = open_bag(POLICY)
     plan = schedule(bag, topics=["odom"])
-    done = play(plan, bag, rate=10.0, clock=True, wait_s=1.5)
+    done = play(plan, bag, rate=10.0, clock=True, wait_s=3.0)
     assert done.messages == 100
     assert heard["odom"] == bag.of(ODOMETRY).data
     stamps = stamps_ns(bag.of(ODOMETRY))

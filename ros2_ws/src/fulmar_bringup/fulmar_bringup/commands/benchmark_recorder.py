@@ -32,10 +32,10 @@ def recorder(
     ] = 600.0,
     lockstep_hz: Annotated[
         float, typer.Option(metavar="HZ", min=0.1, help="Lock step: steps a simulated second.")
-    ] = 25.0,
+    ] = 10.0,
     lockstep_s: Annotated[
         float, typer.Option(metavar="S", min=1.0, help="Lock step: simulated seconds.")
-    ] = 600.0,
+    ] = 1500.0,
     kills: Annotated[int, typer.Option(metavar="N", min=1, help="Kills: recorders that die.")] = 50,
     out: Annotated[
         Path | None,
