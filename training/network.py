@@ -58,7 +58,6 @@ class DeployedNetwork(nn.Module):
     choice_gas: torch.Tensor
     mirror_seen: torch.Tensor
     mirror_done: torch.Tensor
-    choice_turn_first: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
         """Build an untrained network."""
@@ -73,7 +72,6 @@ class DeployedNetwork(nn.Module):
             self.register_buffer("choice_slope", torch.zeros(WRENCH, count))
             self.register_buffer("choice_offset", torch.zeros(count))
             self.register_buffer("choice_gas", torch.zeros(count))
-            self.register_buffer("choice_turn_first", torch.zeros(1))
         if plan.side is not None:
             self.register_buffer("mirror_seen", torch.eye(plan.inputs))
             self.register_buffer("mirror_done", torch.eye(plan.outputs))
@@ -142,19 +140,13 @@ class DeployedNetwork(nn.Module):
         self.choice_slope.copy_(torch.as_tensor(choice.slope))
         self.choice_offset.copy_(torch.as_tensor(choice.offset))
         self.choice_gas.copy_(torch.as_tensor(choice.gas))
-        self.choice_turn_first.copy_(torch.as_tensor(choice.turn_first))
 
     def _appraised(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
         """How much opening each valve is worth, where the last layer asks for a wrench; else what it put out."""
         if self.plan.decision != "choose":
             return raw
         choice = WrenchChoice(
-            self.choice_commands,
-            self.choice_slope,
-            self.choice_offset,
-            self.choice_gas,
-            torch.ones(WRENCH),
-            self.choice_turn_first,
+            self.choice_commands, self.choice_slope, self.choice_offset, self.choice_gas, torch.ones(WRENCH)
         )
         valves = len(self.plan.command_scale)
         dead = 1.0 - observation[:, -valves:] if self.plan.knows_dead else None

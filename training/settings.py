@@ -156,7 +156,6 @@ class TrainingSettings:
     )
     mirror: bool = False  # goals on the right are shown, and answered, as on the left
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
-    turn_first: float = 0.0  # how much more than its share a large torque asks for in that choice
 
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""

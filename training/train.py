@@ -108,7 +108,6 @@ def train(
         wrench=settings.wrench,
         gas=settings.gas,
         mirror=settings.mirror,
-        turn_first=settings.turn_first,
     )
     story = Story()
     if resume:

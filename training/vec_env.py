@@ -48,7 +48,6 @@ class BatchVecEnv(VecEnv):
         wrench: bool = False,
         gas: float = 1.0,
         mirror: bool = False,
-        turn_first: float = 0.0,
     ) -> None:
         """Build the worlds.
 
@@ -66,16 +65,15 @@ class BatchVecEnv(VecEnv):
             wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
             gas: What a valve costs in that choice, as a multiple.
             mirror: Goals on the right are shown, and answered, as on the left (`fulmar_core.symmetry`).
-            turn_first: How much more than its share a large torque asks for in that choice.
         """
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
         self._judged = robot  # with what its actuators cost now
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
+        self.choice = WrenchChoice.of(robot, gas) if wrench else None
         self.mirror = Mirror.of(robot, task) if mirror else None
         self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
-        self.choice = WrenchChoice.of(robot, gas, turn_first) if wrench else None
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)

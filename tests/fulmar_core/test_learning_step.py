@@ -61,9 +61,9 @@ def test_an_episode_ends_outside_the_geofence_and_not_before():
 
 
 def test_touching_ends_an_episode_and_costs_what_the_task_says():
-    goal = goal_at(4.0, disc=(0.0, 0.0, 0.3))
-    near, touches = judged(OBSTACLES, 0.0, goal=goal)
-    away, clear = judged(OBSTACLES, 0.0, goal=goal_at(4.0, disc=(-9.0, 0.0, 0.3)))
+    here, far = (OBSTACLES.surveyed(goal_at(4.0, disc=(x, 0.0, 0.3)), BASE) for x in (0.0, -9.0))
+    near, touches = judged(OBSTACLES, 0.0, goal=here)
+    away, clear = judged(OBSTACLES, 0.0, goal=far)
     assert (touches, clear) == (True, False)
     assert away - near == pytest.approx(OBSTACLES.collision_cost + OBSTACLES.nearness_cost)
 

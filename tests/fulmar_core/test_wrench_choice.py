@@ -78,28 +78,3 @@ def test_tensors_choose_the_same():
 def test_a_robot_without_on_off_valves_is_refused(robot):
     with pytest.raises(ValueError, match="no on/off valves"):
         WrenchChoice.of(load_robot(robot))
-
-
-def test_who_has_far_to_turn_turns_before_it_goes():
-    ready = WrenchChoice.of(ROBOT, turn_first=2.0)
-
-    def torque(choice, shares):
-        return np.mean(np.sign(shares[:, 2]) * wrench(choice.best(shares))[:, 2])
-
-    assert torque(ready, SHARES) > 1.1 * torque(CHOICE, SHARES)
-    small = 0.2 * SHARES
-    assert np.mean(np.any(ready.best(small) != CHOICE.best(small), axis=-1)) < 0.1
-
-
-@pytest.mark.parametrize("first", [0.0, 1.5])
-def test_shares_of_a_wrench_within_reach_ask_for_that_wrench(first):
-    choice = WrenchChoice.of(ROBOT, turn_first=first)
-    wanted = RNG.uniform(-0.5, 0.5, (20, 3)) * choice.unit
-    shares = choice.shares_of(wanted.copy())
-    shares[:, 2] *= 1.0 + first * shares[:, 2] ** 2
-    np.testing.assert_allclose(REACH * shares * choice.unit, wanted, atol=1e-9)
-
-
-def test_the_array_libraries_choose_alike_when_turning_comes_first():
-    choice = WrenchChoice.of(ROBOT, turn_first=1.5)
-    np.testing.assert_array_equal(choice.best(SHARES), choice.best(torch.from_numpy(SHARES)).numpy())

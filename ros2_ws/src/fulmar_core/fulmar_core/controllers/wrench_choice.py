@@ -35,9 +35,6 @@ class WrenchChoice:
     In units of the strongest force, and of the strongest torque divided by the root of `TORQUE_WEIGHT`, combination k
     brings up w_k with gas g_k = VALVE_COST n_k. Where w is wanted, it costs |w_k - w|² + g_k (1 + HASTE_COST |w|²),
     told less |w|², which does not depend on k.
-
-    A torque share t asks for t (1 + `turn_first` t²): who has far to turn turns before it goes, and who corrects is as
-    exact as ever.
     """
 
     commands: Array  # open (1) or closed (0), shape (k, n)
@@ -45,16 +42,14 @@ class WrenchChoice:
     offset: Array  # cost where nothing is wanted, shape (k,)
     gas: Array  # shape (k,)
     unit: Array  # shape (3,) [N, N, N·m]
-    turn_first: Array  # shape (1,) [-]
 
     @classmethod
-    def of(cls, robot: Robot, gas: float = 1.0, turn_first: float = 0.0) -> WrenchChoice:
+    def of(cls, robot: Robot, gas: float = 1.0) -> WrenchChoice:
         """The table of a robot.
 
         Args:
             robot: The robot.
             gas: Multiple of `VALVE_COST` that a valve costs: less is more exact, and uses more.
-            turn_first: How much more a large torque share asks for; 0 or more.
 
         Raises:
             ValueError: It has no on/off valves.
@@ -69,7 +64,7 @@ class WrenchChoice:
         commands, wrench, offset = table.every
         order = ORDER_COST * np.arange(len(commands))
         slope = 2.0 * REACH * (wrench / unit).T
-        parts = commands, slope, offset + order, cost * commands.sum(axis=-1), unit, [turn_first]
+        parts = commands, slope, offset + order, cost * commands.sum(axis=-1), unit
         return cls(*(np.asarray(part, dtype=np.float32) for part in parts))
 
     def costs(self, shares: Array, dead: Array | None = None) -> Array:
@@ -84,20 +79,13 @@ class WrenchChoice:
         """
         xp = array_namespace(shares)
         commands = xp.asarray(self.commands)
-        torque = shares[..., 2:]
-        asked = xp.concat(
-            (shares[..., :2], torque * (1.0 + xp.asarray(self.turn_first) * torque * torque)), axis=-1
-        )
         haste = HASTE_COST * REACH**2 * xp.sum(shares * shares, axis=-1, keepdims=True)
-        cost = xp.asarray(self.offset) + haste * xp.asarray(self.gas) - asked @ xp.asarray(self.slope)
+        cost = xp.asarray(self.offset) + haste * xp.asarray(self.gas) - shares @ xp.asarray(self.slope)
         return cost if dead is None else cost + DEAD_COST * (dead @ commands.T)
 
     def shares_of(self, wrench: np.ndarray) -> np.ndarray:
         """Shares that ask for a wrench, shape (rows, 3) [N, N, N·m]; one that is out of reach keeps its direction."""
         shares = wrench / (REACH * self.unit)
-        root = math.sqrt(3.0 * float(self.turn_first[0]))
-        if root:  # t + turn_first t³ = share has one real solution
-            shares[..., 2] = 2.0 / root * np.sinh(np.arcsinh(1.5 * root * shares[..., 2]) / 3.0)
         return np.asarray(shares / np.maximum(1.0, np.linalg.norm(shares, axis=-1, keepdims=True)))
 
     def best(self, shares: Array, dead: Array | None = None) -> Array:
