@@ -239,7 +239,7 @@ class _Messages:
                 pose=self._pose(np.array([x, y, 0.0]), np.array([0.0, 0.0, 0.0, 1.0])),
                 scale=self._vector("Vector3", np.array([2.0 * radius, 2.0 * radius, 0.5])),
             )
-            for x, y, radius in discs
+            for x, y, radius, *_ in discs
             if radius > 0.0
         ]
         message = self._new("visualization_msgs/msg/MarkerArray", markers=markers)

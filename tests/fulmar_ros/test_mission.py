@@ -13,7 +13,8 @@ from fulmar_core.goal import goal_at
 from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from fulmar_ros.goal_messages import obstacles_message, obstacles_of
+from fulmar_ros.goal_messages import obstacles_message
+from fulmar_ros.message_reader import obstacles_of
 from fulmar_ros.mission import Mission
 from tests.states import planar_state
 

@@ -10,7 +10,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.planar import COLUMNS
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import load_task, sees_obstacles
 
 torch = pytest.importorskip("torch")
 
@@ -49,7 +49,12 @@ def assert_alike(robot, task, dtype, device):
     ours = trajectory(robot, task, np, dtype)
     theirs = trajectory(robot, task, torch, dtype, device)
     assert np.isfinite(ours).all()
-    np.testing.assert_allclose(theirs, ours, rtol=0, atol=CLOSE[dtype])
+    close = CLOSE[dtype]
+    if sees_obstacles(
+        task
+    ):  # beside a disc its tangent turns with the root of the distance, and so does rounding
+        close = max(close, float(np.sqrt(np.finfo(dtype).eps)))
+    np.testing.assert_allclose(theirs, ours, rtol=0, atol=close)
 
 
 @pytest.mark.parametrize("dtype", CLOSE)

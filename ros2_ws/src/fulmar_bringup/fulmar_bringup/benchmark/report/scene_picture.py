@@ -23,7 +23,7 @@ def draw_scenes_with_obstacles(runs: Sequence[View]) -> Figure:
         for one, episode in zip(axes[:, column], _two_episodes(run), strict=True):
             outcome = run.main
             well = bool(outcome.succeeded[episode])
-            for x, y, radius in outcome.obstacles[episode]:
+            for x, y, radius, *_ in outcome.obstacles[episode]:
                 if radius > 0.0:
                     one.add_patch(Circle((x, y), radius, facecolor=FAINT, edgecolor=INK, linewidth=0.6))
             _way(one, run, episode, run.colour if well else ALARM)
