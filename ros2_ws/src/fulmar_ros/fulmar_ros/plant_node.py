@@ -173,6 +173,8 @@ class PlantNode(LifecycleNode):
         """
         assert self._backend is not None
         sample = self._backend.reset(episode, seed=seed, number=number)
+        with self.wires.lock:
+            self.guard.reset()  # actuators begin at rest, not where the episode before left them
         self._lockstep.run(sample, steps, self._stop, on_step)
 
     def _motion_capture(self) -> MotionCapture | None:
