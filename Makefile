@@ -96,17 +96,25 @@ policies: dev ## Make the shipped policies that are missing or out of date (unde
 replay-bags: dev ## Record the reference bags of the tests anew, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
 
-# What talks over ROS keeps time, so it runs alone; the rest runs on two cores. 5: nothing of this part was asked for.
+# Two parts on two cores: what computes, then what talks over ROS and mostly waits. 5: nothing of a part was asked for.
+define run_tests
+code=5; \
+for part in "tests --ignore=tests/ros --dist loadfile" "tests/ros $(1)"; do \
+	last=0; $(BIN)/python -m pytest -n 2 $$part $(PYTEST_ARGS) || last=$$?; \
+	if [ $$last != 5 ] && { [ $$code = 5 ] || [ $$code = 0 ]; }; then code=$$last; fi; \
+done; \
+if [ $$code = 0 ]; then echo; echo "All tests passed."; \
+else echo; echo "Some tests failed, or none was found. Once more, only those that failed: make test PYTEST_ARGS=--last-failed" >&2; \
+	exit $$code; fi
+endef
+
 .PHONY: test
-test: dev ## Run every test
-	@code=5; \
-	for part in "tests --ignore=tests/ros -n 2 --dist loadfile" "tests/ros"; do \
-		last=0; $(BIN)/python -m pytest $$part $(PYTEST_ARGS) || last=$$?; \
-		if [ $$last != 5 ] && { [ $$code = 5 ] || [ $$code = 0 ]; }; then code=$$last; fi; \
-	done; \
-	if [ $$code = 0 ]; then echo; echo "All tests passed."; \
-	else echo; echo "Some tests failed, or none was found. Once more, only those that failed: make test PYTEST_ARGS=--last-failed" >&2; \
-		exit $$code; fi
+test: dev ## Run the tests, but for closed loops over ROS that take long
+	@$(call run_tests,-m not(slow))
+
+.PHONY: test-all
+test-all: dev ## Run every test
+	@$(call run_tests,)
 
 .PHONY: check
 check: dev ## Check format, lint, types, import contracts and spelling
