@@ -16,6 +16,7 @@ TARGETS = {
     "demo",
     "train-demo",
     "test",
+    "test-all",
     "check",
     "format",
     "policies",
