@@ -25,6 +25,7 @@ def test_a_cell_tells_latency_errors_of_the_period_and_what_each_node_uses() -> 
     assert figures["required"] == []
 
 
+@pytest.mark.slow
 def test_a_long_run_tells_growth_of_memory_and_commands_that_the_bag_lacks(tmp_path: Path) -> None:
     figures = endure(simulated_s=10.0, rate=4.0, folder=tmp_path / "long", progress=lambda _done: None)
     assert figures["commands_lost"] == 0

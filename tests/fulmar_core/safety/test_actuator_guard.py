@@ -209,6 +209,19 @@ class TestHand:
         assert guard.offer(NAMES, GOOD, 4)
         assert guard.output(5).tolist() == GOOD
 
+    def test_the_last_word_of_a_hand_that_comes_late_takes_nothing_back(self, guard):
+        guard.offer_by_hand(NAMES, [0.0] * 8, 0)
+        guard.give_back(1)
+        assert not guard.offer_by_hand(NAMES, [0.0] * 8, 100 * MS)
+        assert not guard.person
+        assert guard.offer_by_hand(NAMES, GOOD, 110 * MS)  # one that moves the robot does, at once
+        assert guard.person
+
+    def test_a_hand_at_rest_takes_the_robot_once_the_last_words_are_over(self, guard):
+        guard.offer_by_hand(NAMES, [0.0] * 8, 0)
+        guard.give_back(1)
+        assert guard.offer_by_hand(NAMES, [0.0] * 8, 300 * MS)
+
     def test_a_senseless_hand_takes_nothing(self, guard):
         assert not guard.offer_by_hand(NAMES, [float("nan")] * 8, 0)
         assert not guard.person

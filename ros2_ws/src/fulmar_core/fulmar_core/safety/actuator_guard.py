@@ -12,6 +12,11 @@ from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 
 
+LAST_WORDS_NS = (
+    200_000_000  # so long after a person gave back, safe commands by hand may still have been under way
+)
+
+
 class ActuatorGuard:
     """Holds the newest acceptable command for as long as the watchdog and the e-stop let it.
 
@@ -46,6 +51,7 @@ class ActuatorGuard:
         self._control_dt = control_dt
         self.rejected = 0
         self.last_rejection = ""
+        self._given_back_ns: int | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -89,6 +95,8 @@ class ActuatorGuard:
         if not self._check(names, values, None):
             return False
         if not self.person:
+            if self._is_last_word(values, now_ns):
+                return False
             self.person = True
             self.command = self._actuators.safe_command  # what the controller wanted is over
         self._take(values, now_ns, None)
@@ -108,6 +116,7 @@ class ActuatorGuard:
         if np.any(self.output(now_ns) != self._actuators.safe_command):
             return "refused: the last command by hand still moves the robot. Let go first."
         self.reset()
+        self._given_back_ns = now_ns
         return ""
 
     def output(self, now_ns: int) -> np.ndarray:
@@ -145,6 +154,12 @@ class ActuatorGuard:
         elif self._stopped_ns is None:
             self._stopped_ns = now_ns
         return self._stopped_ns
+
+    def _is_last_word(self, values: Sequence[float], now_ns: int) -> bool:
+        """Whether a person who has just given back would take the actuators with a safe command that came late."""
+        if self._given_back_ns is None or now_ns - self._given_back_ns > LAST_WORDS_NS:
+            return False
+        return bool(np.all(np.asarray(values, dtype=float) == self._actuators.safe_command))
 
     def _check(self, names: Sequence[str], values: Sequence[float], problem: str | None) -> bool:
         count = len(self._actuators.names)
