@@ -11,7 +11,6 @@ from fulmar_core.safety.command_gate import command_problem, name_problem
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 
-
 LAST_WORDS_NS = (
     200_000_000  # so long after a person gave back, safe commands by hand may still have been under way
 )
