@@ -96,11 +96,11 @@ policies: dev ## Make the shipped policies that are missing or out of date (unde
 replay-bags: dev ## Record the reference bags of the tests anew, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
 
-# Two parts on two cores: what computes, then what talks over ROS and mostly waits. 5: nothing of a part was asked for.
+# What computes runs on two cores; what talks over ROS keeps time and runs alone. 5: nothing of a part was asked for.
 define run_tests
 code=5; \
-for part in "tests --ignore=tests/ros --dist loadfile" "tests/ros $(1)"; do \
-	last=0; $(BIN)/python -m pytest -n 2 $$part $(PYTEST_ARGS) || last=$$?; \
+for part in "tests --ignore=tests/ros -n 2 --dist loadfile" "tests/ros $(1)"; do \
+	last=0; $(BIN)/python -m pytest $$part $(PYTEST_ARGS) || last=$$?; \
 	if [ $$last != 5 ] && { [ $$code = 5 ] || [ $$code = 0 ]; }; then code=$$last; fi; \
 done; \
 if [ $$code = 0 ]; then echo; echo "All tests passed."; \

@@ -53,6 +53,7 @@ def heard(ros_domain: RosDomain):
     rclpy.try_shutdown(context=context)
 
 
+@pytest.mark.slow
 def test_a_bag_is_played_byte_for_byte_with_its_clock(heard):
     bag = open_bag(POLICY)
     plan = schedule(bag, topics=["odom"])

@@ -106,6 +106,7 @@ def test_senseless_messages_are_refused_and_told(
     assert all(np.isfinite(m.twist.twist.linear.x) for m in sources.odometry)
 
 
+@pytest.mark.slow
 def test_a_platform_reaches_its_pose_by_estimated_odometry_alone(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -10,6 +10,7 @@ from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
 
+@pytest.mark.slow
 def test_an_excited_run_succeeds_without_a_goal_and_its_bag_tells_thrust_and_inertia(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -25,6 +26,7 @@ def test_an_excited_run_succeeds_without_a_goal_and_its_bag_tells_thrust_and_ine
     assert estimates["yaw_inertia"]["value"] == pytest.approx(0.2045, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_calibrated_run_says_so_in_its_bag_and_needs_a_file_for_its_own_robot(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -299,6 +299,7 @@ def test_no_node_outlives_its_launcher(ros_domain: RosDomain, tmp_path: Path) ->
     assert not read_run(tmp_path / "bag").warnings
 
 
+@pytest.mark.slow
 def test_a_ring_writes_the_run_of_a_controller_that_died(ros_domain: RosDomain, tmp_path: Path) -> None:
     """The watchdog trips; the goal, the way until then and the closed valves are in the bag."""
     asked = ("run", "floating_platform", "--controller", "lqr", *FAR, "--recording", "ring")
