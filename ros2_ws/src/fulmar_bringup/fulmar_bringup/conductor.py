@@ -42,6 +42,7 @@ from hardware_drivers.settings import load_hardware
 
 # A ring that no fault has written tells nothing of the goal.
 _UNJUDGED: dict[str, Any] = {"success": None, "bag": None, "failure": None}
+CONTROLLER_AND_RECORDER = 2  # who has to know the goal before anything moves
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
@@ -170,6 +171,8 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
         else:
             now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
             overseer.give_goal(request.mission, time_ns=now_ns, alive=starting)
+            # The recorder may find the operator later than the controller does; a short run would be over by then.
+            overseer.wait_until(lambda: overseer.listeners() >= CONTROLLER_AND_RECORDER, starting)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)

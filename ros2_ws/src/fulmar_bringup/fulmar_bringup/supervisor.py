@@ -102,6 +102,11 @@ class Supervisor:
             self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
             self.wait_until(lambda echo=echo: self.controller.values.get("goal_stamp_ns") == echo, alive)
 
+    def listeners(self) -> int:
+        """How many nodes have found what this operator tells: goals, and obstacles where the task has any."""
+        told = (self._goal, self._obstacles)
+        return min(int(wire.get_subscription_count()) for wire in told if wire is not None)
+
     def give_obstacles(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
         """The obstacles alone, if the task has any; arguments as of `give_goal`."""
         if self._obstacles is None:
