@@ -241,6 +241,15 @@ def base():
 class TestSlew:
     """Commands that actuators cannot follow are brought nearer to the one before."""
 
+    @pytest.mark.parametrize(("lockstep", "goes_on"), [(True, True), (False, False)])
+    def test_only_in_lock_step_a_late_answer_goes_on_from_the_command_before(self, lockstep, goes_on):
+        guard = ActuatorGuard(BASE, Watchdog(400 * MS), control_dt=0.1, lockstep=lockstep)
+        for k in range(1, 10):
+            guard.offer(BASE.names, [0.05 * k, 0.0], k * MS, stamp_ns=k)
+        before = guard.command[0]
+        guard.offer(BASE.names, [before, 0.0], 5_000 * MS, stamp_ns=10)
+        assert bool(guard.command[0] == before) is goes_on
+
     def test_a_step_is_cut_to_what_one_control_period_allows(self, base):
         base.offer(BASE.names, [0.45, 0.0], 0, stamp_ns=100 * MS)
         assert base.output(1)[0] == pytest.approx(0.09)

@@ -84,6 +84,7 @@ class PlantNode(LifecycleNode):
             Watchdog(round(timeout_s * 1e9)),
             estop=EstopWatch(required=self.settings.estop),
             control_dt=1.0 / self.settings.control_rate(self.robot),
+            lockstep=self.settings.lockstep,
         )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:

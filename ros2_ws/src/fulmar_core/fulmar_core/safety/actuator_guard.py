@@ -36,6 +36,7 @@ class ActuatorGuard:
         *,
         estop: EstopWatch | None = None,
         control_dt: float = 0.0,
+        lockstep: bool = False,
     ) -> None:
         """Begin with the safe command.
 
@@ -44,10 +45,11 @@ class ActuatorGuard:
             watchdog: Ends a command that nobody repeats.
             estop: Ends any command; none by default.
             control_dt: Time between commands: what they may differ by follows from it; 0 for no such limit [s].
+            lockstep: Time stands still between commands, so nothing slows down while one is waited for.
         """
         self._actuators, self.watchdog = actuators, watchdog
         self.estop = estop or EstopWatch(required=False)
-        self._control_dt = control_dt
+        self._control_dt, self._lockstep = control_dt, lockstep
         self.rejected = 0
         self.last_rejection = ""
         self._given_back_ns: int | None = None
@@ -178,7 +180,7 @@ class ActuatorGuard:
             if not isinstance(self._actuators, Rolling) or not np.any(self.output(now_ns)):
                 self.command = self._actuators.safe_command  # nothing is left to slow down from
         else:
-            if self.watchdog.expired(now_ns):
+            if self.watchdog.expired(now_ns) and not self._lockstep:
                 self.command = self.output(now_ns)  # where wheels have slowed down to
             self.command = self._slewed(np.asarray(values, dtype=float), now_ns, seconds)
         self._taken_ns = now_ns
