@@ -32,7 +32,8 @@ from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import time_bar
 from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
-from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor, supervisor
+from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
+from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
@@ -42,7 +43,6 @@ from hardware_drivers.settings import load_hardware
 
 # A ring that no fault has written tells nothing of the goal.
 _UNJUDGED: dict[str, Any] = {"success": None, "bag": None, "failure": None}
-CONTROLLER_AND_RECORDER = 2  # who has to know the goal before anything moves
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
@@ -154,25 +154,15 @@ def _with_ends(failure: str, ends: list[Ended]) -> str:
 
 def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
     """Start the run and wait for its end; returns why it failed, or an empty text."""
-    began = time.monotonic()
-
-    def starting() -> None:
-        _raise_if_ended(group)
-        if time.monotonic() - began > START_TIMEOUT_S:
-            said = overseer.controller.message or "nothing"
-            raise RunFailed(
-                f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the controller said: {said}). "
-                "Is another system running in this ROS domain? Try `fulmar doctor`."
-            )
-
+    starting = while_starting(group, overseer)
     try:
         if plan.goals:
             overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
         else:
             now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
-            overseer.give_goal(request.mission, time_ns=now_ns, alive=starting)
-            # The recorder may find the operator later than the controller does; a short run would be over by then.
-            overseer.wait_until(lambda: overseer.listeners() >= CONTROLLER_AND_RECORDER, starting)
+            overseer.give_goal(
+                request.mission, time_ns=now_ns, alive=starting, listeners=CONTROLLER_AND_RECORDER
+            )
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved)
@@ -190,7 +180,7 @@ def _wait_for_end(
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
 
     def running() -> None:
-        _raise_if_ended(group)
+        raise_if_ended(group)
         moved(_passed_s(plan, overseer.plant))
         if overseer.plant.level == "error":
             raise RunFailed(f"plant: {overseer.plant.message}")
@@ -226,12 +216,6 @@ def _raise_if_silent(name: str, report: Report, limit_s: float) -> None:
     silent_s = time.monotonic() - report.heard
     if report.heard and silent_s > limit_s:
         raise RunFailed(f"{name}: has not reported for {silent_s:.1f} s; it hangs")
-
-
-def _raise_if_ended(group: ProcessGroup) -> None:
-    end = group.ended()
-    if end is not None:
-        raise RunFailed(f"{end.text} before the run was over")
 
 
 def _with_plant_reaction(reason: str, overseer: Supervisor) -> str:

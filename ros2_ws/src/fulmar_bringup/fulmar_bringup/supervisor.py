@@ -85,8 +85,10 @@ class Supervisor:
                 part.heard = time.monotonic()
                 self._changed.notify_all()
 
-    def give_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
+    def give_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None], listeners: int = 1) -> None:
         """Publish a goal, with the obstacles if the task has any, and wait until the controller has them.
+
+        A recorder may find this operator later than the controller does, and a short run would be over by then.
 
         Velocities that follow one another are all sent now, stamped with the time when each begins: what a controller
         tracks then hangs on the plant's clock alone.
@@ -95,17 +97,15 @@ class Supervisor:
             goal: The goal, without a batch axis.
             time_ns: Its stamp, by which the controller names it; for velocities also when the first begins [ns].
             alive: Called while waiting; raises to give up.
+            listeners: How many nodes have to have found this operator, the controller among them.
         """
         self.give_obstacles(goal, time_ns=time_ns, alive=alive)
         for part, stamp in self._timed(goal, time_ns):
             echo = str(stamp)
             self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
             self.wait_until(lambda echo=echo: self.controller.values.get("goal_stamp_ns") == echo, alive)
-
-    def listeners(self) -> int:
-        """How many nodes have found what this operator tells: goals, and obstacles where the task has any."""
-        told = (self._goal, self._obstacles)
-        return min(int(wire.get_subscription_count()) for wire in told if wire is not None)
+        told = [wire for wire in (self._goal, self._obstacles) if wire is not None]
+        self.wait_until(lambda: all(wire.get_subscription_count() >= listeners for wire in told), alive)
 
     def give_obstacles(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
         """The obstacles alone, if the task has any; arguments as of `give_goal`."""

@@ -20,7 +20,7 @@ from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
-from fulmar_core.priority import CONTROL_PRIORITY, give_up_priority, take_priority, take_priority_with_helpers
+from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.area import outside
@@ -38,6 +38,7 @@ from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, sta
 from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.phase import ArrivalPhase
+from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
 from fulmar_ros.standby import Standby, ready
 
@@ -48,7 +49,6 @@ FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the 
 PATIENCE = 0.25  # of a period, for a measurement that is late
 COPY_AFTER = 0.2  # of a period; the copies of a command are over before the next one
 PATIENCE_AT_FIRST = 0.9  # the same while nobody knows yet when measurements come
-LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 SAFE_REPEATS = 5
 STATUS_PERIOD_S = 0.4  # at least 2 Hz
 
@@ -79,7 +79,7 @@ class ControllerNode(LifecycleNode):
         self.settings = read_parameters(self, ControllerSettings)
         self.robot = load_robot(self.settings.robot)
         self.task = load_task(self.settings.task)
-        self._make_controller, self._request_exit, self._learned = make_controller, request_exit, learned
+        self._make_controller, self._request_exit = make_controller, request_exit
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._arrived = threading.Event()  # a measurement, since a beat waits for one
@@ -94,8 +94,11 @@ class ControllerNode(LifecycleNode):
         self._estop = EstopWatch(required=self.settings.estop)
         noisy = self.robot.sensors.odometry.position.std > 0.0 and not self.settings.lockstep
         self._input_gate = InputGate(self.robot.limits, frozen_after=FROZEN_AFTER if noisy else 0)
-        self._swap = ""  # what came of the last request for another policy
-        self._loader: threading.Thread | None = None
+        self._swap = PolicySwap(
+            self._load if learned else None,
+            propose=lambda candidate: self._succession.propose(candidate),
+            warn=self.get_logger().warning,
+        )
         self._acted = 0  # control steps
         self._newest: Measurement | None = None
         self.mission = Mission(self.robot, self.task, streamed=self.settings.goals_streamed)
@@ -266,42 +269,24 @@ class ControllerNode(LifecycleNode):
         self._tell_status(self._decide())
 
     def _on_swap(self, message: String) -> None:
-        """Load another policy beside the one that runs; the one that runs is not disturbed."""
-        folder = message.data
-        if not self._learned:
-            self._refuse_swap(folder, "this controller runs no policy")
-        elif not folder or len(folder) > LONGEST_PATH:
-            self._refuse_swap(folder, f"a folder has 1 to {LONGEST_PATH} characters, found {len(folder)}")
-        elif self._loader is not None and self._loader.is_alive():
-            self._refuse_swap(folder, "another policy is being loaded")
-        else:
-            self._swap = f"loading {folder}"
-            self._loader = threading.Thread(target=self._load, args=(folder,), name="loader", daemon=True)
-            self._loader.start()
+        self._swap.ask(message.data)
 
-    def _load(self, folder: str) -> None:
-        give_up_priority()  # the one that runs goes first
-        try:
-            settings = dataclasses.replace(self.settings, policy=folder)
-            controller = self._make_controller(self.robot, self.task, settings)
-            if controller.observation_names != self.controller.observation_names:
-                raise ConfigError("it sees something else than the controller that runs")
-            candidate = ready(controller, self.robot)
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with it, the one that runs goes on
-            known = isinstance(error, FulmarError)
-            self._refuse_swap(folder, str(error) if known else f"{type(error).__name__}: {error}")
-            return
-        self._swap = f"ready {folder}"
-        self._succession.propose(candidate)
+    def _load(self, folder: str) -> Standby:
+        """Another policy, ready to take over.
 
-    def _refuse_swap(self, folder: str, reason: str) -> None:
-        self._swap = f"refused {folder[:LONGEST_PATH]}: {reason}"
-        self.get_logger().warning(f"policy not changed: {reason}")
+        Raises:
+            FulmarError: It cannot take the place of the one that runs.
+        """
+        settings = dataclasses.replace(self.settings, policy=folder)
+        controller = self._make_controller(self.robot, self.task, settings)
+        if controller.observation_names != self.controller.observation_names:
+            raise ConfigError("it sees something else than the controller that runs")
+        return ready(controller, self.robot)
 
     def _take_turns(self) -> None:
         """Between two control steps: let a new policy take over, and say so."""
         if self._succession.turn():
-            self._swap = self._swap.replace("ready", "done", 1)
+            self._swap.took_over()
             self._announce()
 
     def _announce(self) -> None:
@@ -518,7 +503,7 @@ class ControllerNode(LifecycleNode):
             self._succession.rejections,
             self._succession.current.sha256,
             self._succession.fell_back,
-            self._swap,
+            self._swap.said,
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < STATUS_PERIOD_S:
@@ -534,7 +519,7 @@ class ControllerNode(LifecycleNode):
             "sha256": self._succession.current.sha256,
             "controller": self.controller.name,
             "fell_back": fell_back,
-            "swap": self._swap,
+            "swap": self._swap.said,
             "epoch": str(self._input_gate.epoch),
             "goal_stamp_ns": str(self.mission.goal_stamp_ns),
             "obstacles_stamp_ns": str(self.mission.obstacles_stamp_ns),

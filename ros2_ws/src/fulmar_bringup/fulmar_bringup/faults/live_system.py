@@ -24,7 +24,8 @@ from fulmar_bringup.node_table import (
 )
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
-from fulmar_bringup.supervisor import START_TIMEOUT_S, supervisor
+from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.supervisor import supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.watchdog import default_timeout
@@ -110,16 +111,13 @@ def live_system(request: RunRequest, hosts: TwoHosts | None = None) -> Iterator[
             try:
                 for spec in _specs(plan, request.record):
                     group.start(spec)
-                began_s = time.monotonic()
-
-                def alive() -> None:
-                    end = group.ended()
-                    if end is not None:
-                        raise RunFailed(f"{end.text} before anything was done to it")
-                    if time.monotonic() - began_s > START_TIMEOUT_S:
-                        raise RunFailed(f"the nodes did not get ready within {START_TIMEOUT_S:g} s")
-
-                overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=alive)
+                alive = while_starting(group, overseer)
+                overseer.give_goal(
+                    request.mission,
+                    time_ns=SIMULATION_START_NS,
+                    alive=alive,
+                    listeners=CONTROLLER_AND_RECORDER,
+                )
                 overseer.start_plant(alive, lambda: group.last_words("plant"))
                 yield live
             finally:

@@ -15,7 +15,8 @@ from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_bringup.processes import ProcessGroup
-from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
+from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
 from fulmar_core.robot import load_robot
@@ -132,16 +133,10 @@ def watched_system(request: RunRequest, environment: Mapping[str, str]) -> Itera
 
 
 def _begin(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
-    began_s = time.monotonic()
-
-    def alive() -> None:
-        end = group.ended()
-        if end is not None:
-            raise RunFailed(f"{end.text}: {group.last_words(end.name)}")
-        if time.monotonic() - began_s > START_TIMEOUT_S:
-            raise RunFailed(f"the nodes did not get ready within {START_TIMEOUT_S:g} s.")
-
-    overseer.give_goal(request.mission, time_ns=SIMULATION_START_NS, alive=alive)
+    alive = while_starting(group, overseer)
+    overseer.give_goal(
+        request.mission, time_ns=SIMULATION_START_NS, alive=alive, listeners=CONTROLLER_AND_RECORDER
+    )
     overseer.start_plant(alive, lambda: group.last_words("plant"))
     overseer.wait_until(lambda: overseer.controller.values.get("mode") == "active", alive)
     assert load_robot(plan.robot).timing.physics_dt == 1.0 / STEP_HZ

@@ -24,7 +24,8 @@ from fulmar_bringup.benchmark.recorder.recorders import recorders
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
-from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
+from fulmar_bringup.starting import while_starting
+from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import RunFailed
@@ -108,15 +109,7 @@ def _running(plan: RunPlan) -> Iterator[PlantNode]:
 
 def _begin(plan: RunPlan, plant: PlantNode, overseer: Supervisor, group: ProcessGroup) -> None:
     """Give a goal, then start the plant."""
-    until = time.monotonic() + START_TIMEOUT_S
-
-    def alive() -> None:
-        end = group.ended()
-        if end is not None:
-            raise RunFailed(f"{end.text}: {group.last_words('controller')}")
-        if time.monotonic() > until:
-            raise RunFailed(f"the nodes did not get ready within {START_TIMEOUT_S:g} s.")
-
+    alive = while_starting(group, overseer)
     episode = draw_episode(
         load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario), seed=plan.seed, number=0
     )

@@ -1,0 +1,39 @@
+"""Processes that get ready: who waits for them learns when one has ended, or when it takes too long."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor
+from fulmar_core.errors import RunFailed
+
+CONTROLLER_AND_RECORDER = 2  # who has to know the goal before anything moves
+
+
+def raise_if_ended(group: ProcessGroup) -> None:
+    """Give up where a process has ended.
+
+    Raises:
+        RunFailed: With its name and how it ended.
+    """
+    end = group.ended()
+    if end is not None:
+        raise RunFailed(f"{end.text} before the run was over")
+
+
+def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], None]:
+    """What to call while nodes get ready, from now on; it raises `RunFailed` where waiting has no sense any more."""
+    began_s = time.monotonic()
+
+    def alive() -> None:
+        raise_if_ended(group)
+        if time.monotonic() - began_s > START_TIMEOUT_S:
+            said = overseer.controller.message or "nothing"
+            raise RunFailed(
+                f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the controller said: {said}). "
+                "Is another system running in this ROS domain? Try `fulmar doctor`."
+            )
+
+    return alive
