@@ -58,6 +58,7 @@ def test_a_valve_that_stays_closed_is_in_the_bag_of_its_run(ros_domain: RosDomai
     assert np.all(last[~dead] > 0.5)
 
 
+@pytest.mark.real_time
 def test_where_nobody_listens_nothing_is_reckoned(stream: Stream, controller: ControllerNode) -> None:
     """And from the first listener on, it is."""
     assert not controller.wires.health_wanted

@@ -22,6 +22,8 @@ from fulmar_ros.qos import subscriber_qos
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
+pytestmark = pytest.mark.real_time
+
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"
 POLICY, LQR = BAGS / "floating_platform_go_to_pose_policy", BAGS / "floating_platform_go_to_pose_lqr"
 

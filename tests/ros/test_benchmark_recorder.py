@@ -10,6 +10,8 @@ from fulmar_ros.bag_records import bag_files
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.mark.slow
 def test_killed_recorders_leave_bags_that_two_readers_open(ros_domain: RosDomain, tmp_path: Path) -> None:

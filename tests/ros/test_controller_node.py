@@ -36,6 +36,8 @@ from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
 
+pytestmark = pytest.mark.real_time
+
 
 def spoil_value(message: Odometry) -> None:
     message.pose.pose.position.x = float("nan")

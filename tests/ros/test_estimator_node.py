@@ -23,6 +23,8 @@ from tests.ros.cli import json_of, run_in_real_time
 from tests.ros.neighbour import NAMESPACE, Neighbour, until
 from tests.states import planar_state
 
+pytestmark = pytest.mark.real_time
+
 pytest.importorskip("filterpy")
 MS = 1_000_000
 

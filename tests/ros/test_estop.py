@@ -22,6 +22,8 @@ from tests.conftest import RosDomain
 from tests.ros.cli import fulmar
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, open_valves, until
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture
 def button(neighbour: Neighbour) -> Iterator[EstopNode]:

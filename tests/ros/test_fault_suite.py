@@ -16,6 +16,8 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
+pytestmark = pytest.mark.real_time
+
 QUICK = {
     "floating_platform": "disk_full",
     "turtlebot2": "time_jump_backwards",

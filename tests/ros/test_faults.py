@@ -32,6 +32,8 @@ from tests.ros.cli import (
     wait_for_children,
 )
 
+pytestmark = pytest.mark.real_time
+
 FAR = ("--start", "4,0,0", "--goal", "0,0,0")  # valves stay open for seconds
 WATCHDOG_S, TICK_S = 0.4, 0.02
 UNDER_WAY = 400  # messages in the bag

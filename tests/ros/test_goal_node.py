@@ -24,6 +24,8 @@ from tests.conftest import RosDomain
 from tests.ros.cli import start_fulmar
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
 
+pytestmark = pytest.mark.real_time
+
 VELOCITIES = """
 kind: velocities
 title: ahead, then turning

@@ -35,6 +35,8 @@ from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import Neighbour, until
 
+pytestmark = pytest.mark.real_time
+
 STARTS_S = 40.0
 OWN_TIMEOUT_S = {"turtlebot2": 0.6, "kingfisher": 0.5, "kingfisher_ardupilot": 1.5}
 

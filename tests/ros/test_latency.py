@@ -11,6 +11,8 @@ from fulmar_bringup.benchmark.latency.endurance import endure
 from fulmar_bringup.commands.benchmark_latency import latency
 from fulmar_core.errors import ConfigError
 
+pytestmark = pytest.mark.real_time
+
 
 def test_a_cell_tells_latency_errors_of_the_period_and_what_each_node_uses() -> None:
     """rclpy's own executor, whose figures nothing is asked of, at 100 Hz."""

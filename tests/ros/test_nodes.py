@@ -16,6 +16,8 @@ from fulmar_core.topics import (
 from tests.conftest import RosDomain
 from tests.ros.neighbour import NAMESPACE, Neighbour, until
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.mark.parametrize(
     ("module", "parameter", "words"),

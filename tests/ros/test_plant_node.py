@@ -20,6 +20,8 @@ from sim_nodes.mock_backend import MockBackend
 from sim_nodes.sim_node import make_backend
 from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
 
+pytestmark = pytest.mark.real_time
+
 
 def test_a_command_opens_valves_and_silence_closes_them_within_the_timeout(
     neighbour: Neighbour, plant: PlantNode

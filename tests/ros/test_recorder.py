@@ -31,6 +31,8 @@ from fulmar_core.topics import DIAGNOSTICS, ESTOP, METADATA, ODOMETRY
 from fulmar_ros.patience import publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
+pytestmark = pytest.mark.real_time
+
 ROBOT = "/floating_platform"
 
 

@@ -148,6 +148,7 @@ def test_a_missed_goal_is_exit_code_one_and_no_failure(ros_domain: RosDomain, tm
     assert summary["failure"] is None
 
 
+@pytest.mark.real_time
 def test_a_realtime_run_holds_its_rate_and_records_every_wire(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Rate and figures of a real-time run; how punctual it was is for an idle machine to say."""
     asked = (

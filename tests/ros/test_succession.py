@@ -24,6 +24,8 @@ from policy_server.policy_node import make_policy
 from policy_server.shipped import policies_directory
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
 
+pytestmark = pytest.mark.real_time
+
 SHIPPED = policies_directory() / "floating_platform_go_to_pose"
 OTHER_TASK = policies_directory() / "floating_platform_go_to_position"
 OTHER_ROBOT = policies_directory() / "turtlebot2_go_to_pose"

@@ -12,6 +12,8 @@ from fulmar_core.tasks import load_task
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.mark.parametrize(
     ("refused", "words"),

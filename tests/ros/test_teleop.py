@@ -21,6 +21,8 @@ from tests.conftest import RosDomain
 from tests.ros.cli import FULMAR, fulmar
 from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
 
+pytestmark = pytest.mark.real_time
+
 AHEAD = [0.0, 1.0, 0.0, 0.0]
 
 
