@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-import os
 import sys
 import threading
 import time
@@ -27,7 +25,6 @@ from fulmar_ros.recorder_health import RecorderHealth
 from fulmar_ros.recorder_settings import RecorderSettings
 from fulmar_ros.runtime import RequestExit, run_node
 
-NICE = 5  # of the whole process; compression and disk give way even to its own receiving
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
 LONGEST_GOODBYE_S = 5.0
 
@@ -149,21 +146,8 @@ def _message_class(wire: Wire) -> type | None:
         return None
 
 
-def give_way() -> None:
-    """Let everything that controls go first, where the kernel can be asked for it.
-
-    Linux groups processes by session before it looks at their priority; only who leads a session of his own, as under
-    `fulmar run`, speaks for the whole group.
-    """
-    with contextlib.suppress(OSError, AttributeError):
-        os.setpriority(os.PRIO_PROCESS, 0, NICE)
-        if os.getsid(0) == os.getpid():
-            Path("/proc/self/autogroup").write_text(str(NICE))
-
-
 def main() -> None:
     """Record until told to stop."""
-    give_way()
     sys.exit(run_node(RecorderNode))
 
 
