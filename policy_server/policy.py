@@ -9,18 +9,11 @@ from typing import Any
 import numpy as np
 import onnxruntime
 
+from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.told import told_for
 from fulmar_core.errors import BundleError
 from fulmar_core.observation import Observer
-from fulmar_core.policy_bundle import (
-    GOLDEN,
-    NETWORK,
-    Golden,
-    Passport,
-    check_fit,
-    read_golden,
-    read_passport,
-)
+from fulmar_core.policy_bundle import GOLDEN, NETWORK, Bundle, Golden, Passport, check_fit, read_bundle
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
@@ -35,7 +28,15 @@ class Policy:
 
     name = "policy"
 
-    def __init__(self, folder: Path, robot: Robot, task: Task, *, control_hz: float | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        robot: Robot,
+        task: Task,
+        *,
+        control_hz: float | None = None,
+        trusted: Path | None = None,
+    ) -> None:
         """Load a bundle.
 
         Args:
@@ -43,20 +44,25 @@ class Policy:
             robot: The robot it shall drive.
             task: The task it shall do.
             control_hz: The rate it shall run at; the robot's own by default [Hz].
+            trusted: File or folder of public keys, one of which must have signed it; None: nobody needs to.
 
         Raises:
-            BundleError: Anything is missing, damaged, of other shape, made for something else, or does not
+            BundleError: Anything is missing, damaged, not signed, of other shape, made for something else, or does not
                 reproduce its golden vectors.
+            ConfigError: There is no readable key.
         """
-        self.passport = read_passport(folder)
+        bundle = read_bundle(folder)
+        if trusted is not None:
+            verify_bundle(bundle, trusted)
+        self.passport = bundle.passport
         self.control_hz = control_hz or robot.timing.control_hz
         check_fit(self.passport, robot, task, self.control_hz, where=str(folder))
         self._told = told_for(robot, task, self.control_hz, len(self.passport.observation_names))
         self.observation_names = Observer(robot, task).names
-        self._session = _open(folder)
+        self._session = _open(bundle)
         self._memory: np.ndarray | None = None
         _check_shapes(self._session, self.passport, folder)
-        _check_golden(self._session, self.passport, folder)
+        _check_golden(self._session, bundle)
 
     def reset(self) -> None:
         """Forget what was seen, if the network remembers anything."""
@@ -88,18 +94,16 @@ class Policy:
         return {"controller": self.name, **asdict(self.passport)}
 
 
-def _open(folder: Path) -> onnxruntime.InferenceSession:
+def _open(bundle: Bundle) -> onnxruntime.InferenceSession:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(
-            (folder / NETWORK).read_bytes(), options, providers=["CPUExecutionProvider"]
-        )
+        return onnxruntime.InferenceSession(bundle.network, options, providers=["CPUExecutionProvider"])
     except Exception as error:
         reason = str(error).splitlines()[0]
         raise BundleError(
-            f"{folder / NETWORK}: onnxruntime refuses it: {reason}. Export the policy again."
+            f"{bundle.folder / NETWORK}: onnxruntime refuses it: {reason}. Export the policy again."
         ) from error
 
 
@@ -130,8 +134,8 @@ def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, fol
         raise BundleError(f"{folder / NETWORK}: takes {', '.join(inputs)}; it must take {alone} alone.")
 
 
-def _check_golden(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:
-    golden = read_golden(folder)
+def _check_golden(session: onnxruntime.InferenceSession, bundle: Bundle) -> None:
+    folder, passport, golden = bundle.folder, bundle.passport, bundle.golden()
     _check_golden_shapes(golden, passport, folder)
     feed = {"observation": golden.observations}
     names = ["command", "logits"]

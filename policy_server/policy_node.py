@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import BundleError
 from fulmar_core.robot import Robot
@@ -24,9 +23,8 @@ def make_policy(robot: Robot, task: Task, settings: ControllerSettings) -> Contr
         raise BundleError(
             f"no policy is shipped for '{robot.name}' and '{task.name}'. Set the parameter 'policy'."
         )
-    if settings.trusted_keys:
-        verify_bundle(folder, Path(settings.trusted_keys))
-    return Policy(folder, robot, task, control_hz=settings.control_rate(robot))
+    trusted = Path(settings.trusted_keys) if settings.trusted_keys else None
+    return Policy(folder, robot, task, control_hz=settings.control_rate(robot), trusted=trusted)
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fulmar_core.bundle_signature import make_keys, sign_bundle, verify_bundle
 from fulmar_core.errors import BundleError, ConfigError, FulmarError
-from fulmar_core.policy_bundle import PASSPORT, SIGNATURE, read_passport
+from fulmar_core.policy_bundle import PASSPORT, SIGNATURE, read_bundle, read_passport
 from policy_server.shipped import policies_directory
 
 pytest.importorskip("cryptography")
@@ -34,7 +34,7 @@ def bundle(tmp_path, keys):
 
 
 def test_a_signed_bundle_is_known_by_the_key_that_signed_it(bundle, keys):
-    assert verify_bundle(bundle, keys[1]) == "lab.pem"
+    assert verify_bundle(read_bundle(bundle), keys[1]) == "lab.pem"
 
 
 def test_of_a_folder_of_keys_the_right_one_is_found(bundle, keys, tmp_path):
@@ -42,19 +42,19 @@ def test_of_a_folder_of_keys_the_right_one_is_found(bundle, keys, tmp_path):
     folder.mkdir()
     make_keys(tmp_path / "other_private.pem", folder / "a_other.pem")
     shutil.copy(keys[1], folder / "b_lab.pem")
-    assert verify_bundle(bundle, folder) == "b_lab.pem"
+    assert verify_bundle(read_bundle(bundle), folder) == "b_lab.pem"
 
 
 def test_a_bundle_without_a_signature_is_refused(bundle, keys):
     (bundle / SIGNATURE).unlink()
     with pytest.raises(BundleError, match="not signed"):
-        verify_bundle(bundle, keys[1])
+        verify_bundle(read_bundle(bundle), keys[1])
 
 
 def test_a_signature_of_somebody_else_is_refused(bundle, tmp_path):
     make_keys(tmp_path / "p2.pem", tmp_path / "other.pem")
     with pytest.raises(BundleError, match="signed by none"):
-        verify_bundle(bundle, tmp_path / "other.pem")
+        verify_bundle(read_bundle(bundle), tmp_path / "other.pem")
 
 
 def test_a_passport_that_was_changed_and_sealed_anew_is_refused(bundle, keys):
@@ -63,7 +63,7 @@ def test_a_passport_that_was_changed_and_sealed_anew_is_refused(bundle, keys):
     (bundle / PASSPORT).write_text(json.dumps(asdict(changed)))
     read_passport(bundle)  # every hash is in order
     with pytest.raises(BundleError, match="changed after it was signed"):
-        verify_bundle(bundle, keys[1])
+        verify_bundle(read_bundle(bundle), keys[1])
 
 
 def test_a_network_that_was_exchanged_is_refused_by_its_hash(bundle):
@@ -88,13 +88,13 @@ def test_a_key_is_never_overwritten_and_the_private_one_is_for_its_owner_alone(k
 def test_what_is_no_key_is_told(bundle, tmp_path):
     (tmp_path / "no.pem").write_text("hello")
     for call in (
-        lambda: verify_bundle(bundle, tmp_path / "no.pem"),
+        lambda: verify_bundle(read_bundle(bundle), tmp_path / "no.pem"),
         lambda: sign_bundle(bundle, tmp_path / "no.pem"),
     ):
         with pytest.raises(ConfigError, match=r"no\.pem"):
             call()
     with pytest.raises(ConfigError, match="cannot be read"):
-        verify_bundle(bundle, tmp_path / "missing.pem")
+        verify_bundle(read_bundle(bundle), tmp_path / "missing.pem")
 
 
 @given(st.binary(max_size=200))
@@ -105,4 +105,4 @@ def test_whatever_lies_in_the_place_of_a_signature_is_refused_in_words(tmp_path_
     bundle = shutil.copytree(SHIPPED, folder / "bundle")
     (bundle / SIGNATURE).write_bytes(junk)
     with pytest.raises(FulmarError):
-        verify_bundle(bundle, folder / "public.pem")
+        verify_bundle(read_bundle(bundle), folder / "public.pem")

@@ -358,3 +358,27 @@ def test_golden_vectors_of_a_network_with_memory_are_compared_too(remembering, n
     reseal(remembering, golden=replace(golden, **{name: getattr(golden, name) + np.float32(0.01)}))
     with pytest.raises(BundleError, match="golden vectors"):
         Policy(remembering, ROLLING, ROLLING_TASK)
+
+
+def test_what_was_verified_is_what_runs_though_the_files_are_exchanged_afterwards(folder, tmp_path, monkeypatch):
+    """A forger who writes as soon as the signature was checked: other network, golden vectors and passport, all hashes
+    in order."""
+    pytest.importorskip("cryptography")
+    from fulmar_core.bundle_signature import make_keys, sign_bundle, verify_bundle
+
+    make_keys(tmp_path / "private.pem", tmp_path / "lab.pem")
+    sign_bundle(folder, tmp_path / "private.pem")
+    signed, network, golden = load(folder), *linear_network()
+
+    def verify_then_exchange(bundle, trusted):
+        name = verify_bundle(bundle, trusted)
+        reseal(folder, network=network, golden=golden)
+        return name
+
+    monkeypatch.setattr("policy_server.policy.verify_bundle", verify_then_exchange)
+    policy = load(folder, trusted=tmp_path / "lab.pem")
+    assert load(folder).passport != signed.passport  # they were exchanged
+    assert policy.passport == signed.passport
+    np.testing.assert_array_equal(policy.act(golden.observations), signed.act(golden.observations))
+    with pytest.raises(BundleError, match="not signed"):
+        load(folder, trusted=tmp_path / "lab.pem")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fulmar_core.errors import BundleError, ConfigError
-from fulmar_core.policy_bundle import PASSPORT, SIGNATURE, read_passport
+from fulmar_core.policy_bundle import SIGNATURE, Bundle, read_bundle
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -54,23 +54,23 @@ def sign_bundle(folder: Path, private: Path) -> None:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
-    read_passport(folder)
+    bundle = read_bundle(folder)
     try:
         key = load_pem_private_key(_read(private), password=None)
     except (ValueError, TypeError) as error:
         raise ConfigError(f"{private}: is no private key in PEM without a password.") from error
     if not isinstance(key, Ed25519PrivateKey):
         raise ConfigError(f"{private}: is no ed25519 key. Make one with `fulmar bundle keys`.")
-    signature = key.sign(DOMAIN + (folder / PASSPORT).read_bytes())
+    signature = key.sign(DOMAIN + bundle.passport_file)
     values = {"algorithm": "ed25519", "signature": base64.b64encode(signature).decode()}
     (folder / SIGNATURE).write_text(json.dumps(values) + "\n", encoding="utf-8")
 
 
-def verify_bundle(folder: Path, trusted: Path) -> str:
-    """Refuse a bundle that none of the trusted keys has signed; the hashes themselves are `read_passport`'s.
+def verify_bundle(bundle: Bundle, trusted: Path) -> str:
+    """Refuse a bundle that none of the trusted keys has signed.
 
     Args:
-        folder: The bundle.
+        bundle: As it was read, whose hashes are in order.
         trusted: PEM file with one public key, or a folder of such files.
 
     Returns:
@@ -83,8 +83,8 @@ def verify_bundle(folder: Path, trusted: Path) -> str:
     from cryptography.exceptions import InvalidSignature
 
     keys = _public_keys(trusted)
-    signature = _signature(folder)
-    message = DOMAIN + (folder / PASSPORT).read_bytes()
+    signature = _signature(bundle.folder)
+    message = DOMAIN + bundle.passport_file
     for name, key in keys.items():
         try:
             key.verify(signature, message)
@@ -92,7 +92,8 @@ def verify_bundle(folder: Path, trusted: Path) -> str:
             continue
         return name
     raise BundleError(
-        f"policy '{folder}' is signed by none of the {len(keys)} keys in {trusted}, or was changed after it was signed."
+        f"policy '{bundle.folder}' is signed by none of the {len(keys)} keys in {trusted}, "
+        "or was changed after it was signed."
     )
 
 

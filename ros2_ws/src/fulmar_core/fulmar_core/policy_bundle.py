@@ -12,7 +12,9 @@ Knows files and hashes, not how to run a network.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
+import os
 import zipfile
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -77,6 +79,25 @@ class Golden:
     next_memories: np.ndarray  # (k, `memory`) float32
 
 
+@dataclass(frozen=True)
+class Bundle:
+    """What the files of a bundle held when each was read, once: what is checked is what runs, whatever lies there now."""
+
+    folder: Path  # where it was read from, for messages
+    passport: Passport
+    passport_file: bytes  # which signatures are over
+    network: bytes  # ONNX
+    golden_file: bytes
+
+    def golden(self) -> Golden:
+        """The golden vectors.
+
+        Raises:
+            BundleError: If they cannot be read.
+        """
+        return _golden_of(self.golden_file, self.folder / GOLDEN)
+
+
 def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passport) -> Passport:
     """Write a bundle; hashes are filled in here.
 
@@ -94,8 +115,8 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
     with (folder / GOLDEN).open("wb") as file:
         np.savez(file, **{f.name: getattr(golden, f.name) for f in fields(golden)})
     values = asdict(passport) | {
-        "network_sha256": _sha256(folder / NETWORK),
-        "golden_sha256": _sha256(folder / GOLDEN),
+        "network_sha256": _sha256(network),
+        "golden_sha256": _sha256((folder / GOLDEN).read_bytes()),
         "sha256": "",
     }
     sealed = _passport_of(values, folder / PASSPORT).sealed()
@@ -104,29 +125,22 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
     return sealed
 
 
-def read_passport(folder: Path) -> Passport:
-    """Read the passport of a bundle and check every hash.
+def read_bundle(folder: Path) -> Bundle:
+    """Read every file of a bundle once and check every hash.
 
     Args:
         folder: The bundle.
 
     Returns:
-        The passport.
+        The bundle; its signature, if there is one, is not looked at.
 
     Raises:
         BundleError: No bundle, unreadable, of another format, or a file that is not the one it was sealed with.
     """
-    for name in (PASSPORT, NETWORK, GOLDEN):
-        path = folder / name
-        if not path.is_file():
-            raise BundleError(
-                f"policy '{folder}' has no {name}. Export one with `fulmar export RUN --out DIR`."
-            )
-        if path.stat().st_size > MAX_BYTES:
-            raise BundleError(f"{path}: {path.stat().st_size} bytes, at most {MAX_BYTES} are accepted.")
+    text, network, golden = (_content(folder, name) for name in (PASSPORT, NETWORK, GOLDEN))
     try:
-        values = json.loads((folder / PASSPORT).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        values = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise BundleError(
             f"{folder / PASSPORT}: cannot be read: {error}. Export the policy again."
         ) from error
@@ -140,27 +154,31 @@ def read_passport(folder: Path) -> Passport:
         raise BundleError(
             f"{folder / PASSPORT}: was changed after export (its hash does not match). Export it again."
         )
-    for name, expected in ((NETWORK, passport.network_sha256), (GOLDEN, passport.golden_sha256)):
-        found = _sha256(folder / name)
+    for name, content, expected in (
+        (NETWORK, network, passport.network_sha256),
+        (GOLDEN, golden, passport.golden_sha256),
+    ):
+        found = _sha256(content)
         if found != expected:
             raise BundleError(
                 f"{folder / name}: SHA-256 is {found[:12]}…, the passport says {expected[:12]}…. "
                 "The file is not the one that was exported; export the policy again."
             )
-    return passport
+    return Bundle(folder, passport, text, network, golden)
+
+
+def read_passport(folder: Path) -> Passport:
+    """The passport of a bundle, after every hash was checked; see `read_bundle`."""
+    return read_bundle(folder).passport
 
 
 def read_golden(folder: Path) -> Golden:
-    """Read the golden vectors; call `read_passport` first, which checks their hash.
+    """Read the golden vectors alone; their hash is not checked.
 
     Raises:
         BundleError: If they cannot be read.
     """
-    try:
-        with np.load(folder / GOLDEN, allow_pickle=False) as arrays:
-            return Golden(**{f.name: arrays[f.name] for f in fields(Golden)})
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise BundleError(f"{folder / GOLDEN}: cannot be read: {error}. Export the policy again.") from error
+    return _golden_of(_content(folder, GOLDEN), folder / GOLDEN)
 
 
 def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *, where: str) -> None:
@@ -264,5 +282,27 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
 }
 
 
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _content(folder: Path, name: str) -> bytes:
+    path = folder / name
+    if not path.is_file():
+        raise BundleError(f"policy '{folder}' has no {name}. Export one with `fulmar export RUN --out DIR`.")
+    try:
+        with path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > MAX_BYTES:
+                raise BundleError(f"{path}: {size} bytes, at most {MAX_BYTES} are accepted.")
+            return file.read(MAX_BYTES)
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be read: {error.strerror}. Export the policy again.") from error
+
+
+def _golden_of(content: bytes, path: Path) -> Golden:
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            return Golden(**{f.name: arrays[f.name] for f in fields(Golden)})
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise BundleError(f"{path}: cannot be read: {error}. Export the policy again.") from error
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

@@ -82,12 +82,12 @@ def verify(
 
     require("cryptography")
     from fulmar_core.bundle_signature import verify_bundle
-    from fulmar_core.policy_bundle import read_passport
+    from fulmar_core.policy_bundle import read_bundle
 
-    passport = read_passport(folder)
-    name = verify_bundle(folder, trusted)
+    found = read_bundle(folder)
+    name = verify_bundle(found, trusted)
     if as_json:
-        print_json({"bundle": str(folder), "signed_by": name, "sha256": passport.sha256})
+        print_json({"bundle": str(folder), "signed_by": name, "sha256": found.passport.sha256})
     else:
         output.print(f"{folder}: signed by {name}", markup=False, soft_wrap=True)
 
