@@ -272,9 +272,14 @@ def start_evaluation(domain: RosDomain, folder: Path) -> psutil.Popen:
 
 
 @pytest.mark.parametrize(
-    ("number", "told"), [(signal.SIGINT, "stopped by the user"), (signal.SIGTERM, "stopped by SIGTERM")]
+    ("number", "told"),
+    [
+        (signal.SIGINT, "stopped by the user"),
+        (signal.SIGTERM, "stopped by SIGTERM"),
+        (signal.SIGHUP, "stopped by SIGHUP"),
+    ],
 )
-def test_ctrl_c_and_sigterm_stop_in_order_with_the_valves_closed_last(
+def test_ctrl_c_sigterm_and_a_lost_terminal_stop_in_order_with_the_valves_closed_last(
     number: signal.Signals, told: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """The bag is whole and ends with closed valves; nobody is left behind."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -31,6 +32,7 @@ from fulmar_ros.runtime import spinning
 from hardware_drivers.adapter_node import AdapterNode
 from hardware_drivers.driver_node import DriverNode
 from hardware_drivers.settings import load_hardware
+from sim_nodes.emulators.valves import ValveBank
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import Neighbour, until
@@ -120,15 +122,47 @@ def test_a_killed_driver_of_valves_leaves_them_open_and_a_new_one_closes_them(ri
     device.close()
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(240)
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
-def test_a_driver_that_is_told_to_end_closes_its_valves_first(rig: Rig, number: signal.Signals) -> None:
-    rig.until_it_moves()
-    rig.driver.send_signal(number)
-    until(lambda: not rig.device[-1].any(), timeout_s=1.0)
-    assert rig.driver.wait(10.0) == 0
+@pytest.fixture
+def valves(neighbour: Neighbour, tmp_path: Path) -> Iterator[tuple[ValveBank, psutil.Process]]:
+    """Valves on pins, and the driver that has opened one of them; a process."""
+    bank = ValveBank(
+        tmp_path / "pins", neighbour.robot, order=load_hardware("zero_g_lab").driver.order, active_low=True
+    )
+    plan = RunPlan("floating_platform", "go_to_position", "policy", "hardware", 10.0)
+    group = ProcessGroup()
+    group.start(plant_spec(replace(plan, hardware="zero_g_lab"), port=bank.address))
+    try:
+        first = [1.0] + [0.0] * 7
+        until(lambda: neighbour.command(first) or bank.command(0.0).any(), STARTS_S)
+        yield bank, group.process("plant")
+    finally:
+        group.stop_all()
+        bank.close()
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"])
+def test_a_driver_that_is_told_to_end_closes_its_valves_first(valves, number: str) -> None:
+    """SIGHUP is what a driver hears whose ssh connection drops."""
+    bank, driver = valves
+    driver.send_signal(signal.Signals[number])
+    until(lambda: not bank.command(0.0).any(), timeout_s=1.0)
+    assert driver.wait(10.0) == 0
+
+
+@pytest.mark.timeout(120)
+def test_a_node_that_was_started_by_nohup_goes_on_without_its_terminal(neighbour, tmp_path: Path) -> None:
+    """Who says `nohup` means it."""
+    node = [sys.executable, "-m", "fulmar_ros.estop_node", "--ros-args", "-r", f"__ns:=/{neighbour.robot.name}"]
+    started = subprocess.Popen(["nohup", *node], cwd=tmp_path, stdin=subprocess.DEVNULL)
+    try:
+        until(lambda: "estop" in neighbour.said, STARTS_S)
+        started.send_signal(signal.SIGHUP)
+        neighbour.said.clear()
+        until(lambda: "estop" in neighbour.said)
+    finally:
+        started.terminate()
+        assert started.wait(10.0) == 0
 
 
 @pytest.mark.slow

@@ -67,13 +67,16 @@ def main() -> None:
     """Run the command line; mistakes end with one line and exit code 2, failures with 1."""
     told: list[str] = []
 
-    def on_terminate(_number: int, _frame: FrameType | None) -> None:
-        """SIGTERM stops a command as Ctrl-C does, in order; once, though `timeout` sends it twice."""
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        told.append("stopped by SIGTERM")
+    def on_terminate(number: int, _frame: FrameType | None) -> None:
+        """These stop a command as Ctrl-C does, in order; once, though `timeout` sends SIGTERM twice."""
+        for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+            signal.signal(each, signal.SIG_IGN)
+        told.append(f"stopped by {signal.Signals(number).name}")
         raise KeyboardInterrupt(*told)
 
-    signal.signal(signal.SIGTERM, on_terminate)
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` leaves SIGHUP
+            signal.signal(number, on_terminate)
     # A shell starts its background jobs with Ctrl-C ignored, and so would everything that we start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

@@ -32,6 +32,7 @@ from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
 
+ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 SPIN_S = 60.0
 EXECUTOR = "FULMAR_EXECUTOR"  # environment variable: default, or events
 
@@ -42,7 +43,8 @@ RequestExit = Callable[[int], None]
 def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | None = None) -> int:
     """Build one node, spin it until it is told to stop, and stop it in order.
 
-    SIGINT and SIGTERM ask for an orderly end with exit code 0. A node may have a method `stop()`: it is
+    SIGINT, SIGTERM, SIGQUIT and, unless `nohup` had it ignored, SIGHUP (the terminal or the ssh connection is gone) ask
+    for an orderly end with exit code 0. A node may have a method `stop()`: it is
     called in the main thread while messages still flow (publish zeros, flush, close). What it returns, if
     anything, is the exit code of a run that would otherwise end with 0.
 
@@ -60,8 +62,9 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     def on_signal(_number: int, _frame: FrameType | None) -> None:
         exit_codes.put(DONE)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
+    for number in ENDS:
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, on_signal)
     end_with_parent()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
