@@ -7,16 +7,17 @@ those that the open iM200 application of MOOS-IvP reads, and its recording of a 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from fulmar_core.sensors.imu import ImuSample
 from hardware_drivers.nmea import sentence
+from hardware_drivers.thrust import bounded
 
 GRAVITY = 9.80665  # [m/s²]; the recorded boat reports accelerations in multiples of it, with z down
 DAY_S = 86400.0
+LARGEST = 1e6  # of any field; beyond it is nonsense, of which conversions could make what is not finite
 OLDEST_SPEED_S = 0.5  # a velocity that came longer before a position says nothing about it
 
 
@@ -64,11 +65,10 @@ def drive(left: float, right: float) -> bytes:
     """The sentence that makes the propellers turn.
 
     Args:
-        left: Share of full thrust, -1 to 1.
+        left: Share of full thrust, -1 to 1; see `bounded`.
         right: Same.
     """
-    shares = (max(-100.0, min(100.0, 100.0 * share)) for share in (left, right))
-    return sentence("PYDIR," + ",".join(f"{share:.1f}" for share in shares))
+    return sentence("PYDIR," + ",".join(f"{100.0 * share:.1f}" for share in bounded(left, right)))
 
 
 def read(fields: list[str]) -> Message | None:
@@ -117,9 +117,9 @@ READERS = {"CPNVG": _fix, "CPNVR": _rates, "CPIMU": _inertial, "CPRBS": _battery
 
 
 def _number(text: str) -> float:
-    """A finite number, as NMEA writes it; raises ValueError."""
+    """A number of sensible size, as NMEA writes it; raises ValueError."""
     value = float(text)
-    if not math.isfinite(value) or "_" in text:
+    if not abs(value) <= LARGEST or "_" in text:
         raise ValueError(text)
     return value
 

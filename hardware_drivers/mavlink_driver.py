@@ -23,6 +23,7 @@ from hardware_drivers.attitude import attitude
 from hardware_drivers.device_time import DeviceTime
 from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.settings import MavlinkBoat
+from hardware_drivers.thrust import bounded
 
 HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
 HEARTBEAT_S = 1.0
@@ -131,14 +132,7 @@ class MavlinkDriver:
             )
 
     def _drive(self, left: float, right: float) -> None:
-        settings, link = self._settings, self._link
-        channels = [NO_CHANGE] * 8
-        shares = {
-            settings.steering_channel: 0.5 * (left - right),
-            settings.throttle_channel: 0.5 * (left + right),
-        }
-        for channel, share in shares.items():
-            channels[channel - 1] = settings.trim_us + round(settings.span_us * max(-1.0, min(1.0, share)))
+        link, channels = self._link, override_of(self._settings, left, right)
         with self._sending:
             link.mav.rc_channels_override_send(link.target_system, link.target_component, *channels)
 
@@ -182,6 +176,25 @@ class MavlinkDriver:
             if state is not None:
                 stamp_ns = self._time.stamp_ns(float(message.time_boot_ms), now_ns)
                 self._feedback.put(Report(state, self._imu, stamp_ns))
+
+
+def override_of(settings: MavlinkBoat, left: float, right: float) -> list[int]:
+    """Pulses of eight RC channels that make the propellers turn [µs].
+
+    Args:
+        settings: Which channels, and how far.
+        left: Share of full thrust, -1 to 1; see `bounded`.
+        right: Same.
+    """
+    left, right = bounded(left, right)
+    channels = [NO_CHANGE] * 8
+    shares = {
+        settings.steering_channel: 0.5 * (left - right),
+        settings.throttle_channel: 0.5 * (left + right),
+    }
+    for channel, share in shares.items():
+        channels[channel - 1] = settings.trim_us + round(settings.span_us * share)
+    return channels
 
 
 def state_of(position: Any, attitude_of: Any, shift: np.ndarray) -> RigidBodyState | None:

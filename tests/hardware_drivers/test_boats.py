@@ -13,7 +13,7 @@ from fulmar_core.errors import ConfigError, DeviceError
 from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
 from hardware_drivers.kingfisher_driver import KingfisherDriver
-from hardware_drivers.mavlink_driver import MavlinkDriver, state_of
+from hardware_drivers.mavlink_driver import NO_CHANGE, MavlinkDriver, override_of, state_of
 from hardware_drivers.ports import open_port
 from hardware_drivers.settings import KingfisherNmea, MavlinkBoat, Thrust
 from sim_nodes.emulators.ardupilot import ArdupilotEmulator
@@ -135,6 +135,21 @@ def test_nobody_at_the_other_end_is_refused_with_a_hint(unused_udp_port):
 def test_an_address_that_is_none_is_refused():
     with pytest.raises(ConfigError, match="tcp://host:port"):
         open_port("tcp://host", 0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("command", "steering", "throttle"),
+    [
+        ((1.0, 1.0), 1500, 1900),
+        ((1.0, -1.0), 1900, 1500),
+        ((-9.0, -9.0), 1500, 1100),
+        ((float("nan"), 1.0), 1500, 1500),
+        ((1.0, float("inf")), 1500, 1500),
+    ],
+)
+def test_pulses_stay_within_their_span_and_what_is_no_number_is_a_stop(command, steering, throttle):
+    channels = override_of(MavlinkBoat("mavlink_boat", "", THRUST), *command)
+    assert channels == [steering, NO_CHANGE, throttle, *[NO_CHANGE] * 5]
 
 
 @dataclass

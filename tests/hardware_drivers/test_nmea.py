@@ -60,6 +60,11 @@ def test_the_boat_understands_every_command_as_it_was_meant(left, right):
     assert boat.command(1.0) == pytest.approx(np.clip((left, right), -1.0, 1.0), abs=6e-4)
 
 
+@pytest.mark.parametrize("command", [(math.nan, 1.0), (1.0, math.nan), (math.inf, 1.0), (0.0, -math.inf)])
+def test_a_command_that_is_no_number_is_a_stop_of_both_propellers(command):
+    assert drive(*command) == sentence("PYDIR,0.0,0.0")
+
+
 def test_a_boat_without_commands_stops_after_its_own_timeout():
     wire = Wire()
     boat = KingfisherEmulator(wire)
@@ -95,6 +100,15 @@ def test_any_fields_are_survived_and_what_is_read_is_finite(fields, name):
         assert math.isfinite(message.heading)
     if isinstance(message, Rates):
         assert math.isfinite(message.east + message.north + message.yaw_rate)
+
+
+@pytest.mark.parametrize("huge", ["1e308", "-1e308", "1e7", "inf", "nan"])
+@pytest.mark.parametrize("field", range(2, 8))
+def test_an_inertial_reading_of_no_sensible_size_is_refused(field, huge):
+    fields = ["CPIMU", "164958.858", "0", "0", "0", "0", "0", "-1"]
+    assert isinstance(read(fields), Inertial)
+    fields[field] = huge
+    assert read(fields) is None
 
 
 @given(st.binary(max_size=600))
