@@ -109,7 +109,9 @@ class DriverNode(PlantNode):
             def send(valves: np.ndarray, bearing: bool) -> None:
                 publish(to_message(valves, bearing=bearing, order=driver.order))
 
-            return ValveTopicDriver(robot, send, bearing_on=driver.bearing_on_at_start)
+            return ValveTopicDriver(
+                robot, send, bearing_on=driver.bearing_on_at_start, linger_s=driver.linger_s
+            )
         return None
 
 

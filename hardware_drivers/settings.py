@@ -12,6 +12,16 @@ from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Actuators, load_robot
 
 
+# A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
+LONGEST_LINGER_S = 2.0
+
+
+def check_linger(linger_s: float) -> None:
+    """Refuse times without meaning, and those that a launcher would not wait for; raises ValueError."""
+    if not 0.0 <= linger_s <= LONGEST_LINGER_S:
+        raise ValueError(f"linger_s = {linger_s:g} must be from 0 to {LONGEST_LINGER_S:g} s.")
+
+
 @dataclass(frozen=True)
 class Bearing:
     """The valve that feeds the air bearing."""
@@ -25,8 +35,9 @@ class Bearing:
 
     def __post_init__(self) -> None:
         """Refuse times without meaning."""
-        if min(self.linger_s, self.idle_off_s) < 0.0 or self.linger_s > 5.0:
-            raise ValueError("linger_s must be from 0 to 5 s, and idle_off_s must not be negative.")
+        check_linger(self.linger_s)
+        if not self.idle_off_s >= 0.0:
+            raise ValueError("idle_off_s must not be negative.")
 
 
 @dataclass(frozen=True)
@@ -60,9 +71,11 @@ class ValveTopic:
     topic: str
     order: tuple[int, ...]  # which thruster, counted from 0, each entry after the first opens
     bearing_on_at_start: bool = True
+    linger_s: float = 1.0  # it carries the platform so long after the last valve has closed for good [s]
 
     def __post_init__(self) -> None:
-        """Refuse orders that leave a valve out."""
+        """Refuse orders that leave a valve out, and times without meaning."""
+        check_linger(self.linger_s)
         if sorted(self.order) != list(range(len(self.order))):
             raise ValueError(f"'order' must hold each of 0 to {len(self.order) - 1} once.")
 

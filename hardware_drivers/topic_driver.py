@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +13,8 @@ from fulmar_core.robot import Robot
 
 Send = Callable[[np.ndarray], None]
 STOPS = 5
+# Between them, and after the last: publishers keep one message, and the process may end right after it.
+STOP_PERIOD_S = 0.02
 
 
 class TopicDriver:
@@ -36,9 +39,10 @@ class TopicDriver:
         return Sample(None, None, None)
 
     def make_safe(self) -> None:
-        """Send the safe command, several times."""
+        """Send the safe command several times, with time for each to arrive."""
         for _ in range(STOPS):
             self._send(self.robot.actuators.safe_command)
+            time.sleep(STOP_PERIOD_S)
 
     def close(self) -> None:
         """As `make_safe`."""
@@ -52,16 +56,33 @@ class TopicDriver:
 class ValveTopicDriver(TopicDriver):
     """The same with an air bearing, which travels in the same message as the valves."""
 
-    def __init__(self, robot: Robot, send: Callable[[np.ndarray, bool], None], *, bearing_on: bool) -> None:
-        """Prepare; the bearing as `bearing_on` says, from the start on."""
+    def __init__(
+        self, robot: Robot, send: Callable[[np.ndarray, bool], None], *, bearing_on: bool, linger_s: float
+    ) -> None:
+        """Prepare.
+
+        Args:
+            robot: The robot.
+            send: Publishes zeros and ones, and whether the bearing shall be on.
+            bearing_on: Whether it is, from the start on.
+            linger_s: It carries the platform so long after the last valve has closed for good [s].
+        """
         super().__init__(robot, lambda command: send(command, self._bearing))
-        self._bearing = bearing_on
+        self._bearing, self._linger_s = bearing_on, linger_s
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Send a command, or closed valves while the bearing is off; see `Backend.step`."""
         applied = np.asarray(command, dtype=float) if self._bearing else self.robot.actuators.safe_command
         super().step(applied)
         return Sample(None, None, None, applied=applied)
+
+    def close(self) -> None:
+        """Close every valve, and let the platform down after a while."""
+        self.make_safe()
+        if self._bearing:
+            time.sleep(self._linger_s)
+            self._bearing = False
+            self.make_safe()
 
     @property
     def bearing_on(self) -> bool:

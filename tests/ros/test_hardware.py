@@ -280,6 +280,7 @@ def test_our_commands_reach_the_lab_s_valve_node_and_silence_closes_its_valves(n
         until(lambda: not any(messages[-1].data[1:]))
         assert messages[-1].data[0] == 1
         node.stop()
+        until(lambda: messages[-1].data.tolist() == [0] * 9)  # it is let down
 
 
 @pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)

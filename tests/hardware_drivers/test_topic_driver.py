@@ -1,0 +1,66 @@
+"""Devices that somebody else's node drives: what it is told at the end, and when."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from fulmar_core.robot import load_robot
+from hardware_drivers.settings import LONGEST_LINGER_S, Bearing, ValveTopic
+from hardware_drivers.topic_driver import STOPS, TopicDriver, ValveTopicDriver
+
+ROBOT = load_robot("floating_platform")
+
+
+class Listener:
+    """Keeps what is sent, and when."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[float, np.ndarray, bool]] = []
+
+    def __call__(self, command: np.ndarray, bearing: bool = True) -> None:
+        self.heard.append((time.monotonic(), command, bearing))
+
+
+def test_stops_come_one_by_one_and_the_last_has_time_to_arrive():
+    """A publisher that keeps one message would send of a burst only the last, and of that one nothing if the process
+    ends with it."""
+    listener = Listener()
+    driver = TopicDriver(ROBOT, listener)
+    driver.step(np.ones(8))
+    driver.make_safe()
+    times = [at for at, _, _ in listener.heard[1:]] + [time.monotonic()]
+    assert len(times) == STOPS + 1
+    assert min(np.diff(times)) >= 0.01
+    assert not any(command.any() for _, command, _ in listener.heard[1:])
+
+
+def test_at_the_end_the_valves_close_first_and_the_platform_is_let_down_later():
+    listener = Listener()
+    driver = ValveTopicDriver(ROBOT, listener, bearing_on=True, linger_s=0.3)
+    driver.step(np.ones(8))
+    driver.close()
+    assert not driver.bearing_on
+    carried, down = ([entry for entry in listener.heard[1:] if entry[2] is on] for on in (True, False))
+    assert not any(command.any() for _, command, _ in (*carried, *down))
+    assert len(carried) == len(down) == STOPS
+    assert down[0][0] - carried[-1][0] >= 0.3
+
+
+def test_a_bearing_that_is_off_needs_no_time():
+    listener = Listener()
+    driver = ValveTopicDriver(ROBOT, listener, bearing_on=False, linger_s=1.0)
+    began = time.monotonic()
+    driver.close()
+    assert time.monotonic() - began < 0.5
+    assert not any(on for _, _, on in listener.heard)
+
+
+@pytest.mark.parametrize("linger_s", [-0.1, LONGEST_LINGER_S + 0.1, float("nan")])
+def test_a_lingering_that_a_launcher_would_not_wait_for_is_refused(linger_s):
+    with pytest.raises(ValueError, match="linger_s"):
+        Bearing("7", linger_s=linger_s)
+    with pytest.raises(ValueError, match="linger_s"):
+        ValveTopic("valve_topic", "/x", tuple(range(8)), linger_s=linger_s)
