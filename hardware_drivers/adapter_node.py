@@ -17,6 +17,7 @@ from std_msgs.msg import Float32MultiArray, Int16MultiArray
 from std_srvs.srv import SetBool
 
 from fulmar_core.errors import ConfigError
+from fulmar_core.exit_codes import BAD_USAGE
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.air_bearing import SERVICE
@@ -28,6 +29,7 @@ from hardware_drivers.settings import ThrustTopic, ValveTopic, VelocityTopic, lo
 from hardware_drivers.valve_message import from_message
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches whatever they offer
+PLANT = "plant"  # name of driver nodes
 NO_STAMP = 0  # they answer no observation of ours
 
 
@@ -47,8 +49,12 @@ class AdapterNode(Node):
     It holds nothing back and repeats nothing: when they fall silent, so does it, and the watchdog acts.
     """
 
-    def __init__(self, _request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
+    def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
         """Create both ends.
+
+        Args:
+            request_exit: Ends the process.
+            cli_args: ROS arguments of this node alone, where it shares a process.
 
         Raises:
             ConfigError: A parameter is wrong, or the hardware file has another driver.
@@ -69,8 +75,9 @@ class AdapterNode(Node):
         self._publisher = self.create_publisher(kind, wire.name, publisher_qos(wire))
         self._bearing: bool | None = None
         self._enable = self.create_client(SetBool, SERVICE) if self._order else None
-        heard, take = self._ear(driver)
-        self.create_subscription(heard, settings.topic or driver.topic, take, NEWEST)
+        self._request_exit = request_exit
+        heard, self._take = self._ear(driver)
+        self._heard = self.create_subscription(heard, settings.topic or driver.topic, self._hear, NEWEST)
 
     def _ear(self, driver: ValveTopic | VelocityTopic | ThrustTopic) -> tuple[type, Callable[[Any], None]]:
         if isinstance(driver, ValveTopic):
@@ -80,6 +87,17 @@ class AdapterNode(Node):
         if driver.stamped:
             return TwistStamped, lambda message: self._velocity(message.twist)
         return Twist, self._velocity
+
+    def _hear(self, message: Any) -> None:
+        if self._comes_from_our_plant():
+            self.get_logger().error(
+                f"{self._heard.topic_name} is what this robot's own driver publishes: its commands would come back as "
+                "new ones, and the watchdog would never act. Give the topic of the other controllers, such as "
+                "-p topic:=/fp_cmd_mux/autonomous_control_input."
+            )
+            self._request_exit(BAD_USAGE)
+            return
+        self._take(message)
 
     def _velocity(self, twist: Twist) -> None:
         self._pass_on(np.array([twist.linear.x, twist.angular.z]))
@@ -100,6 +118,12 @@ class AdapterNode(Node):
             self._refuse(f"{len(command)} values, not {len(self._robot.actuators.names)} finite ones")
             return
         self._publisher.publish(self._write.write(command, NO_STAMP))
+
+    def _comes_from_our_plant(self) -> bool:
+        """Looked up for every message: a driver may start later than we do."""
+        infos = self.get_publishers_info_by_topic(self._heard.topic_name)
+        ours = (PLANT, self.get_namespace())
+        return any((info.node_name, info.node_namespace) == ours for info in infos)
 
     def _refuse(self, what: str) -> None:
         self.get_logger().warning(f"command refused: {what}", throttle_duration_sec=1.0)

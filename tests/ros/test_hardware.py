@@ -262,10 +262,10 @@ def heard(neighbour: Neighbour):
     return listen
 
 
-def running(make, namespace: str, *parameters: str):
+def running(make, namespace: str, *parameters: str, request_exit=lambda _code: None):
     arguments = ["--ros-args", "-r", f"__ns:=/{namespace}"]
     arguments += [word for parameter in parameters for word in ("-p", parameter)]
-    node = make(lambda _code: None, cli_args=arguments)
+    node = make(request_exit, cli_args=arguments)
     return node, spinning(node, lambda error: pytest.fail(repr(error)))
 
 
@@ -333,6 +333,21 @@ def test_the_lab_s_controllers_command_our_valves_through_the_adapter(neighbour,
         found = [command for command in neighbour.commands if command.any()]
         assert all(command.tolist() == commanded for command in found)
         assert bool(found) is (commanded is not None)
+
+
+def test_an_adapter_that_hears_our_own_driver_passes_nothing_on_and_ends(neighbour) -> None:
+    """Both of one hardware file: what the driver publishes would come back as a command and feed its watchdog."""
+    ended: list[int] = []
+    file = "hardware:=zero_g_lab_valve_node"
+    node, spin = running(DriverNode, "floating_platform", file)
+    _adapter, spin_adapter = running(AdapterNode, "floating_platform", file, request_exit=ended.append)
+    with spin, spin_adapter:
+        until(lambda: bool(ended))
+        assert set(ended) == {2}
+        first = [1.0] + [0.0] * 7
+        until(lambda: neighbour.command(first) or bool(neighbour.applied and neighbour.applied[-1].any()))
+        until(lambda: not neighbour.applied[-1].any())
+        node.stop()
 
 
 @pytest.mark.parametrize("neighbour", ["kingfisher"], indirect=True)
