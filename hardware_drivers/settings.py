@@ -11,7 +11,6 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Actuators, load_robot
 
-
 # A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
 LONGEST_LINGER_S = 2.0
 

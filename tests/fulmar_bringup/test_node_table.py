@@ -177,6 +177,8 @@ def test_a_robot_that_only_motion_capture_sees_gets_an_estimator(hardware, estim
     [
         ({"fallback": "lqq"}, "Did you mean 'lqr'"),
         ({"fallback": "policy"}, "not known"),
+        ({"trusted_keys": ""}, "'trusted_keys' is empty"),
+        ({"trusted_keys": " "}, "'trusted_keys' is empty"),
         ({"max_run_time_s": -1.0}, "max_run_time_s"),
         ({"area": (1.0, 0.0, 0.0, 1.0)}, "x_min < x_max"),
     ],

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from nav_msgs.msg import Odometry
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_core.goal import goal_at
 from fulmar_ros.goal_messages import goal_message, obstacles_message
-from fulmar_ros.message_reader import MOST_OBSTACLES, MOST_WAYPOINTS, goal_of, obstacles_of, stamp_ns
+from fulmar_ros.message_reader import (
+    MOST_OBSTACLES,
+    MOST_WAYPOINTS,
+    goal_of,
+    measurement_of,
+    obstacles_of,
+    stamp_ns,
+)
 
 NAN = float("nan")
 COURSE = ((1.0, -2.0, 0.5), (0.0, 3.0, -3.0), (4.0, 4.0, 0.0))
@@ -121,6 +129,30 @@ def test_an_obstacle_without_sense_is_refused_with_a_reason(x, diameter, frame, 
     discs, problem = obstacles_of(message)
     assert discs is None
     assert reason in problem
+
+
+def test_as_many_obstacles_as_are_taken_come_with_the_marker_that_clears_the_view():
+    discs, problem = obstacles_of(obstacles_message(np.full((MOST_OBSTACLES, 3), 0.5), 7))
+    assert problem == ""
+    assert len(discs) == MOST_OBSTACLES
+    one_more = obstacles_message(np.full((MOST_OBSTACLES + 1, 3), 0.5), 7)
+    assert obstacles_of(one_more)[0] is None
+    assert obstacles_of(MarkerArray(markers=one_more.markers[1:]))[0] is None
+
+
+def test_a_frame_that_is_no_name_is_not_quoted_whole():
+    long = "f" * 1_000_000
+    goal, marks, odometry = (
+        goal_message(goal_at((1.0, 2.0, 0.3)), "goal_pose", 7),
+        obstacles_message(np.ones((1, 3)), 7),
+        Odometry(),
+    )
+    goal.header.frame_id = marks.markers[1].header.frame_id = long
+    odometry.header.frame_id = odometry.child_frame_id = long
+    found = measurement_of(odometry)
+    for told in (goal_of(goal)[1], obstacles_of(marks)[1], found.frame, found.child_frame):
+        assert "ffff" in told
+        assert len(told) < 200
 
 
 def test_an_absurd_number_of_obstacles_is_refused():

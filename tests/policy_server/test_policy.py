@@ -360,7 +360,9 @@ def test_golden_vectors_of_a_network_with_memory_are_compared_too(remembering, n
         Policy(remembering, ROLLING, ROLLING_TASK)
 
 
-def test_what_was_verified_is_what_runs_though_the_files_are_exchanged_afterwards(folder, tmp_path, monkeypatch):
+def test_what_was_verified_is_what_runs_though_the_files_are_exchanged_afterwards(
+    folder, tmp_path, monkeypatch
+):
     """A forger who writes as soon as the signature was checked: other network, golden vectors and passport, all hashes
     in order."""
     pytest.importorskip("cryptography")

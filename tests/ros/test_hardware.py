@@ -153,7 +153,14 @@ def test_a_driver_that_is_told_to_end_closes_its_valves_first(valves, number: st
 @pytest.mark.timeout(120)
 def test_a_node_that_was_started_by_nohup_goes_on_without_its_terminal(neighbour, tmp_path: Path) -> None:
     """Who says `nohup` means it."""
-    node = [sys.executable, "-m", "fulmar_ros.estop_node", "--ros-args", "-r", f"__ns:=/{neighbour.robot.name}"]
+    node = [
+        sys.executable,
+        "-m",
+        "fulmar_ros.estop_node",
+        "--ros-args",
+        "-r",
+        f"__ns:=/{neighbour.robot.name}",
+    ]
     started = subprocess.Popen(["nohup", *node], cwd=tmp_path, stdin=subprocess.DEVNULL)
     try:
         until(lambda: "estop" in neighbour.said, STARTS_S)

@@ -37,6 +37,24 @@ def test_names_have_to_be_the_robots_in_its_order(names, reason):
     assert name_problem(names, ("a", "b")) == reason
 
 
+def test_a_name_that_is_none_is_not_quoted_whole():
+    problem = name_problem(("a", "b" * 1_000_000), ("a", "b"))
+    assert problem is not None
+    assert "as actuator 2, must be 'b'" in problem
+    assert len(problem) < 200
+
+
+def test_names_that_are_too_many_are_not_looked_at():
+    class Many(tuple):
+        def __len__(self) -> int:
+            return 10**9
+
+        def __iter__(self):
+            raise AssertionError("copied")
+
+    assert name_problem(Many(), ("a", "b")) == "command names 1000000000 actuators, must name 2"
+
+
 def test_refusals_in_a_row_latch_with_the_last_reason():
     rejections = Rejections()
     assert [rejections.note("x") for _ in range(REJECTIONS_TO_LATCH - 1)] == [None] * (

@@ -93,7 +93,7 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         texts = {
             "policy": plan.policy,
             "fallback": guards.fallback or "",
-            "trusted_keys": str(Path(guards.trusted_keys).absolute()) if guards.trusted_keys else "",
+            "trusted_keys": "" if guards.trusted_keys is None else str(Path(guards.trusted_keys).absolute()),
         }
         parameters |= {key: text for key, text in texts.items() if text}
     if guards.max_run_time_s:

@@ -125,6 +125,10 @@ class Guards:
             raise ValueError(
                 f"'fallback' = '{self.fallback}' is not known.{did_you_mean(self.fallback, FALLBACKS)}"
             )
+        if self.trusted_keys is not None and not self.trusted_keys.strip():
+            raise ValueError(
+                "'trusted_keys' is empty: name a file or a folder, or leave it out, and any bundle runs."
+            )
         if self.max_run_time_s < 0.0:
             raise ValueError(f"'max_run_time_s' = {self.max_run_time_s:g} must not be negative.")
         if self.area != NO_AREA:

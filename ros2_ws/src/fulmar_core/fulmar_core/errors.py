@@ -1,9 +1,11 @@
-"""Errors that a person can act on, and the nearest-name helper they share."""
+"""Errors that a person can act on, and the helpers that they share."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+
+LONGEST_NAME = 64  # that is quoted whole [characters]
 
 
 class FulmarError(Exception):
@@ -64,3 +66,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     if near:
         return f" Did you mean '{near[0]}'?"
     return f" Known: {', '.join(known) if known else 'none'}."
+
+
+def shortened(text: str) -> str:
+    """A name from outside as messages for people quote it: what is too long to be a name is cut."""
+    return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"

@@ -81,7 +81,7 @@ class Golden:
 
 @dataclass(frozen=True)
 class Bundle:
-    """What the files of a bundle held when each was read, once: what is checked is what runs, whatever lies there now."""
+    """What the files of a bundle held when each was read, once: what is checked is what runs."""
 
     folder: Path  # where it was read from, for messages
     passport: Passport

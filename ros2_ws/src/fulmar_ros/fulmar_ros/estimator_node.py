@@ -16,6 +16,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import Imu
 
+from fulmar_core.errors import shortened
 from fulmar_core.estimation.estimator import Estimate, Estimator
 from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
@@ -84,7 +85,7 @@ class EstimatorNode(Node):
         frame = message.header.frame_id
         with self._lock:
             if frame not in FRAMES:
-                self._refuse(f"pose is in '{frame}', must be in one of {', '.join(FRAMES)}")
+                self._refuse(f"pose is in '{shortened(frame)}', must be in one of {', '.join(FRAMES)}")
                 return
             self._take(
                 self._estimator.see_pose(

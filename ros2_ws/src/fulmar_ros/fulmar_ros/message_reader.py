@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_core.errors import shortened
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.rotation import yaw_of
 from fulmar_core.safety.input_gate import Measurement
@@ -47,7 +48,8 @@ def measurement_of(message: Any) -> Measurement:
         np.array(turned(quat, (v.x, v.y, v.z))),
         np.array([w.x, w.y, w.z]),
     )
-    return Measurement(stamp_ns(message.header.stamp), message.header.frame_id, message.child_frame_id, state)
+    frame, child_frame = shortened(message.header.frame_id), shortened(message.child_frame_id)
+    return Measurement(stamp_ns(message.header.stamp), frame, child_frame, state)
 
 
 def goal_of(message: Any) -> tuple[Goal | None, str]:
@@ -61,7 +63,7 @@ def goal_of(message: Any) -> tuple[Goal | None, str]:
     """
     frame = BODY_FRAME if hasattr(message, "twist") else FRAME
     if message.header.frame_id != frame:
-        return None, f"goal frame is '{message.header.frame_id}', must be '{frame}'"
+        return None, f"goal frame is '{shortened(message.header.frame_id)}', must be '{frame}'"
     if hasattr(message, "twist"):
         targets = [(message.twist.linear.x, message.twist.linear.y, message.twist.angular.z)]
     elif hasattr(message, "point"):
@@ -98,12 +100,15 @@ def obstacles_of(message: Any) -> tuple[np.ndarray | None, str]:
     Returns:
         Discs, shape (m, 3), and an empty text, or None and what is wrong with the message.
     """
-    if len(message.markers) > MOST_OBSTACLES:
-        return None, f"{len(message.markers)} obstacles, at most {MOST_OBSTACLES}"
+    count = len(message.markers)
+    if count == MOST_OBSTACLES + 1:  # one of them may clear what a viewer drew before
+        count = sum(marker.action == ADD for marker in message.markers)
+    if count > MOST_OBSTACLES:
+        return None, f"{count} obstacles, at most {MOST_OBSTACLES}"
     discs = []
     for marker in message.markers:
         if marker.header.frame_id != FRAME:
-            return None, f"obstacle frame is '{marker.header.frame_id}', must be '{FRAME}'"
+            return None, f"obstacle frame is '{shortened(marker.header.frame_id)}', must be '{FRAME}'"
         if marker.action == ADD:
             discs.append((marker.pose.position.x, marker.pose.position.y, 0.5 * marker.scale.x))
     found = np.array(discs, dtype=float).reshape(-1, 3)

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fulmar_core.errors import shortened
+
 REJECTIONS_TO_LATCH = 3
 
 
@@ -28,12 +30,12 @@ def command_problem(command: np.ndarray, count: int) -> str | None:
 
 def name_problem(names: Sequence[str], needed: Sequence[str]) -> str | None:
     """What is wrong with the actuator names of a command, or None."""
-    if list(names) == list(needed):
-        return None
     if len(names) != len(needed):
         return f"command names {len(names)} actuators, must name {len(needed)}"
-    index = next(i for i, (a, b) in enumerate(zip(names, needed, strict=True)) if a != b)
-    return f"command names '{names[index]}' as actuator {index + 1}, must be '{needed[index]}'"
+    for number, (found, expected) in enumerate(zip(names, needed, strict=True), start=1):
+        if found != expected:
+            return f"command names '{shortened(found)}' as actuator {number}, must be '{expected}'"
+    return None
 
 
 class Rejections:
