@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from functools import partial
 from typing import Any
 
 # MAVLink 2 carries the messages that ArduPilot speaks today; pymavlink reads this when it is imported.
@@ -22,9 +23,11 @@ from fulmar_core.state import RigidBodyState
 from hardware_drivers.attitude import attitude
 from hardware_drivers.device_time import DeviceTime
 from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.ports import patiently, write_at_once
 from hardware_drivers.settings import MavlinkBoat
 from hardware_drivers.thrust import bounded
 
+Address = tuple[int, int]  # system and component
 HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
 HEARTBEAT_S = 1.0
 NO_CHANGE = 65535  # of a channel in an override
@@ -55,21 +58,16 @@ class MavlinkDriver:
         self._voltage, self._armed = "", False
         self._sending = threading.Lock()
         self._over = threading.Event()
+        self._link = _opened(settings, patience_s)
         try:
-            self._link: Any = mavutil.mavlink_connection(
-                settings.port,
-                baud=settings.baud,
-                source_system=HOST_SYSTEM,
-                source_component=HOST_COMPONENT,
-                autoreconnect=False,
-                robust_parsing=True,
-            )
-        except (OSError, ValueError) as error:
-            raise DeviceError(f"{settings.port} cannot be opened: {error}.") from error
-        if self._link.wait_heartbeat(timeout=patience_s) is None:
+            self._autopilot = _wait_for_autopilot(self._link, settings.port, patience_s)
+            self._prepare()
+        except OSError as error:
             self._link.close()
-            raise DeviceError(f"autopilot at {settings.port}: no heartbeat for {patience_s:g} s. Is it on?")
-        self._prepare()
+            raise DeviceError(f"autopilot at {settings.port}: the link is gone ({error}).") from error
+        except DeviceError:
+            self._link.close()
+            raise
         self._thread = threading.Thread(target=self._run, name="mavlink reader", daemon=True)
         self._thread.start()
         try:
@@ -127,14 +125,12 @@ class MavlinkDriver:
     def _command(self, number: int, first: float, second: float = 0.0) -> None:
         link = self._link
         with self._sending:
-            link.mav.command_long_send(
-                link.target_system, link.target_component, number, 0, first, second, 0.0, 0.0, 0.0, 0.0, 0.0
-            )
+            link.mav.command_long_send(*self._autopilot, number, 0, first, second, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def _drive(self, left: float, right: float) -> None:
         link, channels = self._link, override_of(self._settings, left, right)
         with self._sending:
-            link.mav.rc_channels_override_send(link.target_system, link.target_component, *channels)
+            link.mav.rc_channels_override_send(*self._autopilot, *channels)
 
     def _run(self) -> None:
         beaten = 0.0
@@ -149,7 +145,7 @@ class MavlinkDriver:
                 if not self._over.is_set():
                     self._feedback.fail(f"the link is gone ({error})")
                 return
-            if message is not None and message.get_srcSystem() == self._link.target_system:
+            if message is not None and _sender(message) == self._autopilot:
                 self._take(message, time.time_ns())
 
     def _beat(self) -> None:
@@ -176,6 +172,48 @@ class MavlinkDriver:
             if state is not None:
                 stamp_ns = self._time.stamp_ns(float(message.time_boot_ms), now_ns)
                 self._feedback.put(Report(state, self._imu, stamp_ns))
+
+
+def _opened(settings: MavlinkBoat, patience_s: float) -> Any:
+    """The link, as soon as it can be opened; raises DeviceError."""
+    try:
+        link = patiently(
+            lambda: mavutil.mavlink_connection(
+                settings.port,
+                baud=settings.baud,
+                source_system=HOST_SYSTEM,
+                source_component=HOST_COMPONENT,
+                autoreconnect=False,
+                robust_parsing=True,
+                retries=1,
+            ),
+            settings.port,
+            patience_s,
+        )
+    except ValueError as error:
+        raise DeviceError(f"{settings.port} cannot be opened: {error}.") from error
+    if isinstance(link, (mavutil.mavserial, mavutil.mavtcp)):
+        # Not pymavlink's own: on a serial port it waits for ever, and it keeps every failure to itself.
+        link.write = partial(write_at_once, link.fd)
+    return link
+
+
+def _wait_for_autopilot(link: Any, port: str, patience_s: float) -> Address:
+    """Who sends the first heartbeat of an autopilot; gimbals and ground stations have one, too.
+
+    Raises:
+        DeviceError: Nobody in time.
+    """
+    until = time.monotonic() + patience_s
+    while (left_s := until - time.monotonic()) > 0.0:
+        heartbeat = link.recv_match(type="HEARTBEAT", blocking=True, timeout=left_s)
+        if heartbeat is not None and heartbeat.autopilot != mavutil.mavlink.MAV_AUTOPILOT_INVALID:
+            return _sender(heartbeat)
+    raise DeviceError(f"autopilot at {port}: no heartbeat for {patience_s:g} s. Is it on?")
+
+
+def _sender(message: Any) -> Address:
+    return message.get_srcSystem(), message.get_srcComponent()
 
 
 def override_of(settings: MavlinkBoat, left: float, right: float) -> list[int]:

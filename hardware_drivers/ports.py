@@ -8,12 +8,13 @@ import socket
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import serial
 
 from fulmar_core.errors import ConfigError, DeviceError
 
+T = TypeVar("T")
 READ_S = 0.05  # how soon the reading thread hears that it shall end
 RETRY_S = 0.1
 CHUNK = 4096
@@ -48,9 +49,7 @@ class SerialPort:
 
     def write(self, data: bytes) -> None:
         """See `Port`."""
-        # Not pyserial's own: it waits, or counts a late thread as a late device. The descriptor never blocks.
-        if os.write(self._port.fileno(), data) < len(data):
-            raise OSError("it does not take any more bytes")
+        write_at_once(self._port.fileno(), data)
 
     def close(self) -> None:
         """See `Port`."""
@@ -100,7 +99,20 @@ def open_port(address: str, baud: int, patience_s: float) -> Port:
         ConfigError: The address is none.
         DeviceError: It cannot be opened.
     """
-    make = _maker(address, baud)
+    return patiently(_maker(address, baud), address, patience_s)
+
+
+def patiently(make: Callable[[], T], address: str, patience_s: float) -> T:
+    """Make a connection, and wait for its other end if that is not there yet.
+
+    Args:
+        make: Opens it; raises OSError.
+        address: For messages.
+        patience_s: Try again for so long [s].
+
+    Raises:
+        DeviceError: It cannot be opened.
+    """
     until = time.monotonic() + patience_s
     while True:
         try:
@@ -112,6 +124,15 @@ def open_port(address: str, baud: int, patience_s: float) -> Port:
                     f"{address} cannot be opened: {reason}. Is the device connected, and may this user use the port?"
                 ) from error
         time.sleep(RETRY_S)
+
+
+def write_at_once(descriptor: int, data: bytes) -> None:
+    """Send through a descriptor that never blocks; raises OSError when it does not take all of the bytes at once.
+
+    Not pyserial's own write: it waits, or counts a late thread as a late device.
+    """
+    if os.write(descriptor, data) < len(data):
+        raise OSError("it does not take any more bytes")
 
 
 def _maker(address: str, baud: int) -> Callable[[], Port]:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import socket
+import threading
 import time
+import tty
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink import mavutil
 
 from fulmar_core.errors import ConfigError, DeviceError
 from fulmar_core.planar import planar_of
@@ -45,8 +52,6 @@ def bench(kind, tmp_path, unused_udp_port):
 
 @pytest.fixture
 def unused_udp_port() -> int:
-    import socket
-
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
@@ -132,6 +137,93 @@ def test_nobody_at_the_other_end_is_refused_with_a_hint(unused_udp_port):
         )
 
 
+@pytest.fixture
+def cable(tmp_path) -> Iterator[Callable[[], None]]:
+    """Serial port of an autopilot that reports from the first moment on, and never reads; plugged in when called."""
+    host, device = pty.openpty()
+    tty.setraw(device)
+    over = threading.Event()
+    mav = mavutil.mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    said = (
+        mav.heartbeat_encode(11, mavutil.mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, 0, 0, 4),
+        mav.attitude_encode(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        mav.local_position_ned_encode(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    )
+
+    def report() -> None:
+        while not over.wait(0.02):
+            os.write(host, b"".join(message.pack(mav) for message in said))
+
+    thread = threading.Thread(target=report)
+
+    def plug() -> None:
+        (tmp_path / "serial").symlink_to(os.ttyname(device))
+        thread.start()
+
+    yield plug
+    over.set()
+    if thread.ident:
+        thread.join()
+    os.close(host)
+    os.close(device)
+
+
+def test_a_serial_autopilot_is_waited_for_and_a_cable_that_takes_no_more_is_an_error_and_no_wait(
+    cable, tmp_path
+):
+    threading.Timer(0.5, cable).start()
+    boat = MavlinkBoat("mavlink_boat", str(tmp_path / "serial"), THRUST)
+    driver = MavlinkDriver(load_robot("kingfisher"), boat, patience_s=5.0)
+    began = time.monotonic()
+    with pytest.raises(OSError, match=r"more bytes|unavailable"):
+        for _ in range(5000):
+            driver.step(np.zeros(2))
+    assert time.monotonic() - began < 5.0
+    driver.close()
+
+
+def test_a_serial_port_that_never_comes_is_told_with_a_hint(tmp_path):
+    boat = MavlinkBoat("mavlink_boat", str(tmp_path / "none"), THRUST)
+    with pytest.raises(DeviceError, match=r"none cannot be opened: .*Is the device connected"):
+        MavlinkDriver(load_robot("kingfisher"), boat, patience_s=0.2)
+
+
+@pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
+def test_only_the_autopilot_itself_says_that_it_is_armed(bench, driver):
+    """Not a gimbal of the same system, whose heartbeats come in between."""
+    host, _, number = bench.device.address.removeprefix("udpin:").partition(":")
+    gimbal = mavutil.mavlink.MAVLink(None, srcSystem=1, srcComponent=154)
+    until(lambda: driver.step(np.zeros(2)) and driver.health()["armed"] == "true")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        for _ in range(20):
+            beat = gimbal.heartbeat_encode(26, mavutil.mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4)
+            other.sendto(beat.pack(gimbal), (host, int(number)))
+            time.sleep(0.01)
+            assert driver.health()["armed"] == "true"
+
+
+def test_a_gimbal_alone_is_no_autopilot(unused_udp_port):
+    gimbal = mavutil.mavlink_connection(
+        f"udpout:127.0.0.1:{unused_udp_port}", source_system=1, source_component=154
+    )
+    over = threading.Event()
+
+    def beat() -> None:
+        while not over.wait(0.02):
+            gimbal.mav.heartbeat_send(26, mavutil.mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4)
+
+    thread = threading.Thread(target=beat)
+    thread.start()
+    boat = MavlinkBoat("mavlink_boat", f"udpin:127.0.0.1:{unused_udp_port}", THRUST)
+    try:
+        with pytest.raises(DeviceError, match="no heartbeat"):
+            MavlinkDriver(load_robot("kingfisher"), boat, patience_s=0.3)
+    finally:
+        over.set()
+        thread.join()
+        gimbal.close()
+
+
 def test_an_address_that_is_none_is_refused():
     with pytest.raises(ConfigError, match="tcp://host:port"):
         open_port("tcp://host", 0, 0.0)
@@ -186,8 +278,6 @@ def test_an_estimate_that_is_not_finite_or_not_of_one_time_is_none(spoilt):
 @pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
 def test_noise_beside_the_autopilot_changes_nothing(bench, driver):
     """Random datagrams, and cut and spoilt ones of the autopilot's own, from another sender."""
-    import socket
-
     rng = np.random.default_rng(1)
     host, _, number = bench.device.address.removeprefix("udpin:").partition(":")
     packet = bytes(
