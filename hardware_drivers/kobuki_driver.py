@@ -24,10 +24,12 @@ from hardware_drivers.kobuki_protocol import (
 )
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import Kobuki
+from hardware_drivers.slowdown import slowdown
 from hardware_drivers.wheel_odometry import WheelOdometry
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous
 STOPS = 5  # the stop goes out this often on the way out
+STOP_PERIOD_S = 0.02  # between commands while it slows down
 ABSENT = np.full(3, np.nan)  # the base has no accelerometer
 
 
@@ -50,6 +52,7 @@ class KobukiDriver:
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
         self._begin: tuple[float, float, float] | None = None
         self._core: CoreSensors | None = None
+        self._sent = robot.actuators.safe_command
         self._port = open_port(settings.port, settings.baud, patience_s)
         self._reader = Reader(self._port, self._take, self._feedback.fail)
         try:
@@ -69,14 +72,15 @@ class KobukiDriver:
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Send a command, or a stop where something is in the way; see `Backend.step`."""
-        allowed = self._allowed(np.asarray(command, dtype=float))
-        self._port.write(base_control(float(allowed[0]), float(allowed[1])))
-        return self._feedback.sample(allowed)
+        return self._feedback.sample(self._send(command))
 
     def make_safe(self) -> None:
-        """Stop."""
+        """Slow down as fast as the wheels may, and stop."""
+        for command in slowdown(self.robot.actuators, self._sent, STOP_PERIOD_S):
+            self._send(command)
+            time.sleep(STOP_PERIOD_S)
         for _ in range(STOPS):
-            self._port.write(base_control(0.0, 0.0))
+            self._send(self.robot.actuators.safe_command)
 
     def close(self) -> None:
         """Stop, and let go of the port."""
@@ -92,15 +96,22 @@ class KobukiDriver:
         core = self._core
         if core is None:
             return {}
-        warning = _touched(core) or (f"battery at {core.battery:.1f} V" if core.battery < LOW_BATTERY else "")
+        warning = _touched(core) or _strained(core)
         return {
             "battery_v": f"{core.battery:.1f}",
             "bumpers": str(core.bumpers),
             "cliffs": str(core.cliffs),
             "wheel_drops": str(core.wheel_drops),
+            "overcurrent": str(core.overcurrent),
             "lost_bytes": str(self._decoder.lost),
             "warning": warning,
         }
+
+    def _send(self, command: np.ndarray) -> np.ndarray:
+        """Send what is allowed of a command, shape (2,), and return it."""
+        self._sent = self._allowed(np.asarray(command, dtype=float))
+        self._port.write(base_control(float(self._sent[0]), float(self._sent[1])))
+        return self._sent
 
     def _allowed(self, command: np.ndarray) -> np.ndarray:
         core = self._core
@@ -139,3 +150,9 @@ def _touched(core: CoreSensors) -> str:
     if core.bumpers:
         return "a bumper is pressed: the base only backs off"
     return ""
+
+
+def _strained(core: CoreSensors) -> str:
+    if core.overcurrent:
+        return "a wheel draws too much current: is it blocked?"
+    return f"battery at {core.battery:.1f} V" if core.battery < LOW_BATTERY else ""

@@ -10,6 +10,7 @@ import numpy as np
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
+from hardware_drivers.slowdown import slowdown
 
 Send = Callable[[np.ndarray], None]
 STOPS = 5
@@ -27,7 +28,8 @@ class TopicDriver:
             robot: The robot.
             send: Publishes a command within the actuators' limits.
         """
-        self.robot, self._send = robot, send
+        self.robot, self._publish = robot, send
+        self._sent = robot.actuators.safe_command
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Begin with the safe command; see `Backend.reset`."""
@@ -39,9 +41,10 @@ class TopicDriver:
         return Sample(None, None, None)
 
     def make_safe(self) -> None:
-        """Send the safe command several times, with time for each to arrive."""
-        for _ in range(STOPS):
-            self._send(self.robot.actuators.safe_command)
+        """Let wheels slow down, and send the safe command several times, with time for each to arrive."""
+        ramp = slowdown(self.robot.actuators, self._sent, STOP_PERIOD_S)
+        for command in (*ramp, *[self.robot.actuators.safe_command] * STOPS):
+            self._send(command)
             time.sleep(STOP_PERIOD_S)
 
     def close(self) -> None:
@@ -51,6 +54,10 @@ class TopicDriver:
     def health(self) -> dict[str, str]:
         """Nothing is known; see `Device.health`."""
         return {}
+
+    def _send(self, command: np.ndarray) -> None:
+        self._publish(command)
+        self._sent = command
 
 
 class ValveTopicDriver(TopicDriver):

@@ -27,7 +27,7 @@ class KobukiEmulator:
     """Drives by base control alone; reports core sensors and gyroscope fifty times a second.
 
     Attributes:
-        bumpers, cliffs, wheel_drops: Bits that the next reports carry.
+        bumpers, cliffs, wheel_drops, overcurrent: Bits that the next reports carry.
         mute: Report nothing, as a base whose cable is cut.
     """
 
@@ -46,7 +46,7 @@ class KobukiEmulator:
         self._began_s: float | None = None
         self._angle = 0.0  # that the gyroscope sums up [deg]
         self._rng = np.random.default_rng(seed)
-        self.bumpers = self.cliffs = self.wheel_drops = 0
+        self.bumpers = self.cliffs = self.wheel_drops = self.overcurrent = 0
         self.mute = False
 
     def command(self, now_s: float) -> np.ndarray:
@@ -79,7 +79,7 @@ class KobukiEmulator:
         left, right = (round(wheel * COUNTS_PER_RAD) % 65536 for wheel in self._wheels())
         core = struct.pack(
             "<BBHBBBHHbbBBBB", 1, 15, round(1e3 * (now_s - self._began_s)) % 65536,
-            self.bumpers, self.wheel_drops, self.cliffs, left, right, 0, 0, 0, 0, BATTERY, 0,
+            self.bumpers, self.wheel_drops, self.cliffs, left, right, 0, 0, 0, 0, BATTERY, self.overcurrent,
         )  # fmt: skip
         inertia = struct.pack("<BBhhxxx", 4, 7, round(100.0 * angle), round(100.0 * rate))
         dock = bytes([3, 3, 0, 0, 0])

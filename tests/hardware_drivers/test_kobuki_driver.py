@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 import numpy as np
@@ -94,6 +95,45 @@ def test_a_wheel_in_the_air_stops_everything(bench, driver):
     bench.device.wheel_drops = 1
     until(lambda: not driver.step(np.array([-0.3, 0.0])).applied.any())
     assert "hangs in the air" in driver.health()["warning"]
+
+
+def test_a_base_slows_down_as_fast_as_it_may_and_no_faster(bench, driver):
+    """By what the base understood, while its driver makes it safe from nearly full speed."""
+    drive(driver, (0.4, 0.0), 0.3)
+    seen, over = [], threading.Event()
+
+    def watch() -> None:
+        while not over.wait(0.002):
+            seen.append((time.monotonic(), bench.command[0]))
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    driver.make_safe()
+    until(lambda: not bench.command.any())
+    over.set()
+    watcher.join()
+    speeds = np.array([speed for _, speed in seen])
+    slew = bench.robot.actuators.response.slew[0]
+    assert (np.diff(speeds) <= 0.0).all()
+    assert len(set(speeds.tolist())) > 10
+    ended = next(at for at, speed in seen if speed == 0.0)
+    assert 0.3 / slew < ended - seen[0][0] < 0.4 / slew + 0.3
+
+
+def test_what_touches_stops_it_at_once(bench, driver):
+    drive(driver, (0.4, 0.0), 0.3)
+    bench.device.wheel_drops = 1
+    until(lambda: "hangs" in driver.health()["warning"])
+    stopping = threading.Thread(target=driver.make_safe)
+    stopping.start()
+    until(lambda: not bench.command.any(), timeout_s=0.2)
+    stopping.join()
+
+
+def test_a_wheel_that_draws_too_much_current_is_told(bench, driver):
+    bench.device.overcurrent = 1
+    until(lambda: "too much current" in driver.health()["warning"])
+    assert driver.health()["overcurrent"] == "1"
 
 
 def test_closing_stops_the_base(bench, driver):

@@ -37,6 +37,17 @@ def test_stops_come_one_by_one_and_the_last_has_time_to_arrive():
     assert not any(command.any() for _, command, _ in listener.heard[1:])
 
 
+def test_wheels_of_another_node_slow_down_first():
+    listener, base = Listener(), load_robot("turtlebot2")
+    driver = TopicDriver(base, listener)
+    driver.step(np.array([0.3, -0.6]))
+    driver.make_safe()
+    sent = np.array([command for _, command, _ in listener.heard])
+    most = np.asarray(base.actuators.response.slew) * 0.02 + 1e-9
+    assert (np.abs(np.diff(sent, axis=0)) <= most).all()
+    assert not sent[-STOPS:].any()
+
+
 def test_at_the_end_the_valves_close_first_and_the_platform_is_let_down_later():
     listener = Listener()
     driver = ValveTopicDriver(ROBOT, listener, bearing_on=True, linger_s=0.3)
