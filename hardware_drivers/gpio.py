@@ -76,7 +76,7 @@ def line_of(text: str) -> int | str:
 def request_of_file(address: str, *, consumer: str, config: Mapping[Any, gpiod.LineSettings]) -> LineRequest:
     """`gpiod.request_lines` for a chip that is a file.
 
-    Its bytes stay as they are when the process that set them dies, as the pins of most chips do; none promises it.
+    Its bytes stay as they are when the process that set them dies, as the pins of many chips do; none promises it.
     """
     return FileLines(Path(address.removeprefix(FILE_CHIP)), config)
 
