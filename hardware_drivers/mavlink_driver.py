@@ -18,11 +18,8 @@ from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
 from fulmar_core.robot import Robot
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.state import RigidBodyState
-from hardware_drivers.attitude import attitude
-from hardware_drivers.device_time import DeviceTime
-from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.feedback import Feedback
+from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.ports import patiently, write_at_once
 from hardware_drivers.settings import MavlinkBoat
 from hardware_drivers.thrust import bounded
@@ -31,10 +28,8 @@ Address = tuple[int, int]  # system and component
 HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
 HEARTBEAT_S = 1.0
 NO_CHANGE = 65535  # of a channel in an override
-MILLI_G = 9.80665e-3  # [m/s²]
 STOPS = 5
 RATES_HZ = {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 50.0, "RAW_IMU": 25.0}
-FRESH_MS = 200.0  # an attitude that differs more in time says nothing about a position
 
 
 class MavlinkDriver:
@@ -50,12 +45,8 @@ class MavlinkDriver:
             DeviceError: Nobody answers.
         """
         self.robot, self._settings = robot, settings
-        self._shift = np.zeros(3)  # from where the autopilot's frame begins to where `odom` does [m]
         self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
-        self._time = DeviceTime()
-        self._attitude: Any = None
-        self._imu: ImuSample | None = None
-        self._voltage, self._armed = "", False
+        self._heard = Telemetry()
         self._sending = threading.Lock()
         self._over = threading.Event()
         self._link = _opened(settings, patience_s)
@@ -78,8 +69,8 @@ class MavlinkDriver:
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Take the place of the episode for where the boat is, and arm; see `Backend.reset`."""
-        here = self._feedback.newest.odometry.position_in_world - self._shift
-        self._shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
+        here = self._feedback.newest.odometry.position_in_world - self._heard.shift
+        self._heard.shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
         self._drive(0.0, 0.0)
         self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         return self.step(self.robot.actuators.safe_command)
@@ -109,8 +100,9 @@ class MavlinkDriver:
 
     def health(self) -> dict[str, str]:
         """Battery and arming; see `Device.health`."""
-        warning = "" if self._armed else "the autopilot is not armed: its propellers stand"
-        return {"battery_v": self._voltage, "armed": str(self._armed).lower(), "warning": warning}
+        heard = self._heard
+        warning = "" if heard.armed else "the autopilot is not armed: its propellers stand"
+        return {"battery_v": heard.voltage, "armed": str(heard.armed).lower(), "warning": warning}
 
     def _prepare(self) -> None:
         mavlink = mavutil.mavlink
@@ -141,12 +133,14 @@ class MavlinkDriver:
                     beaten = now
                     self._beat()
                 message = self._link.recv_match(blocking=True, timeout=0.05)
-            except (OSError, mavutil.mavlink.MAVError) as error:
+                if message is not None and _sender(message) == self._autopilot:
+                    report = self._heard.take(message, time.time_ns())
+                    if report is not None:
+                        self._feedback.put(report)
+            except Exception as error:  # noqa: BLE001 - a thread that died in silence would look like a silent boat
                 if not self._over.is_set():
-                    self._feedback.fail(f"the link is gone ({error})")
+                    self._feedback.fail(f"the link is gone ({type(error).__name__}: {error})")
                 return
-            if message is not None and _sender(message) == self._autopilot:
-                self._take(message, time.time_ns())
 
     def _beat(self) -> None:
         mavlink = mavutil.mavlink
@@ -154,24 +148,6 @@ class MavlinkDriver:
             self._link.mav.heartbeat_send(
                 mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 0
             )
-
-    def _take(self, message: Any, now_ns: int) -> None:
-        kind = message.get_type()
-        if kind == "ATTITUDE":
-            self._attitude = message
-        elif kind == "RAW_IMU":
-            ahead, right, down = message.xacc, message.yacc, message.zacc
-            turn = 1e-3 * np.array([message.xgyro, -message.ygyro, -message.zgyro])
-            self._imu = ImuSample(MILLI_G * np.array([ahead, -right, -down]), turn)
-        elif kind == "SYS_STATUS":
-            self._voltage = f"{1e-3 * message.voltage_battery:.1f}"
-        elif kind == "HEARTBEAT":
-            self._armed = bool(message.base_mode & mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
-        elif kind == "LOCAL_POSITION_NED" and self._attitude is not None:
-            state = state_of(message, self._attitude, self._shift)
-            if state is not None:
-                stamp_ns = self._time.stamp_ns(float(message.time_boot_ms), now_ns)
-                self._feedback.put(Report(state, self._imu, stamp_ns))
 
 
 def _opened(settings: MavlinkBoat, patience_s: float) -> Any:
@@ -233,34 +209,3 @@ def override_of(settings: MavlinkBoat, left: float, right: float) -> list[int]:
     for channel, share in shares.items():
         channels[channel - 1] = settings.trim_us + round(settings.span_us * share)
     return channels
-
-
-def state_of(position: Any, attitude_of: Any, shift: np.ndarray) -> RigidBodyState | None:
-    """State in ROS' frames: from north-east-down and starboard to east-north-up and port.
-
-    Args:
-        position: LOCAL_POSITION_NED.
-        attitude_of: ATTITUDE.
-        shift: To add to the place, shape (3,) [m].
-
-    Returns:
-        The state; None where the two are of different times, or not finite.
-    """
-    if abs(position.time_boot_ms - attitude_of.time_boot_ms) > FRESH_MS:
-        return None
-    values = np.array(
-        [
-            position.x, position.y, position.z, position.vx, position.vy, position.vz,
-            attitude_of.roll, attitude_of.pitch, attitude_of.yaw,
-            attitude_of.rollspeed, attitude_of.pitchspeed, attitude_of.yawspeed,
-        ]
-    )  # fmt: skip
-    if not np.isfinite(values).all():
-        return None
-    north, east, down, vn, ve, vd, roll, pitch, yaw, p, q, r = values.tolist()
-    return RigidBodyState(
-        np.array([east, north, -down]) + shift,
-        attitude(roll, pitch, yaw),
-        np.array([ve, vn, -vd]),
-        np.array([p, -q, -r]),
-    )

@@ -154,8 +154,8 @@ class Reader:
 
         Args:
             port: Where to read.
-            take: Told the bytes.
-            on_end: Told why the port is gone, once; not at `stop`.
+            take: Told the bytes; whatever it raises ends the reading, as a port that is gone does.
+            on_end: Told why nothing will be read any more, once; not at `stop`.
         """
         self._port, self._take, self._on_end = port, take, on_end
         self._over = threading.Event()
@@ -174,8 +174,12 @@ class Reader:
                 if not self._over.is_set():
                     self._on_end(f"the connection is gone ({error})")
                 return
-            if data:
-                self._take(data)
+            try:
+                if data:
+                    self._take(data)
+            except Exception as error:  # noqa: BLE001 - a thread that died in silence would look like a silent device
+                self._on_end(f"what it said cannot be read ({type(error).__name__}: {error})")
+                return
 
     def stop(self) -> None:
         """End the thread, then close the port."""

@@ -20,7 +20,8 @@ from fulmar_core.errors import ConfigError, DeviceError
 from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
 from hardware_drivers.kingfisher_driver import KingfisherDriver
-from hardware_drivers.mavlink_driver import NO_CHANGE, MavlinkDriver, override_of, state_of
+from hardware_drivers.mavlink_driver import NO_CHANGE, MavlinkDriver, override_of
+from hardware_drivers.mavlink_telemetry import state_of
 from hardware_drivers.ports import open_port
 from hardware_drivers.settings import KingfisherNmea, MavlinkBoat, Thrust
 from sim_nodes.emulators.ardupilot import ArdupilotEmulator

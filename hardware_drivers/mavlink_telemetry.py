@@ -1,0 +1,93 @@
+"""What an ArduPilot boat says of itself, in ROS' frames; no link of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.state import RigidBodyState
+from hardware_drivers.attitude import attitude
+from hardware_drivers.device_time import DeviceTime
+from hardware_drivers.feedback import Report
+
+MILLI_G = 9.80665e-3  # [m/s²]
+FRESH_MS = 200.0  # an attitude that differs more in time says nothing about a position
+ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+
+
+class Telemetry:
+    """Puts an autopilot's messages together to reports.
+
+    Attributes:
+        shift: From where the autopilot's frame begins to where `odom` does, shape (3,) [m].
+        voltage: Of the battery, as text [V]; empty as long as it is not known.
+        armed: Whether the propellers may turn.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing heard."""
+        self.shift = np.zeros(3)
+        self.voltage, self.armed = "", False
+        self._time = DeviceTime()
+        self._attitude: Any = None
+        self._imu: ImuSample | None = None
+
+    def take(self, message: Any, now_ns: int) -> Report | None:
+        """Take a message of the autopilot.
+
+        Args:
+            message: As pymavlink decodes it.
+            now_ns: When it came, since the epoch [ns].
+
+        Returns:
+            A report, with a position that belongs to a known attitude; most messages give none.
+        """
+        kind = message.get_type()
+        if kind == "ATTITUDE":
+            self._attitude = message
+        elif kind == "RAW_IMU":
+            ahead, right, down = message.xacc, message.yacc, message.zacc
+            turn = 1e-3 * np.array([message.xgyro, -message.ygyro, -message.zgyro])
+            self._imu = ImuSample(MILLI_G * np.array([ahead, -right, -down]), turn)
+        elif kind == "SYS_STATUS":
+            self.voltage = f"{1e-3 * message.voltage_battery:.1f}"
+        elif kind == "HEARTBEAT":
+            self.armed = bool(message.base_mode & ARMED)
+        elif kind == "LOCAL_POSITION_NED" and self._attitude is not None:
+            state = state_of(message, self._attitude, self.shift)
+            if state is not None:
+                return Report(state, self._imu, self._time.stamp_ns(float(message.time_boot_ms), now_ns))
+        return None
+
+
+def state_of(position: Any, attitude_of: Any, shift: np.ndarray) -> RigidBodyState | None:
+    """State in ROS' frames: from north-east-down and starboard to east-north-up and port.
+
+    Args:
+        position: LOCAL_POSITION_NED.
+        attitude_of: ATTITUDE.
+        shift: To add to the place, shape (3,) [m].
+
+    Returns:
+        The state; None where the two are of different times, or not finite.
+    """
+    if abs(position.time_boot_ms - attitude_of.time_boot_ms) > FRESH_MS:
+        return None
+    values = np.array(
+        [
+            position.x, position.y, position.z, position.vx, position.vy, position.vz,
+            attitude_of.roll, attitude_of.pitch, attitude_of.yaw,
+            attitude_of.rollspeed, attitude_of.pitchspeed, attitude_of.yawspeed,
+        ]
+    )  # fmt: skip
+    if not np.isfinite(values).all():
+        return None
+    north, east, down, vn, ve, vd, roll, pitch, yaw, p, q, r = values.tolist()
+    return RigidBodyState(
+        np.array([east, north, -down]) + shift,
+        attitude(roll, pitch, yaw),
+        np.array([ve, vn, -vd]),
+        np.array([p, -q, -r]),
+    )

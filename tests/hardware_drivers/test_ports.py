@@ -1,0 +1,56 @@
+"""The thread that reads from a device: however it ends, somebody is told."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from hardware_drivers.ports import Reader, TcpPort
+from tests.hardware_drivers.bench import until
+
+Read = Callable[[Callable[[bytes], None]], tuple[socket.socket, list[str]]]
+
+
+@pytest.fixture
+def reading() -> Iterator[Read]:
+    """Starts a reader at the end of a TCP connection; gives the device's end, and what the reader said at its own."""
+    made: list[Reader] = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def begin(take: Callable[[bytes], None]) -> tuple[socket.socket, list[str]]:
+            ends: list[str] = []
+            port = TcpPort("127.0.0.1", server.getsockname()[1])
+            device, _ = server.accept()
+            made.append(Reader(port, take, ends.append))
+            return device, ends
+
+        yield begin
+        for reader in made:
+            reader.stop()
+
+
+def test_bytes_are_handed_on(reading):
+    heard = []
+    device, ends = reading(heard.append)
+    device.sendall(b"hello")
+    until(lambda: b"".join(heard) == b"hello")
+    assert not ends
+
+
+def test_a_connection_that_ends_is_told_once(reading):
+    device, ends = reading(lambda _data: None)
+    device.close()
+    until(lambda: bool(ends))
+    assert ends == ["the connection is gone (the other side closed the connection)"]
+
+
+def test_what_cannot_be_taken_is_told_and_does_not_end_the_reading_in_silence(reading):
+    def take(_data: bytes) -> None:
+        raise ZeroDivisionError("by a decoder")
+
+    device, ends = reading(take)
+    device.sendall(b"x")
+    until(lambda: bool(ends))
+    assert ends == ["what it said cannot be read (ZeroDivisionError: by a decoder)"]
