@@ -5,26 +5,37 @@ Handlers are called directly, with real messages, on real nodes: DDS would only 
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from collections.abc import Iterator
+from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 from nav_msgs.msg import Odometry, Path
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState, Joy
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_core.robot import load_robot
 from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.estimator_node import EstimatorNode
 from fulmar_ros.estop_node import EstopNode
+from fulmar_ros.goal_node import GoalNode
+from fulmar_ros.message_reader import goal_of
 from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.recorder_node import RecorderNode
 from fulmar_ros.teleop_node import TeleopNode
+from hardware_drivers.adapter_node import AdapterNode
 from tests.ros.neighbour import NAMESPACE, Neighbour
+from tests.states import planar_state
 
 FUZZ = settings(
     max_examples=60,
@@ -58,6 +69,14 @@ def odometries(draw: st.DrawFn) -> Odometry:
     fill(draw, message.pose.pose.position, message.pose.pose.orientation)
     fill(draw, message.twist.twist.linear, message.twist.twist.angular)
     return message
+
+
+@st.composite
+def good_odometries(draw: st.DrawFn) -> Odometry:
+    """Such as a plant sends, in an order of its own."""
+    at = [draw(st.floats(-5.0, 5.0)) for _ in range(3)]
+    writer = OdometryWriter(load_robot("floating_platform").sensors.odometry)
+    return writer.write(planar_state(*at), draw(st.integers(1, 10**10)))
 
 
 @st.composite
@@ -226,3 +245,119 @@ def test_estimator_e_stop_and_teleoperation_survive_anything(
     for odometry in published:
         twist = odometry.twist.twist
         assert np.isfinite([twist.linear.x, twist.linear.y, twist.angular.z]).all()
+
+
+@pytest.fixture(params=["lab_pose", "circle", "velocity_steps"])
+def goals(neighbour: Neighbour, request: pytest.FixtureRequest) -> Iterator[GoalNode]:
+    words = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", f"goals:={request.param}", "-p", "stay:=true"]
+    node = GoalNode(lambda _code: None, cli_args=words)
+    yield node
+    node.destroy_node()
+
+
+@given(messages=st.lists(odometries() | good_odometries(), max_size=10), lockstep=st.booleans())
+@FUZZ
+def test_a_goal_node_tells_nothing_but_finite_goals(
+    goals: GoalNode, messages: list[Odometry], lockstep: bool
+) -> None:
+    told: list[object] = []
+    goals._publisher.publish = told.append  # type: ignore[method-assign]
+    goals._settings = dataclasses.replace(goals._settings, lockstep=lockstep)
+    for message in messages:
+        with np.errstate(all="ignore"):
+            goals._on_odometry(message)
+            goals._watch()
+    for message in told:
+        goal, problem = goal_of(message)
+        assert goal is not None, problem
+
+
+ADAPTERS = {
+    "zero_g_lab_valve_node": "floating_platform",
+    "turtlebot2_kobuki_node": "turtlebot2",
+    "kingfisher_action": "kingfisher",
+}
+short_integers = st.integers(-(2**15), 2**15 - 1)
+arrays = {
+    "zero_g_lab_valve_node": st.builds(
+        Int16MultiArray,
+        data=st.lists(short_integers, max_size=12) | st.lists(st.integers(0, 1), min_size=9, max_size=9),
+    ),
+    "turtlebot2_kobuki_node": twists().map(lambda message: message.twist),
+    "kingfisher_action": st.builds(
+        Float32MultiArray, data=st.lists(st.floats(width=32, allow_nan=True), max_size=4)
+    ),
+}
+
+
+@pytest.fixture(params=list(ADAPTERS))
+def adapter(neighbour: Neighbour, request: pytest.FixtureRequest) -> Iterator[tuple[str, AdapterNode]]:
+    words = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", f"hardware:={request.param}"]
+    node = AdapterNode(lambda _code: None, cli_args=words)
+    yield request.param, node
+    node.destroy_node()
+
+
+@given(data=st.data())
+@FUZZ
+def test_an_adapter_passes_on_nothing_but_finite_commands_of_the_right_length(
+    adapter: tuple[str, AdapterNode], data: st.DataObject
+) -> None:
+    hardware, node = adapter
+    actuators = load_robot(ADAPTERS[hardware]).actuators
+    passed: list[object] = []
+    node._publisher.publish = passed.append  # type: ignore[method-assign]
+    for message in data.draw(st.lists(arrays[hardware], max_size=6)):
+        node._hear(message)
+    for command in passed:
+        if isinstance(command, TwistStamped):
+            values = [command.twist.linear.x, command.twist.angular.z]
+        else:
+            assert tuple(command.name) == actuators.names  # type: ignore[attr-defined]
+            values = list(command.effort)  # type: ignore[attr-defined]
+        assert np.isfinite(values).all()
+        assert len(values) == len(actuators.names)
+        assert not actuators.binary or set(values) <= {0.0, 1.0}
+
+
+@pytest.mark.parametrize("mode", ["whole", "ring"])
+def test_a_recorder_keeps_any_bytes_and_loses_none(
+    mode: str, neighbour: Neighbour, tmp_path: FilePath
+) -> None:
+    """Foreign bytes on every topic; the ring looks into some of them for faults."""
+    words = [
+        "--ros-args",
+        "-r",
+        f"__ns:={NAMESPACE}",
+        "-p",
+        f"directory:={tmp_path / 'bag'}",
+        "-p",
+        f"mode:={mode}",
+    ]
+    node = RecorderNode(lambda _code: None, cli_args=words)
+    topics, count = sorted(node._topics.values()), 0
+    error = bytes(serialize_message(diagnostics_of(f"{NAMESPACE[1:]}: plant", DiagnosticStatus.ERROR)))
+
+    @given(
+        st.sampled_from(topics), st.binary(max_size=200) | st.tuples(st.integers(0, 200), st.integers(0, 255))
+    )
+    @FUZZ
+    def hear(topic: str, data: bytes | tuple[int, int]) -> None:
+        nonlocal count
+        if isinstance(data, tuple):  # a real one with a byte changed
+            spoilt = bytearray(error)
+            spoilt[data[0] % len(spoilt)] = data[1]
+            data = bytes(spoilt)
+        node._keep(topic)(data)
+        count += 1
+
+    hear()
+    node._keep("/diagnostics")(error)
+    assert node.stop() == 0
+    node.destroy_node()
+    with next((tmp_path / "bag").glob("*.mcap")).open("rb") as stream:
+        assert make_reader(stream).get_summary().statistics.message_count >= count + 1
+
+
+def diagnostics_of(name: str, level: bytes) -> DiagnosticArray:
+    return DiagnosticArray(status=[DiagnosticStatus(name=name, level=level, message="x")])

@@ -103,15 +103,17 @@ class GoalNode(Node):
         measurement = measurement_of(message)
         with self._lock:
             problem = self._gate.problem(measurement)
-            if self._over or (problem and not self._settings.lockstep):
+            if self._over or problem:
                 self._problem = problem or ""
+                if self._settings.lockstep and self._told is not None and not self._over:
+                    self._tell(self._told, measurement.stamp_ns)  # others wait for a goal with this very stamp
                 return
             was_done = self._sequence.done
             self._resume(measurement)
             goal = self._sequence.step(planar_of(measurement.state), self._time_ns / 1e9)
             self._tell_progress()
             if self._is_due(goal):
-                self._tell(goal)
+                self._tell(goal, measurement.stamp_ns)
             if self._sequence.done and not was_done:
                 self._over = not self._settings.stay
                 self.get_logger().info(self._farewell())
@@ -136,9 +138,8 @@ class GoalNode(Node):
             return False
         return self._sequence.done or self._time_ns - self._told_at_ns >= self._period_ns
 
-    def _tell(self, goal: Goal) -> None:
-        assert self._newest is not None
-        self._publisher.publish(goal_message(goal, self._sequence.topic, self._newest.stamp_ns))
+    def _tell(self, goal: Goal, stamp_ns: int) -> None:
+        self._publisher.publish(goal_message(goal, self._sequence.topic, stamp_ns))
         self._told, self._told_at_ns = goal, self._time_ns
 
     def _tell_progress(self) -> None:
@@ -182,9 +183,9 @@ class GoalNode(Node):
 
     def _stand_still(self) -> bool:
         """End a velocity that was told; other goals need no end."""
-        if self._sequence.topic != "goal_velocity" or self._told is None:
+        if self._sequence.topic != "goal_velocity" or self._told is None or self._newest is None:
             return False
-        self._tell(STANDSTILL)
+        self._tell(STANDSTILL, self._newest.stamp_ns)
         return True
 
     def _tell_who_listens(self) -> None:

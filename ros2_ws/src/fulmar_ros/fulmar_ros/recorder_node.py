@@ -32,14 +32,17 @@ LONGEST_GOODBYE_S = 5.0
 class RecorderNode(Node):
     """Subscribes every recorded wire and keeps the messages as they came."""
 
-    def __init__(self, _request_exit: RequestExit) -> None:
+    def __init__(self, _request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
         """Make the bag, then the subscriptions.
+
+        Args:
+            cli_args: ROS arguments of this node alone, where it shares a process.
 
         Raises:
             BagError: There is a bag already, or it cannot be written.
             ConfigError: A parameter is wrong.
         """
-        super().__init__("recorder")
+        super().__init__("recorder", cli_args=cli_args)
         self._settings = settings = read_parameters(self, RecorderSettings)
         self._robot = self.get_namespace().strip("/") or "robot"
         self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
