@@ -5,6 +5,7 @@ Handlers are called directly, with real messages, on real nodes: DDS would only 
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import sys
 from collections.abc import Iterator
@@ -306,7 +307,8 @@ def test_an_adapter_passes_on_nothing_but_finite_commands_of_the_right_length(
     hardware, node = adapter
     actuators = load_robot(ADAPTERS[hardware]).actuators
     passed: list[object] = []
-    node._publisher.publish = passed.append  # type: ignore[method-assign]
+    # Copies: a writer fills the same message again and again.
+    node._publisher.publish = lambda message: passed.append(copy.deepcopy(message))  # type: ignore[method-assign]
     for message in data.draw(st.lists(arrays[hardware], max_size=6)):
         node._hear(message)
     for command in passed:

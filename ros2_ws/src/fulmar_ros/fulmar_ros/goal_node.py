@@ -106,7 +106,9 @@ class GoalNode(Node):
             if self._over or problem:
                 self._problem = problem or ""
                 if self._settings.lockstep and self._told is not None and not self._over:
-                    self._tell(self._told, measurement.stamp_ns)  # others wait for a goal with this very stamp
+                    self._tell(
+                        self._told, measurement.stamp_ns
+                    )  # others wait for a goal with this very stamp
                 return
             was_done = self._sequence.done
             self._resume(measurement)
