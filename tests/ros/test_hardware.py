@@ -17,6 +17,8 @@ import psutil
 import pytest
 from geometry_msgs.msg import Twist
 from mcap.reader import make_reader
+from nav_msgs.msg import Odometry
+from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray
 from std_srvs.srv import SetBool
@@ -26,7 +28,12 @@ from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import RunPlan, emulator_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.system import default_hardware
-from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
+from fulmar_core.backend import Sample
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.watchdog import Watchdog
+from fulmar_core.topics import AIR_BEARING, DEVICE_STATE, ODOMETRY
+from fulmar_ros.message_reader import stamp_ns
+from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from hardware_drivers.adapter_node import AdapterNode
@@ -36,6 +43,7 @@ from sim_nodes.emulators.valves import ValveBank
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import Neighbour, until
+from tests.states import planar_state
 
 pytestmark = pytest.mark.real_time
 
@@ -370,6 +378,34 @@ def test_roboran_s_boats_command_ours_through_the_adapter(neighbour, data, taken
             publisher.publish(Float32MultiArray(data=data))
             time.sleep(0.02)
         assert any(command.any() for command in neighbour.commands) is taken
+
+
+def test_odometry_goes_on_when_somebody_sets_the_clock_back(neighbour) -> None:
+    """By an hour: dropping what lies behind the newest stamp would keep a robot blind for as long. What comes twice, or a
+    little late, is still dropped."""
+    stamps: list[int] = []
+    neighbour.node.create_subscription(
+        Odometry,
+        ODOMETRY.name,
+        lambda message: stamps.append(stamp_ns(message.header.stamp)),
+        subscriber_qos(ODOMETRY, reliable=True, depth=50),
+    )
+    node = LifecycleNode("plant", namespace=f"/{neighbour.robot.name}")
+    guard = ActuatorGuard(neighbour.robot.actuators, Watchdog(200_000_000))
+    wires = PlantWires(node, neighbour.robot, guard, simulated=False)
+    now, hour = 1_700_000_000_000_000_000, 3_600_000_000_000
+    sent = [now, now, now + 20_000_000, now + 10_000_000, now - hour, now - hour, now - hour + 20_000_000]
+    try:
+        until(lambda: wires.subscribers() > 0)
+        time.sleep(0.3)
+        for stamp in sent:
+            wires.publish_sample(Sample(planar_state(0.0, 0.0, 0.0), None, None, stamp_ns=stamp), 0)
+        until(lambda: len(stamps) >= 4)
+        time.sleep(0.1)
+    finally:
+        wires.destroy(node)
+        node.destroy_node()
+    assert stamps == [now, now + 20_000_000, now - hour, now - hour + 20_000_000]
 
 
 def test_a_driver_whose_device_is_not_there_says_what_to_do(ros_domain: RosDomain, tmp_path) -> None:

@@ -228,7 +228,7 @@ def test_estimator_e_stop_and_teleoperation_survive_anything(
 ) -> None:
     estimator, estop, teleop = others
     published: list[Odometry] = []
-    estimator._publisher.publish = published.append  # type: ignore[method-assign]
+    estimator._publisher.publish = lambda message: published.append(copy.deepcopy(message))  # type: ignore[method-assign]
     for message in messages:
         with np.errstate(all="ignore"):
             if isinstance(message, PoseStamped):

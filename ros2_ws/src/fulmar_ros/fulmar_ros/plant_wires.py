@@ -22,6 +22,7 @@ from fulmar_core.backend import Sample
 from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.input_gate import BACK_NS
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     BLOCK,
@@ -144,8 +145,8 @@ class PlantWires:
             resend: Only the odometry, once more.
         """
         if sample.stamp_ns is not None:
-            if sample.stamp_ns <= self._captured_ns:
-                return  # a device that has nothing new
+            if 0 <= self._captured_ns - sample.stamp_ns <= BACK_NS:
+                return  # a device that has nothing new; further back, somebody has set the clock
             time_ns = self._captured_ns = sample.stamp_ns
         self._sent_ns.setdefault(time_ns, time.monotonic_ns())  # of a resent one, the first sending counts
         while len(self._sent_ns) > REMEMBERED:
