@@ -381,8 +381,10 @@ def test_roboran_s_boats_command_ours_through_the_adapter(neighbour, data, taken
 
 
 def test_odometry_goes_on_when_somebody_sets_the_clock_back(neighbour) -> None:
-    """By an hour: dropping what lies behind the newest stamp would keep a robot blind for as long. What comes twice, or a
-    little late, is still dropped."""
+    """By an hour: dropping what lies behind the newest stamp would keep a robot blind for as long.
+
+    What comes twice, or a little late, is still dropped.
+    """
     stamps: list[int] = []
     neighbour.node.create_subscription(
         Odometry,
