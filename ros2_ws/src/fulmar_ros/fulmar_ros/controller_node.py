@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import threading
 import time
-from collections.abc import Callable
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -14,26 +13,26 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
 from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.area import outside
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
-from fulmar_core.safety.succession import Succession
 from fulmar_core.safety.watchdog import default_timeout
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks import load_task
 from fulmar_ros.controller_settings import ControllerSettings
+from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
-from fulmar_ros.deadline import Deadlines, Spread
+from fulmar_ros.deadline import Deadlines
 from fulmar_ros.goal_messages import GoalMessage
+from fulmar_ros.line_up import MakeController, line_up
 from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
@@ -42,7 +41,6 @@ from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
 from fulmar_ros.standby import Standby, ready
 
-MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
 FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the one that was due
@@ -50,7 +48,6 @@ PATIENCE = 0.25  # of a period, for a measurement that is late
 COPY_AFTER = 0.2  # of a period; the copies of a command are over before the next one
 PATIENCE_AT_FIRST = 0.9  # the same while nobody knows yet when measurements come
 SAFE_REPEATS = 5
-STATUS_PERIOD_S = 0.4  # at least 2 Hz
 
 
 class ControllerNode(LifecycleNode):
@@ -109,10 +106,7 @@ class ControllerNode(LifecycleNode):
         self._pause_ns = self.settings.pause_ns(self.robot)
         self._deadlines = self._new_deadlines()
         self._phase = ArrivalPhase(self.settings.rate)
-        self._inference_ms = Spread()
-        self._steps = 0
-        self._said: tuple[object, ...] = ()
-        self._said_at = 0.0
+        self._status = ControllerStatus(self.mission, self._swap, goals_streamed=self.settings.goals_streamed)
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
@@ -121,7 +115,9 @@ class ControllerNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load, validate and warm up the controller; refuse it if anything is wrong."""
         try:
-            self._succession = self._line_up()
+            self._succession = line_up(
+                self._make_controller, self.robot, self.task, self.settings, self.get_logger().error
+            )
         except (FulmarError, ImportError) as error:
             self._refusal = str(error)
             self.get_logger().error(f"not configured: {error}")
@@ -142,7 +138,7 @@ class ControllerNode(LifecycleNode):
         )
         self.wires.publish_metadata(self._succession.current.metadata)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
-        self._status_timer = self.create_timer(STATUS_PERIOD_S / 4, self._tell_idle_status)
+        self._status_timer = self.create_timer(PERIOD_S / 4, self._tell_idle_status)
         self._set(configured=True, latched_fault="")
         return DONE
 
@@ -150,32 +146,6 @@ class ControllerNode(LifecycleNode):
     def controller(self) -> Controller:
         """Whose turn it is."""
         return self._succession.current.controller
-
-    def _line_up(self) -> Succession[Standby]:
-        """The controller that was asked for, or, where it is refused and one is named, its fallback.
-
-        Raises:
-            FulmarError: Both are refused, or the one is and no other is named.
-            ImportError: A library is missing, and no fallback is named.
-        """
-        fallback = self._fallback()
-        try:
-            controller = self._make_controller(self.robot, self.task, self.settings)
-        except (FulmarError, ImportError) as error:
-            if fallback is None:
-                raise
-            self.get_logger().error(f"falling back to {self.settings.fallback}: {error}")
-            return Succession(None, fallback, refused=str(error))
-        return Succession(ready(controller, self.robot), fallback)
-
-    def _fallback(self) -> Standby | None:
-        name = self.settings.fallback
-        if not name:
-            return None
-        law = None if name == "classical" else name
-        hz = self.settings.control_rate(self.robot)
-        controller = load_classical(self.robot, self.task, control_hz=hz, law=law)
-        return ready(controller, self.robot, said={"fallback": True})
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to answer, from fresh measurements on."""
@@ -219,7 +189,7 @@ class ControllerNode(LifecycleNode):
         """Last words before the process ends: the safe command, several times, and the figures of the run."""
         if self._flags.configured:
             self._fall_silent()
-            self._said_at = 0.0
+            self._status.repeat()
             self._tell_status(self._decide())
 
     def _fall_silent(self) -> None:
@@ -420,7 +390,7 @@ class ControllerNode(LifecycleNode):
         elif decision.mode is not Mode.IDLE:
             self.wires.publish_command(command, stamp)
         self._answered_ns, self._answer = stamp, command
-        self._steps += 1
+        self._status.steps += 1
         if observation is not None:
             self._acted += 1
             self._set(active_s=self._acted * self._control_ns / 1e9)
@@ -466,7 +436,7 @@ class ControllerNode(LifecycleNode):
         if not problem:
             wanted = self.robot.actuators.limited(action)
             command = slewed(wanted, self._answer, self.robot, self._control_ns / 1e9)
-        self._inference_ms.add((time.perf_counter_ns() - began) / 1e6)
+        self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
         self.wires.publish_command(command, stamp)
         self.wires.publish_reasoning(observation, action, stamp)
         before = self._succession.current
@@ -494,42 +464,11 @@ class ControllerNode(LifecycleNode):
             self._tell_status(self._decide())
 
     def _tell_status(self, decision: Decision) -> None:
-        """Publish the status when it changed, and at least twice a second."""
-        changed = (
-            decision.mode,
-            decision.reason.split(" (")[0][:24],
-            not self.settings.goals_streamed and self.mission.goal_stamp_ns,
-            self.mission.obstacles_stamp_ns,
-            self._succession.rejections,
-            self._succession.current.sha256,
-            self._succession.fell_back,
-            self._swap.said,
+        self._status.tell(
+            self.wires.health,
+            decision,
+            self._succession,
+            self._deadlines,
+            epoch=self._input_gate.epoch,
+            last_input_ns=self._flags.last_input_ns,
         )
-        now = time.monotonic()
-        if changed == self._said and now - self._said_at < STATUS_PERIOD_S:
-            return
-        self._said, self._said_at = changed, now
-        level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
-        fell_back = self._succession.fell_back
-        level = "warn" if level == "ok" and fell_back else level
-        age_ms = (time.monotonic_ns() - self._flags.last_input_ns) / 1e6 if self._flags.last_input_ns else 0.0
-        values = {
-            "mode": decision.mode.value,
-            "reason": decision.reason,
-            "sha256": self._succession.current.sha256,
-            "controller": self.controller.name,
-            "fell_back": fell_back,
-            "swap": self._swap.said,
-            "epoch": str(self._input_gate.epoch),
-            "goal_stamp_ns": str(self.mission.goal_stamp_ns),
-            "obstacles_stamp_ns": str(self.mission.obstacles_stamp_ns),
-            "goals_done": str(self.mission.done),
-            "steps": str(self._steps),
-            "observation_age_ms": f"{age_ms:.1f}",
-            "control_rate_hz": f"{self._deadlines.rate_hz:.4f}",
-            "overruns": str(self._deadlines.overruns),
-            "rejections": str(self._succession.rejections),
-            **self._inference_ms.percentiles("inference_ms"),
-            **self._deadlines.period_error_ms.percentiles("period_error_ms"),
-        }
-        self.wires.health.publish(level, decision.reason or decision.mode.value, values)

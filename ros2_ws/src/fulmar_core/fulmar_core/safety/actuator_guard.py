@@ -14,7 +14,9 @@ from fulmar_core.safety.watchdog import Watchdog
 LAST_WORDS_NS = (
     200_000_000  # so long after a person gave back, safe commands by hand may still have been under way
 )
-LEFTOVERS_NS = 2_000_000_000  # so long after the last command, one that is older may still come out of a queue
+LEFTOVERS_NS = (
+    2_000_000_000  # so long after the last command, one that is older may still come out of a queue
+)
 
 
 class ActuatorGuard:
