@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import itertools
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
+from rclpy.lifecycle import TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 
 from fulmar_core.controllers.lqr import Lqr
@@ -26,6 +29,7 @@ from fulmar_core.topics import (
     SWAP,
     TRUTH,
 )
+from fulmar_ros import controller_node
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.goal_messages import goal_message
@@ -37,6 +41,43 @@ from tests.conftest import RosDomain
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
 
 pytestmark = pytest.mark.real_time
+
+
+def lqr_that(**changes: Callable) -> Callable[[Robot, GoToPose, ControllerSettings], Lqr]:
+    """The LQR with some of its methods replaced."""
+
+    def make(robot: Robot, task: GoToPose, settings: ControllerSettings) -> Lqr:
+        good = make_lqr(robot, task, settings)
+        good.__class__ = type("Changed", (Lqr,), changes)
+        return good
+
+    return make
+
+
+@contextmanager
+def running(make: Callable, codes: list[int], *parameters: str) -> Iterator[ControllerNode]:
+    """A controller node at 50 Hz, stopped at the end."""
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=50.0"]
+    for parameter in parameters:
+        arguments += ["-p", parameter]
+    node = ControllerNode(make, codes.append, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        yield node
+        node.stop()
+
+
+@contextmanager
+def measured(neighbour: Neighbour) -> Iterator[Stream]:
+    """Odometry for as long as the context lasts."""
+    odometry = Stream(neighbour)
+    try:
+        yield odometry
+    finally:
+        odometry.stop()
+
+
+def reason(neighbour: Neighbour) -> str:
+    return neighbour.said["controller"][1]["reason"]
 
 
 def spoil_value(message: Odometry) -> None:
@@ -111,29 +152,18 @@ def test_a_controller_that_raises_commands_what_is_safe_and_ends(
 ) -> None:
     """The robot does not wait for the watchdog."""
 
-    class Raising(Lqr):
-        def act(self, observation: np.ndarray) -> np.ndarray:
-            if np.any(observation):
-                raise ZeroDivisionError("no gain today")
-            return super().act(observation)
-
-    def make(robot: Robot, task: GoToPose, settings: ControllerSettings) -> Lqr:
-        good = make_lqr(robot, task, settings)
-        good.__class__ = Raising
-        return good
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        if np.any(observation):
+            raise ZeroDivisionError("no gain today")
+        return Lqr.act(self, observation)
 
     codes: list[int] = []
-    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=50.0"]
-    node = ControllerNode(make, codes.append, cli_args=arguments)
-    with spinning(node, lambda error: pytest.fail(repr(error))):
+    with running(lqr_that(act=act), codes), measured(neighbour):
         neighbour.give_goal()
-        odometry = Stream(neighbour)
         until(lambda: codes != [])
-        odometry.stop()
+        until(lambda: "no gain today" in reason(neighbour))
         assert set(codes) == {1}
-        until(lambda: "no gain today" in neighbour.said["controller"][1]["reason"])
         assert not any(command.any() for command in neighbour.commands)
-        node.stop()
 
 
 def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
@@ -178,3 +208,99 @@ def test_copies_of_a_command_come_within_its_period(neighbour: Neighbour, monkey
 def test_more_copies_than_fit_into_a_period_are_refused() -> None:
     with pytest.raises(ValueError, match="copies = 4 must be from 1 to 3"):
         ControllerSettings(copies=4)
+
+
+def test_a_control_loop_that_fails_outside_the_controller_is_a_fault_and_ends_the_process(
+    neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thread that just ended would leave a node that looks as if it waited."""
+    codes: list[int] = []
+    with running(make_lqr, codes) as node, measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+
+        def lost(*_: object) -> None:
+            raise OSError("the middleware is gone")
+
+        monkeypatch.setattr(node.wires, "publish_reasoning", lost)
+        until(lambda: codes == [1])
+        until(lambda: "the middleware is gone" in reason(neighbour))
+        assert neighbour.said["controller"][1]["mode"] == "fault"
+
+
+@pytest.mark.parametrize("fallback", [False, True])
+def test_a_controller_that_raises_when_it_begins_anew_is_given_up(
+    fallback: bool, neighbour: Neighbour
+) -> None:
+    resets: list[int] = []
+
+    def reset(_self: Lqr) -> None:
+        resets.append(1)
+        if len(resets) > 1:  # the first is part of the warm-up
+            raise OSError("no memory")
+
+    codes: list[int] = []
+    parameters = ["fallback:=lqr"] if fallback else []
+    with running(lqr_that(reset=reset), codes, *parameters), measured(neighbour):
+        neighbour.give_goal()
+        if fallback:
+            until(lambda: "no memory" in neighbour.said["controller"][1]["fell_back"])
+            until(lambda: neighbour.commands[-1].any())
+            assert codes == []
+        else:
+            until(lambda: "no memory" in reason(neighbour))
+            assert set(codes) == {1}
+
+
+def test_what_a_controller_that_hung_comes_up_with_does_not_follow_the_safe_command(
+    neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(controller_node, "PATIENCE_S", 0.2)
+    hangs, release, over = threading.Event(), threading.Event(), threading.Event()
+
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        command = Lqr.act(self, observation)
+        if hangs.is_set():
+            release.wait()
+            over.set()
+        return command
+
+    with running(lqr_that(act=act), []) as node, measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        hangs.set()
+        time.sleep(0.1)
+        node.trigger_deactivate()
+        until(lambda: not neighbour.commands[-1].any())
+        assert node.trigger_activate() != TransitionCallbackReturn.SUCCESS
+        release.set()
+        until(over.is_set)
+        time.sleep(0.2)
+        assert not neighbour.commands[-1].any()
+
+
+def test_a_goal_that_comes_while_the_controller_acts_does_not_take_its_memory_away_meanwhile(
+    neighbour: Neighbour,
+) -> None:
+    acting = threading.Event()
+
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        acting.set()
+        time.sleep(0.01)
+        acting.clear()
+        return Lqr.act(self, observation)
+
+    def reset(self: Lqr) -> None:
+        resets.append(acting.is_set())
+        Lqr.reset(self)
+
+    resets: list[bool] = []
+    with running(lqr_that(act=act, reset=reset), []), measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        begun = len(resets)
+        for _ in range(30):
+            neighbour.give_goal()
+            time.sleep(0.013)
+        assert len(resets) > begun + 10
+        assert not any(resets)

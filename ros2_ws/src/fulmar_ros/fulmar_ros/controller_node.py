@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import threading
 import time
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -78,6 +80,7 @@ class ControllerNode(LifecycleNode):
         self.task = load_task(self.settings.task)
         self._make_controller, self._request_exit = make_controller, request_exit
         self._lock = threading.Lock()
+        self._speaking = threading.Lock()  # held from the look at whether commands may go out until one has
         self._stop = threading.Event()
         self._arrived = threading.Event()  # a measurement, since a beat waits for one
         self._thread: threading.Thread | None = None
@@ -97,6 +100,7 @@ class ControllerNode(LifecycleNode):
             warn=self.get_logger().warning,
         )
         self._acted = 0  # control steps
+        self._anew = False  # the controller forgets what was before, at its next step
         self._newest: Measurement | None = None
         self.mission = Mission(self.robot, self.task, streamed=self.settings.goals_streamed)
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
@@ -148,7 +152,11 @@ class ControllerNode(LifecycleNode):
         return self._succession.current.controller
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to answer, from fresh measurements on."""
+        """Begin to answer, from fresh measurements on; not while the controller still hangs from the last time."""
+        if self._thread is not None and self._thread.is_alive():
+            self._refusal = "the controller still hangs in the step that it was in when it was deactivated"
+            self.get_logger().error(f"not activated: {self._refusal}")
+            return REFUSED
         with self._lock:
             self._newest = None
             self._input_gate.forget()
@@ -197,9 +205,9 @@ class ControllerNode(LifecycleNode):
         self._set(activated=False)
         if self._thread is not None:
             self._thread.join(PATIENCE_S)
-            self._thread = None
-        for _ in range(SAFE_REPEATS):
-            self.wires.publish_safe(self._newest.stamp_ns if self._newest else 0)
+        with self._speaking:
+            for _ in range(SAFE_REPEATS):
+                self.wires.publish_safe(self._newest.stamp_ns if self._newest else 0)
         self.wires.flush()
 
     def _dismantle(self) -> None:
@@ -274,7 +282,7 @@ class ControllerNode(LifecycleNode):
                 self.get_logger().warning("goal refused: the e-stop holds. Reset it first.")
                 return
             if self.mission.give(goal, stamp_ns(message.header.stamp)):
-                self.controller.reset()
+                self._anew = True  # not here: the controller may be acting, in another thread
             self._follow_mission()
             if self.settings.lockstep:
                 self._input_gate.forget()
@@ -356,6 +364,12 @@ class ControllerNode(LifecycleNode):
 
     def _run(self) -> None:
         take_priority(CONTROL_PRIORITY)
+        try:
+            self._beat()
+        except Exception as error:  # noqa: BLE001 - a loop that ended without a word would look like one that waits
+            self._fail(f"the control loop raised {type(error).__name__}: {error}")
+
+    def _beat(self) -> None:
         deadlines = self._deadlines
         limit = self.settings.overruns_to_stop
         while deadlines.wait(self._stop):
@@ -366,7 +380,7 @@ class ControllerNode(LifecycleNode):
             self._control(self._newest)
             for _ in range(self.settings.copies - 1):
                 if not self._stop.wait(COPY_AFTER * self._period_s):
-                    self.wires.repeat_command()
+                    self._speak(self.wires.repeat_command)
 
     def _wait_for_what_is_due(self) -> None:
         """Wait a moment for the measurement that comes with this beat: what is acted on is as young as it can be."""
@@ -378,29 +392,57 @@ class ControllerNode(LifecycleNode):
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
         self._take_turns()
-        with self._lock:
-            decision = self._arbitrate()
-            observation = self._observe(measurement) if decision.may_act and measurement else None
         stamp = measurement.stamp_ns if measurement else 0
-        if measurement is not None and not self._watch_actuators(measurement):
+        command, action = self.robot.actuators.safe_command, None
+        try:
+            with self._lock:
+                decision = self._arbitrate()
+                self._begin_anew()
+                observation = self._observe(measurement) if decision.may_act and measurement else None
+            health = self._watch_actuators(measurement) if measurement else None
+            if observation is not None:
+                command, action, problem = self._act(observation)
+        except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
+            self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
             return
-        command = self.robot.actuators.safe_command
-        if observation is not None:
-            command = self._act(observation, stamp)
-        elif decision.mode is not Mode.IDLE:
-            self.wires.publish_command(command, stamp)
+        if health is not None:
+            self.wires.publish_actuators_health(health, stamp)
+        speaks = action is not None or decision.mode is not Mode.IDLE
+        if speaks and not self._speak(partial(self.wires.publish_command, command, stamp)):
+            return
         self._answered_ns, self._answer = stamp, command
         self._status.steps += 1
-        if observation is not None:
+        if observation is not None and action is not None:
+            self.wires.publish_reasoning(observation, action, stamp)
+            self._judge(problem)
             self._acted += 1
             self._set(active_s=self._acted * self._control_ns / 1e9)
         self._tell_status(decision)
 
-    def _watch_actuators(self, measurement: Measurement) -> bool:
-        """Compare what was commanded with how the body moved; false where the controller cannot bear to hear it."""
+    def _speak(self, publish: Callable[[], None]) -> bool:
+        """Publish a command, if commands may still go out.
+
+        What a controller that hung comes up with after all must not follow the safe command of the end.
+
+        Returns:
+            Whether they may.
+        """
+        with self._speaking:
+            if self._flags.activated:
+                publish()
+            return self._flags.activated
+
+    def _begin_anew(self) -> None:
+        """Let the controller forget what was before a new goal; call with the lock held."""
+        if self._anew:
+            self._anew = False
+            self.controller.reset()
+
+    def _watch_actuators(self, measurement: Measurement) -> np.ndarray | None:
+        """Compare what was commanded with how the body moved; what is believed of each actuator, if that is wanted."""
         passed_ns = measurement.stamp_ns - self._seen_ns
         if passed_ns == 0:  # by the clock, one measurement may serve twice
-            return True
+            return None
         informer = self._succession.current.informer
         if not 0 < passed_ns <= self._pause_ns:
             informer.reset()
@@ -408,15 +450,9 @@ class ControllerNode(LifecycleNode):
         wanted = self.wires.health_wanted
         if not (wanted or informer.listens):
             self._seen_ns = 0  # whoever comes to listen later begins anew
-            return True
-        try:
-            health = informer.see(planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted)
-        except Exception as error:  # noqa: BLE001 - as in `_act`
-            self._give_up(f"the controller raised {type(error).__name__}: {error}", measurement.stamp_ns)
-            return False
-        if health is not None and wanted:
-            self.wires.publish_actuators_health(health.effectiveness, measurement.stamp_ns)
-        return True
+            return None
+        health = informer.see(planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted)
+        return health.effectiveness if health is not None and wanted else None
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""
@@ -425,42 +461,48 @@ class ControllerNode(LifecycleNode):
             self.controller.reset()
         return self.mission.observe(measurement.state, measurement.stamp_ns, self._answer)
 
-    def _act(self, observation: np.ndarray, stamp: int) -> np.ndarray:
+    def _act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:
+        """The command, the controller's action that it is made of, and why it is the safe one instead."""
         began = time.perf_counter_ns()
-        try:
-            action = np.asarray(self.controller.act(observation), dtype=float)
-        except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
-            return self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
+        action = np.asarray(self.controller.act(observation), dtype=float)
         problem = command_problem(action, len(self.robot.actuators.names))
         command = self.robot.actuators.safe_command
         if not problem:
             wanted = self.robot.actuators.limited(action)
             command = slewed(wanted, self._answer, self.robot, self._control_ns / 1e9)
         self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
-        self.wires.publish_command(command, stamp)
-        self.wires.publish_reasoning(observation, action, stamp)
+        return command, action, problem
+
+    def _judge(self, problem: str | None) -> None:
+        """Count refused actions: several in a row are the fallback's turn, or a fault."""
         before = self._succession.current
         fault = self._succession.judge(problem)
         if fault:
             self._set(latched_fault=fault)
         elif self._succession.current is not before:
             self._announce()
-        return command
 
-    def _give_up(self, reason: str, stamp: int) -> np.ndarray:
+    def _give_up(self, reason: str, stamp: int) -> None:
         """Command what is safe; let the fallback go on, or, where there is none, latch a fault and end the process."""
-        self.get_logger().error(reason)
-        safe = self.robot.actuators.safe_command
-        self.wires.publish_command(safe, stamp)
+        self._answered_ns, self._answer = stamp, self.robot.actuators.safe_command
+        if not self._speak(partial(self.wires.publish_command, self._answer, stamp)):
+            return
         if self._succession.fall_back(reason):
+            self.get_logger().error(reason)
             self._announce()
-            return safe
+        else:
+            self._fail(reason)
+        self._tell_status(self._decide())
+
+    def _fail(self, reason: str) -> None:
+        """Latch a fault and end the process; its last words are what is safe."""
+        self.get_logger().error(reason)
         self._set(latched_fault=reason)
         self._request_exit(FAILED)
-        return safe
 
     def _tell_idle_status(self) -> None:
-        if self.settings.lockstep or not self._flags.activated:
+        """Where no control step does it."""
+        if self.settings.lockstep or not self._flags.activated or self._flags.latched_fault:
             self._tell_status(self._decide())
 
     def _tell_status(self, decision: Decision) -> None:
