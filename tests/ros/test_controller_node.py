@@ -121,6 +121,17 @@ def test_a_frozen_sensor_is_noticed(stream: Stream) -> None:
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
+def test_a_base_that_has_stood_for_long_goes_when_it_is_given_a_goal(neighbour: Neighbour) -> None:
+    """Encoders at rest tell the very same; only motion could change that."""
+    with running(make_lqr, [], "odometry_may_repeat:=true"), measured(neighbour) as odometry:
+        odometry.moving = False
+        until(lambda: "controller" in neighbour.said and reason(neighbour) == "no goal yet")
+        time.sleep(5.0)
+        assert reason(neighbour) == "no goal yet"
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+
+
 def test_a_stamp_that_goes_back_is_refused(stream: Stream) -> None:
     """Reordered or replayed measurements do not move the robot."""
     stream.step_ns = -20_000_000

@@ -92,8 +92,9 @@ class ControllerNode(LifecycleNode):
             max_run_time_s=self.settings.max_run_time_s,
         )
         self._estop = EstopWatch(required=self.settings.estop)
-        noisy = self.robot.sensors.odometry.position.std > 0.0 and not self.settings.lockstep
-        self._input_gate = InputGate(self.robot.limits, frozen_after=FROZEN_AFTER if noisy else 0)
+        repeats = self.settings.odometry_may_repeat or self.robot.sensors.odometry.position.std == 0.0
+        frozen_after = 0 if repeats or self.settings.lockstep else FROZEN_AFTER
+        self._input_gate = InputGate(self.robot.limits, frozen_after=frozen_after)
         self._swap = PolicySwap(
             self._load if learned else None,
             propose=lambda candidate: self._succession.propose(candidate),
