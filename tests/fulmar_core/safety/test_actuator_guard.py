@@ -189,6 +189,7 @@ class TestEstop:
     def test_after_a_release_only_a_new_command_opens_a_valve(self, guard):
         guard.estop.hear(True, 0)
         guard.offer(NAMES, GOOD, 1)
+        guard.estop.hear(False, 400 * MS)
         guard.estop.hear(False, 600 * MS)
         assert not guard.output(601 * MS).any()
         guard.offer(NAMES, GOOD, 602 * MS)
