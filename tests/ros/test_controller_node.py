@@ -76,8 +76,9 @@ def measured(neighbour: Neighbour) -> Iterator[Stream]:
         odometry.stop()
 
 
-def reason(neighbour: Neighbour) -> str:
-    return neighbour.said["controller"][1]["reason"]
+def told(neighbour: Neighbour, key: str) -> str:
+    """A value of the controller's status; empty before the first."""
+    return neighbour.said.get("controller", ("", {}))[1].get(key, "")
 
 
 def spoil_value(message: Odometry) -> None:
@@ -110,14 +111,14 @@ def test_unbelievable_odometry_gets_closed_valves_and_a_reason(
 ) -> None:
     """Each fault alone, after a good start."""
     stream.spoil = spoil
-    until(lambda: reason in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: reason in told(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
 def test_a_frozen_sensor_is_noticed(stream: Stream) -> None:
     """Stamps go on, the pose does not move by a micrometre."""
     stream.moving = False
-    until(lambda: "stuck" in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: "stuck" in told(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
@@ -125,17 +126,37 @@ def test_a_base_that_has_stood_for_long_goes_when_it_is_given_a_goal(neighbour: 
     """Encoders at rest tell the very same; only motion could change that."""
     with running(make_lqr, [], "odometry_may_repeat:=true"), measured(neighbour) as odometry:
         odometry.moving = False
-        until(lambda: "controller" in neighbour.said and reason(neighbour) == "no goal yet")
+        until(lambda: told(neighbour, "reason") == "no goal yet")
         time.sleep(5.0)
-        assert reason(neighbour) == "no goal yet"
+        assert told(neighbour, "reason") == "no goal yet"
         neighbour.give_goal()
         until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+
+
+def test_a_place_that_jumps_is_told_and_the_controller_begins_anew(neighbour: Neighbour) -> None:
+    resets: list[int] = []
+
+    def reset(self: Lqr) -> None:
+        resets.append(1)
+        Lqr.reset(self)
+
+    def jump(message: Odometry) -> None:
+        message.pose.pose.position.x += 3.0
+
+    with running(lqr_that(reset=reset), []) as node, measured(neighbour) as odometry:
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        begun = len(resets)
+        odometry.spoil = jump
+        until(lambda: told(neighbour, "epoch") == "1")
+        until(lambda: len(resets) == begun + 1)
+        until(lambda: node.mission.complete and neighbour.commands[-1].any())
 
 
 def test_a_stamp_that_goes_back_is_refused(stream: Stream) -> None:
     """Reordered or replayed measurements do not move the robot."""
     stream.step_ns = -20_000_000
-    until(lambda: "went back" in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: "went back" in told(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
@@ -145,7 +166,7 @@ def test_silence_of_the_odometry_closes_the_valves(stream: Stream) -> None:
     since = time.monotonic()
     until(lambda: not stream.neighbour.commands[-1].any())
     assert time.monotonic() - since < 0.4
-    until(lambda: "no usable odom" in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: "no usable odom" in told(stream.neighbour, "reason"))
 
 
 def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
@@ -172,7 +193,7 @@ def test_a_controller_that_raises_commands_what_is_safe_and_ends(
     with running(lqr_that(act=act), codes), measured(neighbour):
         neighbour.give_goal()
         until(lambda: codes != [])
-        until(lambda: "no gain today" in reason(neighbour))
+        until(lambda: "no gain today" in told(neighbour, "reason"))
         assert set(codes) == {1}
         assert not any(command.any() for command in neighbour.commands)
 
@@ -181,7 +202,7 @@ def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
     """Judged at once, not at the next measurement."""
     neighbour = stream.neighbour
     neighbour.goal_publisher.publish(goal_message(goal_at((300.0, 0.0, 0.0)), "goal_pose", 2))
-    until(lambda: "geofence" in neighbour.said["controller"][1]["reason"])
+    until(lambda: "geofence" in told(neighbour, "reason"))
     until(lambda: not neighbour.commands[-1].any())
 
 
@@ -235,8 +256,8 @@ def test_a_control_loop_that_fails_outside_the_controller_is_a_fault_and_ends_th
 
         monkeypatch.setattr(node.wires, "publish_reasoning", lost)
         until(lambda: codes == [1])
-        until(lambda: "the middleware is gone" in reason(neighbour))
-        assert neighbour.said["controller"][1]["mode"] == "fault"
+        until(lambda: "the middleware is gone" in told(neighbour, "reason"))
+        assert told(neighbour, "mode") == "fault"
 
 
 @pytest.mark.parametrize("fallback", [False, True])
@@ -255,11 +276,11 @@ def test_a_controller_that_raises_when_it_begins_anew_is_given_up(
     with running(lqr_that(reset=reset), codes, *parameters), measured(neighbour):
         neighbour.give_goal()
         if fallback:
-            until(lambda: "no memory" in neighbour.said["controller"][1]["fell_back"])
+            until(lambda: "no memory" in told(neighbour, "fell_back"))
             until(lambda: neighbour.commands[-1].any())
             assert codes == []
         else:
-            until(lambda: "no memory" in reason(neighbour))
+            until(lambda: "no memory" in told(neighbour, "reason"))
             assert set(codes) == {1}
 
 

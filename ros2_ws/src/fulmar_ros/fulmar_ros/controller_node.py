@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -26,7 +27,7 @@ from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.area import outside
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.estop import EstopWatch
-from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
+from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate, Measurement
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import load_task
 from fulmar_ros.controller_settings import ControllerSettings
@@ -94,7 +95,9 @@ class ControllerNode(LifecycleNode):
         self._estop = EstopWatch(required=self.settings.estop)
         repeats = self.settings.odometry_may_repeat or self.robot.sensors.odometry.position.std == 0.0
         frozen_after = 0 if repeats or self.settings.lockstep else FROZEN_AFTER
-        self._input_gate = InputGate(self.robot.limits, frozen_after=frozen_after)
+        jump_m = math.inf if self.settings.lockstep else JUMP_M
+        self._input_gate = InputGate(self.robot.limits, frozen_after=frozen_after, jump_m=jump_m)
+        self._epoch = self._acted_epoch = 0  # of the newest usable measurement, and of the last control step
         self._swap = PolicySwap(
             self._load if learned else None,
             propose=lambda candidate: self._succession.propose(candidate),
@@ -342,7 +345,7 @@ class ControllerNode(LifecycleNode):
                 now = time.monotonic_ns()
                 if not self.settings.lockstep:
                     self._follow(measurement, now)
-                self._newest = measurement
+                self._newest, self._epoch = measurement, self._input_gate.epoch
                 changes["last_input_ns"] = now
                 self.mission.turn_to(measurement.stamp_ns)
                 changes["lacking"] = self.mission.lacking
@@ -434,10 +437,13 @@ class ControllerNode(LifecycleNode):
             return self._flags.activated
 
     def _begin_anew(self) -> None:
-        """Let the controller forget what was before a new goal; call with the lock held."""
-        if self._anew:
-            self._anew = False
+        """Let the controller forget what was before a new goal or a jump; call with the lock held."""
+        jumped = self._epoch != self._acted_epoch
+        if jumped:
+            self._seen_ns = 0  # no motion of the body was behind it
+        if jumped or self._anew:
             self.controller.reset()
+        self._anew, self._acted_epoch = False, self._epoch
 
     def _watch_actuators(self, measurement: Measurement) -> np.ndarray | None:
         """Compare what was commanded with how the body moved; what is believed of each actuator, if that is wanted."""
