@@ -206,6 +206,53 @@ def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
     until(lambda: not neighbour.commands[-1].any())
 
 
+def test_a_robot_that_left_its_area_waits_there_and_back_inside_for_somebody_to_give_a_goal(
+    neighbour: Neighbour,
+) -> None:
+    with running(make_lqr, [], "area:=[-1.0, 1.0, -1.0, 1.0]"), measured(neighbour) as odometry:
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+
+        def beyond(message: Odometry) -> None:
+            message.pose.pose.position.x += 1.1
+
+        odometry.spoil = beyond
+        until(lambda: "outside its area" in told(neighbour, "reason"))
+        until(lambda: not neighbour.commands[-1].any())
+        neighbour.give_goal()  # still out there
+        time.sleep(0.3)
+        assert "outside its area" in told(neighbour, "reason")
+        odometry.spoil = lambda _message: None
+        count = len(neighbour.commands)
+        until(lambda: len(neighbour.commands) > count + 25)
+        assert not any(command.any() for command in neighbour.commands[count + 1 :])
+        assert "outside its area" in told(neighbour, "reason")
+        neighbour.give_goal()
+        until(lambda: neighbour.commands[-1].any())
+
+
+def test_a_run_that_has_acted_for_as_long_as_it_may_stops(neighbour: Neighbour) -> None:
+    with running(make_lqr, [], "max_run_time_s:=0.5"), measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        since = time.monotonic()
+        until(lambda: "max_run_time of 0.5 s is over" in told(neighbour, "reason"))
+        assert time.monotonic() - since > 0.3
+        until(lambda: not neighbour.commands[-1].any())
+
+
+def test_beats_that_all_come_late_are_a_fault(neighbour: Neighbour) -> None:
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        time.sleep(0.05 if np.any(observation) else 0.0)
+        return Lqr.act(self, observation)
+
+    with running(lqr_that(act=act), [], "overruns_to_stop:=5"), measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: "5 beats in a row came late" in told(neighbour, "reason"))
+        assert told(neighbour, "mode") == "fault"
+        until(lambda: not neighbour.commands[-1].any())
+
+
 def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: ControllerNode) -> None:
     """Then silence."""
     controller.trigger_deactivate()

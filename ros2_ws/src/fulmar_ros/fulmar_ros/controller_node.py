@@ -165,7 +165,7 @@ class ControllerNode(LifecycleNode):
             self._newest = None
             self._input_gate.forget()
             self._flags = dataclasses.replace(
-                self._flags, activated=True, last_input_ns=None, input_problem="", active_s=0.0
+                self._flags, activated=True, last_input_ns=None, input_problem="", outside="", active_s=0.0
             )
             self._acted = 0
         self._deadlines = self._new_deadlines()
@@ -242,6 +242,7 @@ class ControllerNode(LifecycleNode):
         if stopped and self._estop.heard:
             self.mission.drop()
             self._follow_mission()
+            self._flags = dataclasses.replace(self._flags, outside=self._outside())
         self._flags = dataclasses.replace(self._flags, estop=stopped)
         return arbitrate(self._flags, now)
 
@@ -287,6 +288,10 @@ class ControllerNode(LifecycleNode):
                 return
             if self.mission.give(goal, stamp_ns(message.header.stamp)):
                 self._anew = True  # not here: the controller may be acting, in another thread
+                if (
+                    not self.settings.goals_streamed
+                ):  # somebody has looked: he who left may go on, if he is back
+                    self._flags = dataclasses.replace(self._flags, outside=self._outside())
             self._follow_mission()
             if self.settings.lockstep:
                 self._input_gate.forget()
@@ -351,12 +356,18 @@ class ControllerNode(LifecycleNode):
                 changes["lacking"] = self.mission.lacking
                 changes["has_goal"] = not changes["lacking"]
                 changes["goal_distance"] = self.mission.distance(measurement.state)
-                x, y = (float(value) for value in measurement.state.position_in_world[:2])
-                changes["outside"] = outside(x, y, self.settings.area)
+                changes["outside"] = self._flags.outside or self._outside()
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
         self._arrived.set()
         if self.settings.lockstep:
             self._control(measurement)
+
+    def _outside(self) -> str:
+        """How the robot is outside its area right now; empty if it is not, or if nobody knows."""
+        if self._newest is None:
+            return ""
+        x, y = (float(value) for value in self._newest.state.position_in_world[:2])
+        return outside(x, y, self.settings.area)
 
     def _follow(self, measurement: Measurement, now_ns: int) -> None:
         """Let the beat follow the arrivals, in real time."""
