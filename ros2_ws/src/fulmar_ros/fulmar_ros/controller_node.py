@@ -21,7 +21,6 @@ from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
 from fulmar_core.safety.area import outside
@@ -30,26 +29,20 @@ from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate, Measurement
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import load_task
+from fulmar_ros.control_beat import ControlBeat
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
-from fulmar_ros.deadline import Deadlines
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up
 from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
-from fulmar_ros.phase import ArrivalPhase
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
 from fulmar_ros.standby import Standby, ready
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
-PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
-FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the one that was due
-PATIENCE = 0.25  # of a period, for a measurement that is late
-COPY_AFTER = 0.2  # of a period; the copies of a command are over before the next one
-PATIENCE_AT_FIRST = 0.9  # the same while nobody knows yet when measurements come
 SAFE_REPEATS = 5
 
 
@@ -82,9 +75,6 @@ class ControllerNode(LifecycleNode):
         self._make_controller, self._request_exit = make_controller, request_exit
         self._lock = threading.Lock()
         self._speaking = threading.Lock()  # held from the look at whether commands may go out until one has
-        self._stop = threading.Event()
-        self._arrived = threading.Event()  # a measurement, since a beat waits for one
-        self._thread: threading.Thread | None = None
         hz = self.settings.control_rate(self.robot)
         timeout_s = self.settings.input_timeout_s or default_timeout(1.0 / hz) / min(self.settings.rate, 1.0)
         self._flags = Flags(
@@ -110,10 +100,10 @@ class ControllerNode(LifecycleNode):
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
-        self._period_s = 1.0 / (hz * self.settings.rate)
         self._pause_ns = self.settings.pause_ns(self.robot)
-        self._deadlines = self._new_deadlines()
-        self._phase = ArrivalPhase(self.settings.rate)
+        self._beat = ControlBeat(
+            1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
+        )
         self._status = ControllerStatus(self.mission, self._swap, goals_streamed=self.settings.goals_streamed)
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
@@ -157,7 +147,7 @@ class ControllerNode(LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to answer, from fresh measurements on; not while the controller still hangs from the last time."""
-        if self._thread is not None and self._thread.is_alive():
+        if self._beat.hangs:
             self._refusal = "the controller still hangs in the step that it was in when it was deactivated"
             self.get_logger().error(f"not activated: {self._refusal}")
             return REFUSED
@@ -168,13 +158,10 @@ class ControllerNode(LifecycleNode):
                 self._flags, activated=True, last_input_ns=None, input_problem="", outside="", active_s=0.0
             )
             self._acted = 0
-        self._deadlines = self._new_deadlines()
-        self._phase = ArrivalPhase(self.settings.rate)
+        self._beat.renew()
         settle_memory()
         if not self.settings.lockstep:
-            self._stop.clear()
-            self._thread = threading.Thread(target=self._run, name="control", daemon=True)
-            self._thread.start()
+            self._beat.start(self._step, lambda: self._speak(self.wires.repeat_command), self._fail)
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -205,10 +192,8 @@ class ControllerNode(LifecycleNode):
             self._tell_status(self._decide())
 
     def _fall_silent(self) -> None:
-        self._stop.set()
         self._set(activated=False)
-        if self._thread is not None:
-            self._thread.join(PATIENCE_S)
+        self._beat.halt()
         with self._speaking:
             for _ in range(SAFE_REPEATS):
                 self.wires.publish_safe(self._newest.stamp_ns if self._newest else 0)
@@ -220,9 +205,6 @@ class ControllerNode(LifecycleNode):
             self._set(configured=False)
             self.destroy_timer(self._status_timer)
             self.wires.destroy(self)
-
-    def _new_deadlines(self) -> Deadlines:
-        return Deadlines(1.0 / (self.settings.control_rate(self.robot) * self.settings.rate))
 
     def _set(self, **changes: object) -> None:
         with self._lock:
@@ -347,18 +329,17 @@ class ControllerNode(LifecycleNode):
             problem = self._input_gate.problem(measurement) or ""
             changes: dict[str, object] = {"input_problem": problem}
             if not problem:
-                now = time.monotonic_ns()
                 if not self.settings.lockstep:
-                    self._follow(measurement, now)
+                    self._beat.follow(measurement.stamp_ns)
                 self._newest, self._epoch = measurement, self._input_gate.epoch
-                changes["last_input_ns"] = now
+                changes["last_input_ns"] = time.monotonic_ns()
                 self.mission.turn_to(measurement.stamp_ns)
                 changes["lacking"] = self.mission.lacking
                 changes["has_goal"] = not changes["lacking"]
                 changes["goal_distance"] = self.mission.distance(measurement.state)
                 changes["outside"] = self._flags.outside or self._outside()
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
-        self._arrived.set()
+        self._beat.wake()
         if self.settings.lockstep:
             self._control(measurement)
 
@@ -369,40 +350,13 @@ class ControllerNode(LifecycleNode):
         x, y = (float(value) for value in self._newest.state.position_in_world[:2])
         return outside(x, y, self.settings.area)
 
-    def _follow(self, measurement: Measurement, now_ns: int) -> None:
-        """Let the beat follow the arrivals, in real time."""
-        if self._newest is None:
-            take_priority_with_helpers(CONTROL_PRIORITY)
-        anchor = self._phase.anchor_ns(measurement.stamp_ns, now_ns)
-        if anchor is not None:
-            self._deadlines.align(anchor)
-
-    def _run(self) -> None:
-        take_priority(CONTROL_PRIORITY)
-        try:
-            self._beat()
-        except Exception as error:  # noqa: BLE001 - a loop that ended without a word would look like one that waits
-            self._fail(f"the control loop raised {type(error).__name__}: {error}")
-
-    def _beat(self) -> None:
-        deadlines = self._deadlines
+    def _step(self) -> None:
+        """One beat of the clock."""
         limit = self.settings.overruns_to_stop
-        while deadlines.wait(self._stop):
-            if limit and deadlines.late_in_a_row >= limit:
-                self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
-            self._wait_for_what_is_due()
-            self.wires.forget_command()
-            self._control(self._newest)
-            for _ in range(self.settings.copies - 1):
-                if not self._stop.wait(COPY_AFTER * self._period_s):
-                    self._speak(self.wires.repeat_command)
-
-    def _wait_for_what_is_due(self) -> None:
-        """Wait a moment for the measurement that comes with this beat: what is acted on is as young as it can be."""
-        self._arrived.clear()
-        last_ns = self._flags.last_input_ns
-        if last_ns is not None and time.monotonic_ns() - last_ns > FRESH_NS:
-            self._arrived.wait((PATIENCE if self._phase.known else PATIENCE_AT_FIRST) * self._period_s)
+        if limit and self._beat.deadlines.late_in_a_row >= limit:
+            self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
+        self.wires.forget_command()
+        self._control(self._newest)
 
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
@@ -528,7 +482,7 @@ class ControllerNode(LifecycleNode):
             self.wires.health,
             decision,
             self._succession,
-            self._deadlines,
+            self._beat.deadlines,
             epoch=self._input_gate.epoch,
             last_input_ns=self._flags.last_input_ns,
         )
