@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import threading
 import time
 from collections.abc import Callable
@@ -20,15 +19,14 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
-from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
-from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
+from fulmar_core.safety.arbiter import Decision, Mode, arbitrate
 from fulmar_core.safety.area import outside
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.estop import EstopWatch
-from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate, Measurement
-from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
+from fulmar_ros.actuator_watch import ActuatorWatch
 from fulmar_ros.control_beat import ControlBeat
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
@@ -76,17 +74,9 @@ class ControllerNode(LifecycleNode):
         self._lock = threading.Lock()
         self._speaking = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
-        timeout_s = self.settings.input_timeout_s or default_timeout(1.0 / hz) / min(self.settings.rate, 1.0)
-        self._flags = Flags(
-            input_timeout_ns=round(timeout_s * 1e9),
-            geofence=self.robot.limits.geofence,
-            max_run_time_s=self.settings.max_run_time_s,
-        )
+        self._flags = self.settings.flags(self.robot)
         self._estop = EstopWatch(required=self.settings.estop)
-        repeats = self.settings.odometry_may_repeat or self.robot.sensors.odometry.position.std == 0.0
-        frozen_after = 0 if repeats or self.settings.lockstep else FROZEN_AFTER
-        jump_m = math.inf if self.settings.lockstep else JUMP_M
-        self._input_gate = InputGate(self.robot.limits, frozen_after=frozen_after, jump_m=jump_m)
+        self._input_gate = self.settings.input_gate(self.robot)
         self._epoch = self._acted_epoch = 0  # of the newest usable measurement, and of the last control step
         self._swap = PolicySwap(
             self._load if learned else None,
@@ -101,6 +91,7 @@ class ControllerNode(LifecycleNode):
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
         self._pause_ns = self.settings.pause_ns(self.robot)
+        self._actuators = ActuatorWatch(self._pause_ns)
         self._beat = ControlBeat(
             1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
         )
@@ -120,7 +111,7 @@ class ControllerNode(LifecycleNode):
             self._refusal = str(error)
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
-        self._seen_ns = 0
+        self._actuators.forget()
         self.wires = ControllerWires(
             self,
             self.robot,
@@ -256,7 +247,7 @@ class ControllerNode(LifecycleNode):
 
     def _announce(self) -> None:
         """Say who controls now; what is known of the actuators begins anew."""
-        self._seen_ns = 0
+        self._actuators.forget()
         self.wires.publish_metadata(self._succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
@@ -368,7 +359,7 @@ class ControllerNode(LifecycleNode):
                 decision = self._arbitrate()
                 self._begin_anew()
                 observation = self._observe(measurement) if decision.may_act and measurement else None
-            health = self._watch_actuators(measurement) if measurement else None
+            health = self._watch(measurement) if measurement else None
             if observation is not None:
                 command, action, problem = self._act(observation)
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
@@ -405,26 +396,14 @@ class ControllerNode(LifecycleNode):
         """Let the controller forget what was before a new goal or a jump; call with the lock held."""
         jumped = self._epoch != self._acted_epoch
         if jumped:
-            self._seen_ns = 0  # no motion of the body was behind it
+            self._actuators.forget()  # no motion of the body was behind it
         if jumped or self._anew:
             self.controller.reset()
         self._anew, self._acted_epoch = False, self._epoch
 
-    def _watch_actuators(self, measurement: Measurement) -> np.ndarray | None:
-        """Compare what was commanded with how the body moved; what is believed of each actuator, if that is wanted."""
-        passed_ns = measurement.stamp_ns - self._seen_ns
-        if passed_ns == 0:  # by the clock, one measurement may serve twice
-            return None
+    def _watch(self, measurement: Measurement) -> np.ndarray | None:
         informer = self._succession.current.informer
-        if not 0 < passed_ns <= self._pause_ns:
-            informer.reset()
-        self._seen_ns = measurement.stamp_ns
-        wanted = self.wires.health_wanted
-        if not (wanted or informer.listens):
-            self._seen_ns = 0  # whoever comes to listen later begins anew
-            return None
-        health = informer.see(planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted)
-        return health.effectiveness if health is not None and wanted else None
+        return self._actuators.see(measurement, self._answer, informer, wanted=self.wires.health_wanted)
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""

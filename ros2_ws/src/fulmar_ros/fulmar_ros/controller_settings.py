@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
+from fulmar_core.safety.arbiter import Flags
 from fulmar_core.safety.area import NO_AREA, check_area
+from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
 
 MOST_COPIES = 3
@@ -60,3 +62,21 @@ class ControllerSettings:
         hz = self.control_rate(robot)
         pause_s = 1.75 / hz if self.lockstep else default_timeout(1.0 / hz) * max(self.rate, 1.0)
         return round(1e9 * pause_s)
+
+    def flags(self, robot: Robot) -> Flags:
+        """What the arbiter knows before anything has happened."""
+        timeout_s = self.input_timeout_s or default_timeout(1.0 / self.control_rate(robot)) / min(
+            self.rate, 1.0
+        )
+        return Flags(
+            input_timeout_ns=round(timeout_s * 1e9),
+            geofence=robot.limits.geofence,
+            max_run_time_s=self.max_run_time_s,
+        )
+
+    def input_gate(self, robot: Robot) -> InputGate:
+        """What lets measurements in; in lock step they may repeat themselves, and episodes begin anywhere."""
+        if self.lockstep:
+            return InputGate(robot.limits, frozen_after=0)
+        repeats = self.odometry_may_repeat or robot.sensors.odometry.position.std == 0.0
+        return InputGate(robot.limits, frozen_after=0 if repeats else FROZEN_AFTER, jump_m=JUMP_M)
