@@ -262,6 +262,11 @@ def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: Con
     assert len(stream.neighbour.commands) == count
 
 
+def test_shutdown_from_active_ends_with_the_safe_command(stream: Stream, controller: ControllerNode) -> None:
+    controller.trigger_shutdown()
+    until(lambda: not stream.neighbour.commands[-1].any())
+
+
 def test_copies_of_a_command_come_within_its_period(neighbour: Neighbour, monkeypatch) -> None:
     """Three of each, all with the stamp of the state that it answers."""
     monkeypatch.setattr(sys, "argv", ["lqr_node"])

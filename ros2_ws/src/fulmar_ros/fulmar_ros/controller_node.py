@@ -16,7 +16,7 @@ from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
 from fulmar_core.robot import load_robot
@@ -32,13 +32,13 @@ from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
-from fulmar_ros.line_up import MakeController, line_up
-from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, stamp_ns
+from fulmar_ros.line_up import MakeController, line_up, load_other
+from fulmar_ros.message_reader import block_of, goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.standby import Standby, ready
+from fulmar_ros.standby import Standby
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 SAFE_REPEATS = 5
@@ -165,15 +165,8 @@ class ControllerNode(LifecycleNode):
         self._dismantle()
         return DONE
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop and let go, from whatever state."""
-        self._dismantle()
-        return DONE
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """As on shutdown: an error never leaves a command standing."""
-        self._dismantle()
-        return DONE
+    # From whatever state, and after an error too: no command is left standing.
+    on_shutdown = on_error = on_cleanup
 
     def stop(self) -> None:
         """Last words before the process ends: the safe command, several times, and the figures of the run."""
@@ -228,16 +221,9 @@ class ControllerNode(LifecycleNode):
         self._swap.ask(message.data)
 
     def _load(self, folder: str) -> Standby:
-        """Another policy, ready to take over.
-
-        Raises:
-            FulmarError: It cannot take the place of the one that runs.
-        """
-        settings = dataclasses.replace(self.settings, policy=folder)
-        controller = self._make_controller(self.robot, self.task, settings)
-        if controller.observation_names != self.controller.observation_names:
-            raise ConfigError("it sees something else than the controller that runs")
-        return ready(controller, self.robot)
+        return load_other(
+            self._make_controller, self.robot, self.task, self.settings, folder, like=self.controller
+        )
 
     def _take_turns(self) -> None:
         """Between two control steps: let a new policy take over, and say so."""
@@ -283,12 +269,12 @@ class ControllerNode(LifecycleNode):
         self._tell_status(self._decide())
 
     def _on_block(self, message: PoseStamped) -> None:
-        place = message.pose.position
-        if message.header.frame_id != "odom" or not np.isfinite((place.x, place.y)).all():
-            self.get_logger().warning("place of the block refused: it must be finite and in 'odom'")
+        place, problem = block_of(message)
+        if place is None:
+            self.get_logger().warning(f"place of the block refused: {problem}")
             return
         with self._lock:
-            self.mission.see_block(np.array([place.x, place.y]), stamp_ns(message.header.stamp))
+            self.mission.see_block(place, stamp_ns(message.header.stamp))
             self._follow_mission()
         self._go_on()
 
@@ -338,8 +324,7 @@ class ControllerNode(LifecycleNode):
         """How the robot is outside its area right now; empty if it is not, or if nobody knows."""
         if self._newest is None:
             return ""
-        x, y = (float(value) for value in self._newest.state.position_in_world[:2])
-        return outside(x, y, self.settings.area)
+        return outside(*self._newest.state.position_in_world[:2].tolist(), self.settings.area)
 
     def _step(self) -> None:
         """One beat of the clock."""
@@ -380,12 +365,9 @@ class ControllerNode(LifecycleNode):
         self._tell_status(decision)
 
     def _speak(self, publish: Callable[[], None]) -> bool:
-        """Publish a command, if commands may still go out.
+        """Publish a command, and say so, if commands may still go out.
 
         What a controller that hung comes up with after all must not follow the safe command of the end.
-
-        Returns:
-            Whether they may.
         """
         with self._speaking:
             if self._flags.activated:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import FulmarError
+from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.robot import Robot
 from fulmar_core.safety.succession import Succession
 from fulmar_core.tasks import Task
@@ -45,6 +46,26 @@ def line_up(
         complain(f"falling back to {settings.fallback}: {error}")
         return Succession(None, fallback, refused=str(error))
     return Succession(ready(controller, robot), fallback)
+
+
+def load_other(
+    make_controller: MakeController,
+    robot: Robot,
+    task: Task,
+    settings: ControllerSettings,
+    folder: str,
+    *,
+    like: Controller,
+) -> Standby:
+    """Another policy, ready to take over from `like`; the other arguments as of `line_up`.
+
+    Raises:
+        FulmarError: It cannot take the place of the one that runs.
+    """
+    controller = make_controller(robot, task, dataclasses.replace(settings, policy=folder))
+    if controller.observation_names != like.observation_names:
+        raise ConfigError("it sees something else than the controller that runs")
+    return ready(controller, robot)
 
 
 def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby | None:
