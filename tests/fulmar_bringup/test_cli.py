@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup import cli
+from fulmar_bringup import cli, conductor
 from fulmar_core import policy_bundle
 from fulmar_core.paths import config_directory
 from fulmar_ros import provenance
@@ -98,6 +98,9 @@ RUN = ["run", "floating_platform"]
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),
         ([*RUN, "--goal", "1,2"], "--goal = '1,2' must be three finite numbers"),
         ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),
+        ([*RUN, "--area=2,-2,0,1"], "--area = '2,-2,0,1' must be x_min,x_max,y_min,y_max"),
+        ([*RUN, "--area=1,2,3"], "--area = '1,2,3' must be x_min,x_max,y_min,y_max"),
+        ([*RUN, "--max-run-time", "0"], "--max-run-time"),
         ([*RUN, "--duration", "nan"], "duration"),
         ([*RUN, "--rate", "nan"], "rate"),
         ([*RUN, "--seed", "-1"], "--seed"),
@@ -373,3 +376,19 @@ def test_looking_around_loads_neither_ros_nor_torch_nor_a_simulator():
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_limits_of_a_run_reach_its_plan(fulmar, monkeypatch, tmp_path):
+    class PlannedError(Exception):
+        """Nothing is started."""
+
+    def conduct(request):
+        guards.append(request.plan.guards)
+        raise PlannedError
+
+    guards = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(conductor, "conduct", conduct)
+    with pytest.raises(PlannedError):
+        fulmar(*RUN, "--area=-2,2,-1,1", "--max-run-time", "60")
+    assert (guards[0].area, guards[0].max_run_time_s) == ((-2.0, 2.0, -1.0, 1.0), 60.0)

@@ -154,6 +154,20 @@ def test_a_system_without_guards_has_none_of_their_parameters():
         assert name not in {**nodes["plant"].parameters, **nodes["controller"].parameters}
 
 
+@pytest.mark.parametrize(
+    ("chosen", "repeats"),
+    [
+        ({"robot": "turtlebot2", "backend": "hardware"}, True),
+        ({"robot": "turtlebot2", "backend": "hardware", "hardware": "turtlebot2_kobuki_node"}, True),
+        ({"robot": "turtlebot2", "backend": "mujoco"}, False),
+        ({"backend": "hardware"}, False),  # valves, below motion capture
+    ],
+)
+def test_only_odometry_that_a_device_at_rest_repeats_may_repeat(chosen, repeats):
+    controller = by_name(list_nodes(controller="classical", **chosen))["controller"]
+    assert controller.parameters.get("odometry_may_repeat", False) is repeats
+
+
 def test_hardware_has_an_e_stop_unless_a_system_file_says_otherwise():
     assert default_guards("policy", "hardware", "turtlebot2").estop
     assert not default_guards("policy", "mujoco").estop

@@ -81,9 +81,10 @@ class Neighbour:
                 {pair.key: pair.value for pair in status.values},
             )
 
-    def command(self, values: list[float], names: list[str] | None = None) -> None:
-        """Send one command."""
-        self._command.publish(VectorWriter(names or self.robot.actuators.names).write(np.array(values), 0))
+    def command(self, values: list[float], names: list[str] | None = None, stamp_ns: int = 0) -> None:
+        """Send one command, an answer to the observation of a stamp or to none."""
+        writer = VectorWriter(names or self.robot.actuators.names)
+        self._command.publish(writer.write(np.array(values), stamp_ns))
 
     @staticmethod
     def twist(speed: float, turn_rate: float) -> TwistStamped:

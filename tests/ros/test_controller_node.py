@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import itertools
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
+from rclpy.lifecycle import TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 
 from fulmar_core.controllers.lqr import Lqr
@@ -26,6 +29,7 @@ from fulmar_core.topics import (
     SWAP,
     TRUTH,
 )
+from fulmar_ros import control_beat
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.goal_messages import goal_message
@@ -37,6 +41,44 @@ from tests.conftest import RosDomain
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
 
 pytestmark = pytest.mark.real_time
+
+
+def lqr_that(**changes: Callable) -> Callable[[Robot, GoToPose, ControllerSettings], Lqr]:
+    """The LQR with some of its methods replaced."""
+
+    def make(robot: Robot, task: GoToPose, settings: ControllerSettings) -> Lqr:
+        good = make_lqr(robot, task, settings)
+        good.__class__ = type("Changed", (Lqr,), changes)
+        return good
+
+    return make
+
+
+@contextmanager
+def running(make: Callable, codes: list[int], *parameters: str) -> Iterator[ControllerNode]:
+    """A controller node at 50 Hz, stopped at the end."""
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=50.0"]
+    for parameter in parameters:
+        arguments += ["-p", parameter]
+    node = ControllerNode(make, codes.append, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        yield node
+        node.stop()
+
+
+@contextmanager
+def measured(neighbour: Neighbour) -> Iterator[Stream]:
+    """Odometry for as long as the context lasts."""
+    odometry = Stream(neighbour)
+    try:
+        yield odometry
+    finally:
+        odometry.stop()
+
+
+def told(neighbour: Neighbour, key: str) -> str:
+    """A value of the controller's status; empty before the first."""
+    return neighbour.said.get("controller", ("", {}))[1].get(key, "")
 
 
 def spoil_value(message: Odometry) -> None:
@@ -69,21 +111,52 @@ def test_unbelievable_odometry_gets_closed_valves_and_a_reason(
 ) -> None:
     """Each fault alone, after a good start."""
     stream.spoil = spoil
-    until(lambda: reason in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: reason in told(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
 def test_a_frozen_sensor_is_noticed(stream: Stream) -> None:
     """Stamps go on, the pose does not move by a micrometre."""
     stream.moving = False
-    until(lambda: "stuck" in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: "stuck" in told(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
+
+
+def test_a_base_that_has_stood_for_long_goes_when_it_is_given_a_goal(neighbour: Neighbour) -> None:
+    """Encoders at rest tell the very same; only motion could change that."""
+    with running(make_lqr, [], "odometry_may_repeat:=true"), measured(neighbour) as odometry:
+        odometry.moving = False
+        until(lambda: told(neighbour, "reason") == "no goal yet")
+        time.sleep(5.0)
+        assert told(neighbour, "reason") == "no goal yet"
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+
+
+def test_a_place_that_jumps_is_told_and_the_controller_begins_anew(neighbour: Neighbour) -> None:
+    resets: list[int] = []
+
+    def reset(self: Lqr) -> None:
+        resets.append(1)
+        Lqr.reset(self)
+
+    def jump(message: Odometry) -> None:
+        message.pose.pose.position.x += 3.0
+
+    with running(lqr_that(reset=reset), []) as node, measured(neighbour) as odometry:
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        begun = len(resets)
+        odometry.spoil = jump
+        until(lambda: told(neighbour, "epoch") == "1")
+        until(lambda: len(resets) == begun + 1)
+        until(lambda: node.mission.complete and neighbour.commands[-1].any())
 
 
 def test_a_stamp_that_goes_back_is_refused(stream: Stream) -> None:
     """Reordered or replayed measurements do not move the robot."""
     stream.step_ns = -20_000_000
-    until(lambda: "went back" in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: "went back" in told(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
@@ -93,7 +166,7 @@ def test_silence_of_the_odometry_closes_the_valves(stream: Stream) -> None:
     since = time.monotonic()
     until(lambda: not stream.neighbour.commands[-1].any())
     assert time.monotonic() - since < 0.4
-    until(lambda: "no usable odom" in stream.neighbour.said["controller"][1]["reason"])
+    until(lambda: "no usable odom" in told(stream.neighbour, "reason"))
 
 
 def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
@@ -111,37 +184,73 @@ def test_a_controller_that_raises_commands_what_is_safe_and_ends(
 ) -> None:
     """The robot does not wait for the watchdog."""
 
-    class Raising(Lqr):
-        def act(self, observation: np.ndarray) -> np.ndarray:
-            if np.any(observation):
-                raise ZeroDivisionError("no gain today")
-            return super().act(observation)
-
-    def make(robot: Robot, task: GoToPose, settings: ControllerSettings) -> Lqr:
-        good = make_lqr(robot, task, settings)
-        good.__class__ = Raising
-        return good
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        if np.any(observation):
+            raise ZeroDivisionError("no gain today")
+        return Lqr.act(self, observation)
 
     codes: list[int] = []
-    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=50.0"]
-    node = ControllerNode(make, codes.append, cli_args=arguments)
-    with spinning(node, lambda error: pytest.fail(repr(error))):
+    with running(lqr_that(act=act), codes), measured(neighbour):
         neighbour.give_goal()
-        odometry = Stream(neighbour)
         until(lambda: codes != [])
-        odometry.stop()
+        until(lambda: "no gain today" in told(neighbour, "reason"))
         assert set(codes) == {1}
-        until(lambda: "no gain today" in neighbour.said["controller"][1]["reason"])
         assert not any(command.any() for command in neighbour.commands)
-        node.stop()
 
 
 def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
     """Judged at once, not at the next measurement."""
     neighbour = stream.neighbour
     neighbour.goal_publisher.publish(goal_message(goal_at((300.0, 0.0, 0.0)), "goal_pose", 2))
-    until(lambda: "geofence" in neighbour.said["controller"][1]["reason"])
+    until(lambda: "geofence" in told(neighbour, "reason"))
     until(lambda: not neighbour.commands[-1].any())
+
+
+def test_a_robot_that_left_its_area_waits_there_and_back_inside_for_somebody_to_give_a_goal(
+    neighbour: Neighbour,
+) -> None:
+    with running(make_lqr, [], "area:=[-1.0, 1.0, -1.0, 1.0]"), measured(neighbour) as odometry:
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+
+        def beyond(message: Odometry) -> None:
+            message.pose.pose.position.x += 1.1
+
+        odometry.spoil = beyond
+        until(lambda: "outside its area" in told(neighbour, "reason"))
+        until(lambda: not neighbour.commands[-1].any())
+        neighbour.give_goal()  # still out there
+        time.sleep(0.3)
+        assert "outside its area" in told(neighbour, "reason")
+        odometry.spoil = lambda _message: None
+        count = len(neighbour.commands)
+        until(lambda: len(neighbour.commands) > count + 25)
+        assert not any(command.any() for command in neighbour.commands[count + 1 :])
+        assert "outside its area" in told(neighbour, "reason")
+        neighbour.give_goal()
+        until(lambda: neighbour.commands[-1].any())
+
+
+def test_a_run_that_has_acted_for_as_long_as_it_may_stops(neighbour: Neighbour) -> None:
+    with running(make_lqr, [], "max_run_time_s:=0.5"), measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        since = time.monotonic()
+        until(lambda: "max_run_time of 0.5 s is over" in told(neighbour, "reason"))
+        assert time.monotonic() - since > 0.3
+        until(lambda: not neighbour.commands[-1].any())
+
+
+def test_beats_that_all_come_late_are_a_fault(neighbour: Neighbour) -> None:
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        time.sleep(0.05 if np.any(observation) else 0.0)
+        return Lqr.act(self, observation)
+
+    with running(lqr_that(act=act), [], "overruns_to_stop:=5"), measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: "5 beats in a row came late" in told(neighbour, "reason"))
+        assert told(neighbour, "mode") == "fault"
+        until(lambda: not neighbour.commands[-1].any())
 
 
 def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: ControllerNode) -> None:
@@ -151,6 +260,11 @@ def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: Con
     count = len(stream.neighbour.commands)
     time.sleep(0.2)
     assert len(stream.neighbour.commands) == count
+
+
+def test_shutdown_from_active_ends_with_the_safe_command(stream: Stream, controller: ControllerNode) -> None:
+    controller.trigger_shutdown()
+    until(lambda: not stream.neighbour.commands[-1].any())
 
 
 def test_copies_of_a_command_come_within_its_period(neighbour: Neighbour, monkeypatch) -> None:
@@ -178,3 +292,99 @@ def test_copies_of_a_command_come_within_its_period(neighbour: Neighbour, monkey
 def test_more_copies_than_fit_into_a_period_are_refused() -> None:
     with pytest.raises(ValueError, match="copies = 4 must be from 1 to 3"):
         ControllerSettings(copies=4)
+
+
+def test_a_control_loop_that_fails_outside_the_controller_is_a_fault_and_ends_the_process(
+    neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thread that just ended would leave a node that looks as if it waited."""
+    codes: list[int] = []
+    with running(make_lqr, codes) as node, measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+
+        def lost(*_: object) -> None:
+            raise OSError("the middleware is gone")
+
+        monkeypatch.setattr(node.wires, "publish_reasoning", lost)
+        until(lambda: codes == [1])
+        until(lambda: "the middleware is gone" in told(neighbour, "reason"))
+        assert told(neighbour, "mode") == "fault"
+
+
+@pytest.mark.parametrize("fallback", [False, True])
+def test_a_controller_that_raises_when_it_begins_anew_is_given_up(
+    fallback: bool, neighbour: Neighbour
+) -> None:
+    resets: list[int] = []
+
+    def reset(_self: Lqr) -> None:
+        resets.append(1)
+        if len(resets) > 1:  # the first is part of the warm-up
+            raise OSError("no memory")
+
+    codes: list[int] = []
+    parameters = ["fallback:=lqr"] if fallback else []
+    with running(lqr_that(reset=reset), codes, *parameters), measured(neighbour):
+        neighbour.give_goal()
+        if fallback:
+            until(lambda: "no memory" in told(neighbour, "fell_back"))
+            until(lambda: neighbour.commands[-1].any())
+            assert codes == []
+        else:
+            until(lambda: "no memory" in told(neighbour, "reason"))
+            assert set(codes) == {1}
+
+
+def test_what_a_controller_that_hung_comes_up_with_does_not_follow_the_safe_command(
+    neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(control_beat, "PATIENCE_S", 0.2)
+    hangs, release, over = threading.Event(), threading.Event(), threading.Event()
+
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        command = Lqr.act(self, observation)
+        if hangs.is_set():
+            release.wait()
+            over.set()
+        return command
+
+    with running(lqr_that(act=act), []) as node, measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        hangs.set()
+        time.sleep(0.1)
+        node.trigger_deactivate()
+        until(lambda: not neighbour.commands[-1].any())
+        assert node.trigger_activate() != TransitionCallbackReturn.SUCCESS
+        release.set()
+        until(over.is_set)
+        time.sleep(0.2)
+        assert not neighbour.commands[-1].any()
+
+
+def test_a_goal_that_comes_while_the_controller_acts_does_not_take_its_memory_away_meanwhile(
+    neighbour: Neighbour,
+) -> None:
+    acting = threading.Event()
+
+    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+        acting.set()
+        time.sleep(0.01)
+        acting.clear()
+        return Lqr.act(self, observation)
+
+    def reset(self: Lqr) -> None:
+        resets.append(acting.is_set())
+        Lqr.reset(self)
+
+    resets: list[bool] = []
+    with running(lqr_that(act=act, reset=reset), []), measured(neighbour):
+        neighbour.give_goal()
+        until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
+        begun = len(resets)
+        for _ in range(30):
+            neighbour.give_goal()
+            time.sleep(0.013)
+        assert len(resets) > begun + 10
+        assert not any(resets)

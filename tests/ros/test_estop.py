@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -91,6 +95,26 @@ def test_an_e_stop_whose_process_dies_stops_the_robot_by_its_silence(
     until(lambda: "silent" in neighbour.said["plant"][0])
 
 
+def test_a_press_outlives_the_process_of_its_button(neighbour: Neighbour, plant: PlantNode) -> None:
+    """Pressed, killed, started anew: nothing moves before somebody resets it."""
+    publisher = neighbour.node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
+    until(lambda: drive(neighbour))
+    until(lambda: publisher.publish(Bool(data=True)) or "pressed" in neighbour.said.get("plant", ("",))[0])
+    until(lambda: not drive(neighbour) and "silent" in neighbour.said["plant"][0])
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    node = EstopNode(lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: not drive(neighbour) and "when it fell silent" in neighbour.said["plant"][0])
+        for _ in range(50):
+            time.sleep(0.02)
+            assert not drive(neighbour)
+        neighbour.command([0.0] * 8)
+        time.sleep(0.1)
+        assert ask(neighbour, ESTOP_RESET).success
+        until(lambda: drive(neighbour))
+        node.stop()
+
+
 def test_a_controller_forgets_its_goal_so_that_nothing_moves_by_itself_after_a_reset(
     stream: Stream, button: EstopNode
 ) -> None:
@@ -130,6 +154,42 @@ def test_the_command_stops_a_robot_that_has_no_e_stop_node(
     until(lambda: not drive(neighbour))
     time.sleep(0.6)
     assert not drive(neighbour)
+
+
+def test_an_e_stop_node_that_hangs_keeps_neither_its_robot_nor_another_from_being_stopped(
+    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """The node of a robot whose name comes first, and that of the robot itself, are stopped processes."""
+    nodes = [
+        subprocess.Popen(
+            [sys.executable, "-m", "fulmar_ros.estop_node", "--ros-args", "-r", f"__ns:=/{name}"],
+            env=ros_domain.env,
+        )
+        for name in ("a_robot", "floating_platform")
+    ]
+    try:
+        for name in ("a_robot", "floating_platform"):
+            assert neighbour.node.create_client(Trigger, f"/{name}/{ESTOP_TRIGGER}").wait_for_service(8.0)
+        until(lambda: drive(neighbour))
+        for node in nodes:
+            node.send_signal(signal.SIGSTOP)
+        done = fulmar("estop", "--json", env=ros_domain.env, cwd=tmp_path)
+        said = {answer["robot"]: answer for answer in json.loads(done.stdout)["robots"]}
+        assert said["floating_platform"]["done"], said
+        assert "does not answer" in said["floating_platform"]["said"]
+        assert not said["a_robot"]["done"]  # it has no plant that could hear
+        assert done.returncode == 1
+        assert "Traceback" not in done.stderr
+        until(lambda: not drive(neighbour) and "silent" in neighbour.said["plant"][0])
+        for node in nodes:
+            node.send_signal(signal.SIGCONT)
+        for _ in range(60):  # they still say "released"
+            time.sleep(0.02)
+            assert not drive(neighbour)
+    finally:
+        for node in nodes:
+            node.kill()
+            node.wait()
 
 
 def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain, monkeypatch) -> None:

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from fulmar_core.backend import Sample
-from fulmar_core.topics import COMMAND
+from fulmar_core.topics import COMMAND, SIMULATION_START_NS
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import spinning
@@ -48,6 +48,22 @@ def test_a_senseless_command_is_refused_and_named(
     """The valves stay closed, and the diagnostics say why."""
     until(lambda: neighbour.command(values, names) or reason in neighbour.said.get("plant", ("",))[0])
     assert not any(applied.any() for applied in neighbour.applied)
+
+
+def test_an_answer_to_an_old_observation_opens_no_valve(neighbour: Neighbour, plant: PlantNode) -> None:
+    """The watchdog is 0.4 s; answers half a second old come all the time, with stamps that go on."""
+
+    def answer(age_ns: int) -> bool:
+        neighbour.command(open_valves(neighbour.robot), stamp_ns=plant.clock.now_ns - age_ns)
+        time.sleep(0.02)
+        return bool(neighbour.applied[-1].any())
+
+    until(lambda: plant.clock.now_ns > SIMULATION_START_NS + 500_000_000)
+    end = time.monotonic() + 0.7
+    while time.monotonic() < end:
+        assert not answer(500_000_000)
+    until(lambda: "older than the watchdog's 400 ms" in neighbour.said["plant"][0])
+    until(lambda: answer(100_000_000))
 
 
 def test_a_stale_command_does_not_survive_a_deactivation(neighbour: Neighbour, plant: PlantNode) -> None:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import os
 import subprocess
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sensor_msgs.msg import Joy
+from rclpy.node import Node
+from sensor_msgs.msg import JointState, Joy
 from std_srvs.srv import Trigger
 
-from fulmar_core.topics import GIVE_BACK, JOY
+from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
+from fulmar_ros import teleop_node
 from fulmar_ros.plant_node import PlantNode
-from fulmar_ros.qos import publisher_qos
+from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 from fulmar_ros.teleop_node import TeleopNode
 from tests.conftest import RosDomain
@@ -79,6 +82,45 @@ def test_the_controller_gets_the_robot_back_when_the_person_says_so(pad: Pad) ->
         return bool(pad.neighbour.applied[-1][0])
 
     until(given_back)
+
+
+def test_a_plant_that_dies_while_it_is_asked_does_not_keep_the_hand_for_ever(
+    neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first one takes the request and is gone before it answers; the next gives the robot back."""
+    monkeypatch.setattr(teleop_node, "ANSWER_S", 0.5)
+    asked, answers = threading.Event(), threading.Event()
+
+    def die(_request: Trigger.Request, _response: Trigger.Response) -> Trigger.Response:
+        asked.set()
+        answers.wait()  # for as long as its node lives
+        raise InterruptedError
+
+    first = Node("plant", namespace=NAMESPACE)
+    first.create_service(Trigger, GIVE_BACK, die)
+    given: list[bool] = []
+    driven: list[JointState] = []
+    neighbour.node.create_subscription(JointState, TELEOP.name, driven.append, subscriber_qos(TELEOP))
+
+    def give(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        given.append(True)
+        response.success, response.message = True, "the controller has the robot again"
+        return response
+
+    node = TeleopNode(
+        lambda _code: None, cli_args=["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "keyboard:=false"]
+    )
+    pad = Pad(neighbour)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        with spinning(first, lambda _error: None):
+            until(lambda: pad.say(held=True) or bool(driven))
+            until(lambda: pad.say(held=False, gives_back=True) or asked.is_set())
+            answers.set()
+        second = Node("plant", namespace=NAMESPACE)
+        second.create_service(Trigger, GIVE_BACK, give)
+        with spinning(second, lambda error: pytest.fail(repr(error))):
+            until(lambda: pad.say(held=False, gives_back=True) or bool(given))
+        node.stop()
 
 
 def test_it_is_not_given_back_while_the_hand_moves_something(pad: Pad) -> None:

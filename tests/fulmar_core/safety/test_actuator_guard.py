@@ -123,6 +123,26 @@ def test_a_stray_stamp_from_the_future_locks_nobody_out_beyond_one_trip(guard):
     assert guard.offer(NAMES, GOOD, 10_001 * MS, stamp_ns=5000 * MS)
 
 
+def test_what_was_left_in_a_queue_opens_no_valve_after_a_trip(guard):
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=9000 * MS)
+    assert not guard.output(300 * MS).any()
+    assert guard.watchdog.tripped
+    assert not guard.offer(NAMES, GOOD, 301 * MS, stamp_ns=5000 * MS)
+    assert not guard.output(302 * MS).any()
+
+
+def test_an_answer_to_what_is_older_than_the_watchdog_opens_no_valve_and_does_not_feed_it(guard):
+    assert not guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS, outdated=True)
+    assert "older than the watchdog's 200 ms" in guard.last_rejection
+    assert not guard.output(1).any()
+    assert guard.watchdog.silent_ns(1) == 0
+
+
+def test_in_lock_step_no_answer_is_too_old_since_time_stands_still():
+    guard = ActuatorGuard(THRUSTERS, Watchdog(200 * MS), lockstep=True)
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS, outdated=True)
+
+
 WHEELS = load_robot("turtlebot2").actuators  # may change by 0.9 m/s and 1.8 rad/s a second
 
 
@@ -169,6 +189,7 @@ class TestEstop:
     def test_after_a_release_only_a_new_command_opens_a_valve(self, guard):
         guard.estop.hear(True, 0)
         guard.offer(NAMES, GOOD, 1)
+        guard.estop.hear(False, 400 * MS)
         guard.estop.hear(False, 600 * MS)
         assert not guard.output(601 * MS).any()
         guard.offer(NAMES, GOOD, 602 * MS)

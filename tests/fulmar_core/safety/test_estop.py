@@ -27,6 +27,7 @@ def test_pressed_stops_and_released_lets_go():
     watch = EstopWatch(required=False)
     watch.hear(True, 0)
     assert "pressed" in watch.reason(1)
+    watch.hear(False, TIMEOUT_NS)
     watch.hear(False, TIMEOUT_NS + 1)
     assert watch.reason(TIMEOUT_NS + 2) == ""
 
@@ -44,6 +45,28 @@ def test_of_two_buttons_the_pressed_one_counts():
         watch.hear(True, t * MS)
         watch.hear(False, (t + 10) * MS)
         assert watch.reason((t + 20) * MS)
+
+
+def test_a_press_outlives_its_button_until_a_reset_which_begins_with_another_press():
+    watch = EstopWatch(required=False)
+    watch.hear(True, 0)
+    assert "silent" in watch.reason(3000 * MS)
+    for t in range(3000, 6000, 100):  # started anew, it knows nothing
+        watch.hear(False, t * MS)
+        assert "Reset it" in watch.reason(t * MS)
+    watch.hear(True, 6000 * MS)
+    watch.hear(False, 6100 * MS)
+    assert watch.reason(6100 * MS)
+    watch.hear(False, 6600 * MS)
+    assert watch.reason(6600 * MS) == ""
+
+
+def test_a_button_that_was_silent_for_a_while_but_not_pressed_is_believed_again():
+    watch = EstopWatch(required=False)
+    watch.hear(False, 0)
+    assert watch.reason(3000 * MS)
+    watch.hear(False, 3000 * MS)
+    assert watch.reason(3000 * MS) == ""
 
 
 def test_the_button_stays_pressed_until_it_is_reset():
@@ -103,5 +126,6 @@ def test_it_tells_whether_it_ever_allowed_anything(required):
     watch = EstopWatch(required=required)
     watch.hear(True, 0)
     assert not watch.was_released
+    watch.hear(False, TIMEOUT_NS)
     watch.hear(False, TIMEOUT_NS + 1)
     assert watch.was_released

@@ -140,6 +140,27 @@ def test_repetition_counts_anew_in_a_new_epoch():
     assert reasons[4] == ""
 
 
+def test_a_jump_of_place_is_told_once_and_begins_a_new_epoch():
+    gate = InputGate(LIMITS, jump_m=1.0)
+    assert gate.problem(measurement(100 * SECOND)) is None
+    first = gate.problem(measurement(100 * SECOND + 20_000_000, x=500.0)) or ""
+    assert "odom place jumped by 500.0 m within 20 ms: a new epoch begins" in first
+    assert gate.problem(measurement(100 * SECOND + 40_000_000, x=500.01)) is None
+    assert gate.epoch == 1
+
+
+def test_what_speed_and_a_correction_explain_is_no_jump():
+    gate = InputGate(LIMITS, jump_m=1.0)
+    gate.problem(measurement(100 * SECOND))
+    assert gate.problem(measurement(103 * SECOND, x=6.9)) is None  # 3 s at 2 m/s, and 0.9 m
+
+
+def test_where_episodes_begin_anywhere_no_place_is_too_far():
+    gate = InputGate(LIMITS)
+    gate.problem(measurement(1))
+    assert gate.problem(measurement(2, x=500.0)) is None
+
+
 def test_an_unbelievable_measurement_begins_no_epoch():
     gate = InputGate(LIMITS)
     gate.problem(measurement(1))

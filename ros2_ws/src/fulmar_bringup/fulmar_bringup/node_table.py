@@ -26,6 +26,7 @@ from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
+from hardware_drivers.settings import load_hardware
 
 Parameter = bool | int | float | str | list[float] | list[int]
 
@@ -102,6 +103,9 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         parameters["area"] = list(guards.area)
     if guards.estop:
         parameters["estop"] = True
+    on_hardware = plan.backend == "hardware" and not guards.estimator
+    if on_hardware and not load_hardware(plan.hardware).seen_from_outside:
+        parameters["odometry_may_repeat"] = True  # encoders of a base at rest do; motion capture never does
     if plan.copies > 1:
         parameters["copies"] = plan.copies
     return NodeSpec(

@@ -5,25 +5,27 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_bringup.processes import child_environment
 from fulmar_core.errors import RunFailed
-from fulmar_core.safety.estop import REPUBLISH_HZ
 from fulmar_core.topics import ESTOP, STATUS, SWAP
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
 FIND_S, ANSWER_S, SAY_S = 3.0, 2.0, 1.0
-LOOK_S, SETTLE_S = 0.05, 0.3
+LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
+
+Answer = tuple[bool, str]  # whether it was done, and what was said
 
 
 class Operator:
@@ -62,34 +64,69 @@ class Operator:
         Raises:
             RunFailed: No answer comes.
         """
-        client = self._node.create_client(Trigger, service)
-        if not client.wait_for_service(ANSWER_S):
-            raise RunFailed(f"nobody answers on {service}.")
-        future = client.call_async(Trigger.Request())
-        until = time.monotonic() + ANSWER_S
-        while not future.done():
-            if time.monotonic() > until:
-                raise RunFailed(f"{service} did not answer within {ANSWER_S:g} s.")
-            time.sleep(0.005)
-        return future.result().success, future.result().message
+        answer = self.ask_all([service])[service]
+        if answer is None:
+            raise RunFailed(f"nobody answers on {service} within {ANSWER_S:g} s.")
+        return answer
 
-    def say_stop(self, space: str) -> bool:
-        """Say on the wire itself that the e-stop is pressed, for those who have no e-stop node.
+    def ask_all(
+        self, services: Sequence[str], meanwhile: Callable[[], bool] = lambda: True
+    ) -> dict[str, Answer | None]:
+        """Call Trigger services by their full names, all at once.
+
+        Args:
+            services: Which.
+            meanwhile: Called over and over until it returns true, for at least as long as answers are missing.
 
         Returns:
-            Whether somebody hears it.
+            What each said; None where no answer comes within 2 s.
         """
-        publisher = self._node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
-        until = time.monotonic() + FIND_S
-        while not publisher.get_subscription_count() and time.monotonic() < until:
-            publisher.publish(Bool(data=True))
-            time.sleep(LOOK_S)
-        heard = bool(publisher.get_subscription_count())
-        until = time.monotonic() + SAY_S
-        while time.monotonic() < until:
-            publisher.publish(Bool(data=True))
-            time.sleep(1.0 / REPUBLISH_HZ)
-        return heard
+        clients = {service: self._node.create_client(Trigger, service) for service in services}
+        futures: dict[str, Future] = {}
+        until = time.monotonic() + ANSWER_S
+        while True:
+            for name, client in clients.items():
+                if name not in futures and client.service_is_ready():
+                    futures[name] = client.call_async(Trigger.Request())
+            answered = all(name in futures and futures[name].done() for name in clients)
+            if meanwhile() and (answered or time.monotonic() > until):
+                break
+            time.sleep(ASK_S)
+        said = {name: future.result() for name, future in futures.items() if future.done()}
+        return {name: (said[name].success, said[name].message) if name in said else None for name in clients}
+
+    def stop_all(
+        self, spaces: Sequence[str], services: Sequence[str]
+    ) -> tuple[set[str], dict[str, Answer | None]]:
+        """Say on the wires themselves that the e-stop is pressed, and ask the nodes for it to say so from then on.
+
+        Args:
+            spaces: Namespaces of robots.
+            services: Of those that have an e-stop node.
+
+        Returns:
+            In which namespaces somebody hears the wire, and what the nodes say, as of `ask_all`.
+        """
+        wires = {
+            space: self._node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
+            for space in spaces
+        }
+        began = said = -1.0
+        heard: set[str] = set()
+
+        def say() -> bool:
+            nonlocal began, said
+            now = time.monotonic()
+            began = now if began < 0.0 else began
+            if now - said > LOOK_S:
+                said = now
+                for space, wire in wires.items():
+                    wire.publish(Bool(data=True))
+                    if wire.get_subscription_count():
+                        heard.add(space)
+            return now - began > (SAY_S if len(heard) == len(wires) else FIND_S)
+
+        return heard, self.ask_all(services, say)
 
     def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
         """Ask a controller to go on with another policy.

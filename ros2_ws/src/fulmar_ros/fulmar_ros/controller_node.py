@@ -6,6 +6,7 @@ import dataclasses
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -14,43 +15,33 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.observation import slewed
-from fulmar_core.planar import planar_of
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.safety.arbiter import Decision, Flags, Mode, arbitrate
+from fulmar_core.robot import load_robot
+from fulmar_core.safety.arbiter import Decision, Mode, arbitrate
 from fulmar_core.safety.area import outside
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.estop import EstopWatch
-from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.safety.watchdog import default_timeout
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.tasks import load_task
+from fulmar_ros.actuator_watch import ActuatorWatch
+from fulmar_ros.control_beat import ControlBeat
 from fulmar_ros.controller_settings import ControllerSettings
+from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
-from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.goal_messages import GoalMessage
-from fulmar_ros.message_reader import goal_of, measurement_of, obstacles_of, stamp_ns
+from fulmar_ros.line_up import MakeController, line_up, load_other
+from fulmar_ros.message_reader import block_of, goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 from fulmar_ros.parameters import read_parameters
-from fulmar_ros.phase import ArrivalPhase
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.standby import Standby, ready
+from fulmar_ros.standby import Standby
 
-MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
-PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
-FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the one that was due
-PATIENCE = 0.25  # of a period, for a measurement that is late
-COPY_AFTER = 0.2  # of a period; the copies of a command are over before the next one
-PATIENCE_AT_FIRST = 0.9  # the same while nobody knows yet when measurements come
 SAFE_REPEATS = 5
-STATUS_PERIOD_S = 0.4  # at least 2 Hz
 
 
 class ControllerNode(LifecycleNode):
@@ -81,38 +72,30 @@ class ControllerNode(LifecycleNode):
         self.task = load_task(self.settings.task)
         self._make_controller, self._request_exit = make_controller, request_exit
         self._lock = threading.Lock()
-        self._stop = threading.Event()
-        self._arrived = threading.Event()  # a measurement, since a beat waits for one
-        self._thread: threading.Thread | None = None
+        self._speaking = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
-        timeout_s = self.settings.input_timeout_s or default_timeout(1.0 / hz) / min(self.settings.rate, 1.0)
-        self._flags = Flags(
-            input_timeout_ns=round(timeout_s * 1e9),
-            geofence=self.robot.limits.geofence,
-            max_run_time_s=self.settings.max_run_time_s,
-        )
+        self._flags = self.settings.flags(self.robot)
         self._estop = EstopWatch(required=self.settings.estop)
-        noisy = self.robot.sensors.odometry.position.std > 0.0 and not self.settings.lockstep
-        self._input_gate = InputGate(self.robot.limits, frozen_after=FROZEN_AFTER if noisy else 0)
+        self._input_gate = self.settings.input_gate(self.robot)
+        self._epoch = self._acted_epoch = 0  # of the newest usable measurement, and of the last control step
         self._swap = PolicySwap(
             self._load if learned else None,
             propose=lambda candidate: self._succession.propose(candidate),
             warn=self.get_logger().warning,
         )
         self._acted = 0  # control steps
+        self._anew = False  # the controller forgets what was before, at its next step
         self._newest: Measurement | None = None
         self.mission = Mission(self.robot, self.task, streamed=self.settings.goals_streamed)
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
-        self._period_s = 1.0 / (hz * self.settings.rate)
         self._pause_ns = self.settings.pause_ns(self.robot)
-        self._deadlines = self._new_deadlines()
-        self._phase = ArrivalPhase(self.settings.rate)
-        self._inference_ms = Spread()
-        self._steps = 0
-        self._said: tuple[object, ...] = ()
-        self._said_at = 0.0
+        self._actuators = ActuatorWatch(self._pause_ns)
+        self._beat = ControlBeat(
+            1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
+        )
+        self._status = ControllerStatus(self.mission, self._swap, goals_streamed=self.settings.goals_streamed)
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
@@ -121,12 +104,14 @@ class ControllerNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load, validate and warm up the controller; refuse it if anything is wrong."""
         try:
-            self._succession = self._line_up()
+            self._succession = line_up(
+                self._make_controller, self.robot, self.task, self.settings, self.get_logger().error
+            )
         except (FulmarError, ImportError) as error:
             self._refusal = str(error)
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
-        self._seen_ns = 0
+        self._actuators.forget()
         self.wires = ControllerWires(
             self,
             self.robot,
@@ -142,7 +127,7 @@ class ControllerNode(LifecycleNode):
         )
         self.wires.publish_metadata(self._succession.current.metadata)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
-        self._status_timer = self.create_timer(STATUS_PERIOD_S / 4, self._tell_idle_status)
+        self._status_timer = self.create_timer(PERIOD_S / 4, self._tell_idle_status)
         self._set(configured=True, latched_fault="")
         return DONE
 
@@ -151,48 +136,23 @@ class ControllerNode(LifecycleNode):
         """Whose turn it is."""
         return self._succession.current.controller
 
-    def _line_up(self) -> Succession[Standby]:
-        """The controller that was asked for, or, where it is refused and one is named, its fallback.
-
-        Raises:
-            FulmarError: Both are refused, or the one is and no other is named.
-            ImportError: A library is missing, and no fallback is named.
-        """
-        fallback = self._fallback()
-        try:
-            controller = self._make_controller(self.robot, self.task, self.settings)
-        except (FulmarError, ImportError) as error:
-            if fallback is None:
-                raise
-            self.get_logger().error(f"falling back to {self.settings.fallback}: {error}")
-            return Succession(None, fallback, refused=str(error))
-        return Succession(ready(controller, self.robot), fallback)
-
-    def _fallback(self) -> Standby | None:
-        name = self.settings.fallback
-        if not name:
-            return None
-        law = None if name == "classical" else name
-        hz = self.settings.control_rate(self.robot)
-        controller = load_classical(self.robot, self.task, control_hz=hz, law=law)
-        return ready(controller, self.robot, said={"fallback": True})
-
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to answer, from fresh measurements on."""
+        """Begin to answer, from fresh measurements on; not while the controller still hangs from the last time."""
+        if self._beat.hangs:
+            self._refusal = "the controller still hangs in the step that it was in when it was deactivated"
+            self.get_logger().error(f"not activated: {self._refusal}")
+            return REFUSED
         with self._lock:
             self._newest = None
             self._input_gate.forget()
             self._flags = dataclasses.replace(
-                self._flags, activated=True, last_input_ns=None, input_problem="", active_s=0.0
+                self._flags, activated=True, last_input_ns=None, input_problem="", outside="", active_s=0.0
             )
             self._acted = 0
-        self._deadlines = self._new_deadlines()
-        self._phase = ArrivalPhase(self.settings.rate)
+        self._beat.renew()
         settle_memory()
         if not self.settings.lockstep:
-            self._stop.clear()
-            self._thread = threading.Thread(target=self._run, name="control", daemon=True)
-            self._thread.start()
+            self._beat.start(self._step, lambda: self._speak(self.wires.repeat_command), self._fail)
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -205,31 +165,22 @@ class ControllerNode(LifecycleNode):
         self._dismantle()
         return DONE
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop and let go, from whatever state."""
-        self._dismantle()
-        return DONE
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """As on shutdown: an error never leaves a command standing."""
-        self._dismantle()
-        return DONE
+    # From whatever state, and after an error too: no command is left standing.
+    on_shutdown = on_error = on_cleanup
 
     def stop(self) -> None:
         """Last words before the process ends: the safe command, several times, and the figures of the run."""
         if self._flags.configured:
             self._fall_silent()
-            self._said_at = 0.0
+            self._status.repeat()
             self._tell_status(self._decide())
 
     def _fall_silent(self) -> None:
-        self._stop.set()
         self._set(activated=False)
-        if self._thread is not None:
-            self._thread.join(PATIENCE_S)
-            self._thread = None
-        for _ in range(SAFE_REPEATS):
-            self.wires.publish_safe(self._newest.stamp_ns if self._newest else 0)
+        self._beat.halt()
+        with self._speaking:
+            for _ in range(SAFE_REPEATS):
+                self.wires.publish_safe(self._newest.stamp_ns if self._newest else 0)
         self.wires.flush()
 
     def _dismantle(self) -> None:
@@ -238,9 +189,6 @@ class ControllerNode(LifecycleNode):
             self._set(configured=False)
             self.destroy_timer(self._status_timer)
             self.wires.destroy(self)
-
-    def _new_deadlines(self) -> Deadlines:
-        return Deadlines(1.0 / (self.settings.control_rate(self.robot) * self.settings.rate))
 
     def _set(self, **changes: object) -> None:
         with self._lock:
@@ -260,6 +208,7 @@ class ControllerNode(LifecycleNode):
         if stopped and self._estop.heard:
             self.mission.drop()
             self._follow_mission()
+            self._flags = dataclasses.replace(self._flags, outside=self._outside())
         self._flags = dataclasses.replace(self._flags, estop=stopped)
         return arbitrate(self._flags, now)
 
@@ -272,16 +221,9 @@ class ControllerNode(LifecycleNode):
         self._swap.ask(message.data)
 
     def _load(self, folder: str) -> Standby:
-        """Another policy, ready to take over.
-
-        Raises:
-            FulmarError: It cannot take the place of the one that runs.
-        """
-        settings = dataclasses.replace(self.settings, policy=folder)
-        controller = self._make_controller(self.robot, self.task, settings)
-        if controller.observation_names != self.controller.observation_names:
-            raise ConfigError("it sees something else than the controller that runs")
-        return ready(controller, self.robot)
+        return load_other(
+            self._make_controller, self.robot, self.task, self.settings, folder, like=self.controller
+        )
 
     def _take_turns(self) -> None:
         """Between two control steps: let a new policy take over, and say so."""
@@ -291,7 +233,7 @@ class ControllerNode(LifecycleNode):
 
     def _announce(self) -> None:
         """Say who controls now; what is known of the actuators begins anew."""
-        self._seen_ns = 0
+        self._actuators.forget()
         self.wires.publish_metadata(self._succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
@@ -304,7 +246,11 @@ class ControllerNode(LifecycleNode):
                 self.get_logger().warning("goal refused: the e-stop holds. Reset it first.")
                 return
             if self.mission.give(goal, stamp_ns(message.header.stamp)):
-                self.controller.reset()
+                self._anew = True  # not here: the controller may be acting, in another thread
+                if (
+                    not self.settings.goals_streamed
+                ):  # somebody has looked: he who left may go on, if he is back
+                    self._flags = dataclasses.replace(self._flags, outside=self._outside())
             self._follow_mission()
             if self.settings.lockstep:
                 self._input_gate.forget()
@@ -323,12 +269,12 @@ class ControllerNode(LifecycleNode):
         self._tell_status(self._decide())
 
     def _on_block(self, message: PoseStamped) -> None:
-        place = message.pose.position
-        if message.header.frame_id != "odom" or not np.isfinite((place.x, place.y)).all():
-            self.get_logger().warning("place of the block refused: it must be finite and in 'odom'")
+        place, problem = block_of(message)
+        if place is None:
+            self.get_logger().warning(f"place of the block refused: {problem}")
             return
         with self._lock:
-            self.mission.see_block(np.array([place.x, place.y]), stamp_ns(message.header.stamp))
+            self.mission.see_block(place, stamp_ns(message.header.stamp))
             self._follow_mission()
         self._go_on()
 
@@ -360,93 +306,86 @@ class ControllerNode(LifecycleNode):
             problem = self._input_gate.problem(measurement) or ""
             changes: dict[str, object] = {"input_problem": problem}
             if not problem:
-                now = time.monotonic_ns()
                 if not self.settings.lockstep:
-                    self._follow(measurement, now)
-                self._newest = measurement
-                changes["last_input_ns"] = now
+                    self._beat.follow(measurement.stamp_ns)
+                self._newest, self._epoch = measurement, self._input_gate.epoch
+                changes["last_input_ns"] = time.monotonic_ns()
                 self.mission.turn_to(measurement.stamp_ns)
                 changes["lacking"] = self.mission.lacking
                 changes["has_goal"] = not changes["lacking"]
                 changes["goal_distance"] = self.mission.distance(measurement.state)
-                x, y = (float(value) for value in measurement.state.position_in_world[:2])
-                changes["outside"] = outside(x, y, self.settings.area)
+                changes["outside"] = self._flags.outside or self._outside()
             self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
-        self._arrived.set()
+        self._beat.wake()
         if self.settings.lockstep:
             self._control(measurement)
 
-    def _follow(self, measurement: Measurement, now_ns: int) -> None:
-        """Let the beat follow the arrivals, in real time."""
+    def _outside(self) -> str:
+        """How the robot is outside its area right now; empty if it is not, or if nobody knows."""
         if self._newest is None:
-            take_priority_with_helpers(CONTROL_PRIORITY)
-        anchor = self._phase.anchor_ns(measurement.stamp_ns, now_ns)
-        if anchor is not None:
-            self._deadlines.align(anchor)
+            return ""
+        return outside(*self._newest.state.position_in_world[:2].tolist(), self.settings.area)
 
-    def _run(self) -> None:
-        take_priority(CONTROL_PRIORITY)
-        deadlines = self._deadlines
+    def _step(self) -> None:
+        """One beat of the clock."""
         limit = self.settings.overruns_to_stop
-        while deadlines.wait(self._stop):
-            if limit and deadlines.late_in_a_row >= limit:
-                self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
-            self._wait_for_what_is_due()
-            self.wires.forget_command()
-            self._control(self._newest)
-            for _ in range(self.settings.copies - 1):
-                if not self._stop.wait(COPY_AFTER * self._period_s):
-                    self.wires.repeat_command()
-
-    def _wait_for_what_is_due(self) -> None:
-        """Wait a moment for the measurement that comes with this beat: what is acted on is as young as it can be."""
-        self._arrived.clear()
-        last_ns = self._flags.last_input_ns
-        if last_ns is not None and time.monotonic_ns() - last_ns > FRESH_NS:
-            self._arrived.wait((PATIENCE if self._phase.known else PATIENCE_AT_FIRST) * self._period_s)
+        if limit and self._beat.deadlines.late_in_a_row >= limit:
+            self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
+        self.wires.forget_command()
+        self._control(self._newest)
 
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
         self._take_turns()
-        with self._lock:
-            decision = self._arbitrate()
-            observation = self._observe(measurement) if decision.may_act and measurement else None
         stamp = measurement.stamp_ns if measurement else 0
-        if measurement is not None and not self._watch_actuators(measurement):
+        command, action = self.robot.actuators.safe_command, None
+        try:
+            with self._lock:
+                decision = self._arbitrate()
+                self._begin_anew()
+                observation = self._observe(measurement) if decision.may_act and measurement else None
+            health = self._watch(measurement) if measurement else None
+            if observation is not None:
+                command, action, problem = self._act(observation)
+        except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
+            self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
             return
-        command = self.robot.actuators.safe_command
-        if observation is not None:
-            command = self._act(observation, stamp)
-        elif decision.mode is not Mode.IDLE:
-            self.wires.publish_command(command, stamp)
+        if health is not None:
+            self.wires.publish_actuators_health(health, stamp)
+        speaks = action is not None or decision.mode is not Mode.IDLE
+        if speaks and not self._speak(partial(self.wires.publish_command, command, stamp)):
+            return
         self._answered_ns, self._answer = stamp, command
-        self._steps += 1
-        if observation is not None:
+        self._status.steps += 1
+        if observation is not None and action is not None:
+            self.wires.publish_reasoning(observation, action, stamp)
+            self._judge(problem)
             self._acted += 1
             self._set(active_s=self._acted * self._control_ns / 1e9)
         self._tell_status(decision)
 
-    def _watch_actuators(self, measurement: Measurement) -> bool:
-        """Compare what was commanded with how the body moved; false where the controller cannot bear to hear it."""
-        passed_ns = measurement.stamp_ns - self._seen_ns
-        if passed_ns == 0:  # by the clock, one measurement may serve twice
-            return True
+    def _speak(self, publish: Callable[[], None]) -> bool:
+        """Publish a command, and say so, if commands may still go out.
+
+        What a controller that hung comes up with after all must not follow the safe command of the end.
+        """
+        with self._speaking:
+            if self._flags.activated:
+                publish()
+            return self._flags.activated
+
+    def _begin_anew(self) -> None:
+        """Let the controller forget what was before a new goal or a jump; call with the lock held."""
+        jumped = self._epoch != self._acted_epoch
+        if jumped:
+            self._actuators.forget()  # no motion of the body was behind it
+        if jumped or self._anew:
+            self.controller.reset()
+        self._anew, self._acted_epoch = False, self._epoch
+
+    def _watch(self, measurement: Measurement) -> np.ndarray | None:
         informer = self._succession.current.informer
-        if not 0 < passed_ns <= self._pause_ns:
-            informer.reset()
-        self._seen_ns = measurement.stamp_ns
-        wanted = self.wires.health_wanted
-        if not (wanted or informer.listens):
-            self._seen_ns = 0  # whoever comes to listen later begins anew
-            return True
-        try:
-            health = informer.see(planar_of(measurement.state), self._answer, passed_ns / 1e9, wanted=wanted)
-        except Exception as error:  # noqa: BLE001 - as in `_act`
-            self._give_up(f"the controller raised {type(error).__name__}: {error}", measurement.stamp_ns)
-            return False
-        if health is not None and wanted:
-            self.wires.publish_actuators_health(health.effectiveness, measurement.stamp_ns)
-        return True
+        return self._actuators.see(measurement, self._answer, informer, wanted=self.wires.health_wanted)
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""
@@ -455,81 +394,56 @@ class ControllerNode(LifecycleNode):
             self.controller.reset()
         return self.mission.observe(measurement.state, measurement.stamp_ns, self._answer)
 
-    def _act(self, observation: np.ndarray, stamp: int) -> np.ndarray:
+    def _act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:
+        """The command, the controller's action that it is made of, and why it is the safe one instead."""
         began = time.perf_counter_ns()
-        try:
-            action = np.asarray(self.controller.act(observation), dtype=float)
-        except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
-            return self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
+        action = np.asarray(self.controller.act(observation), dtype=float)
         problem = command_problem(action, len(self.robot.actuators.names))
         command = self.robot.actuators.safe_command
         if not problem:
             wanted = self.robot.actuators.limited(action)
             command = slewed(wanted, self._answer, self.robot, self._control_ns / 1e9)
-        self._inference_ms.add((time.perf_counter_ns() - began) / 1e6)
-        self.wires.publish_command(command, stamp)
-        self.wires.publish_reasoning(observation, action, stamp)
+        self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
+        return command, action, problem
+
+    def _judge(self, problem: str | None) -> None:
+        """Count refused actions: several in a row are the fallback's turn, or a fault."""
         before = self._succession.current
         fault = self._succession.judge(problem)
         if fault:
             self._set(latched_fault=fault)
         elif self._succession.current is not before:
             self._announce()
-        return command
 
-    def _give_up(self, reason: str, stamp: int) -> np.ndarray:
+    def _give_up(self, reason: str, stamp: int) -> None:
         """Command what is safe; let the fallback go on, or, where there is none, latch a fault and end the process."""
-        self.get_logger().error(reason)
-        safe = self.robot.actuators.safe_command
-        self.wires.publish_command(safe, stamp)
+        self._answered_ns, self._answer = stamp, self.robot.actuators.safe_command
+        if not self._speak(partial(self.wires.publish_command, self._answer, stamp)):
+            return
         if self._succession.fall_back(reason):
+            self.get_logger().error(reason)
             self._announce()
-            return safe
+        else:
+            self._fail(reason)
+        self._tell_status(self._decide())
+
+    def _fail(self, reason: str) -> None:
+        """Latch a fault and end the process; its last words are what is safe."""
+        self.get_logger().error(reason)
         self._set(latched_fault=reason)
         self._request_exit(FAILED)
-        return safe
 
     def _tell_idle_status(self) -> None:
-        if self.settings.lockstep or not self._flags.activated:
+        """Where no control step does it."""
+        if self.settings.lockstep or not self._flags.activated or self._flags.latched_fault:
             self._tell_status(self._decide())
 
     def _tell_status(self, decision: Decision) -> None:
-        """Publish the status when it changed, and at least twice a second."""
-        changed = (
-            decision.mode,
-            decision.reason.split(" (")[0][:24],
-            not self.settings.goals_streamed and self.mission.goal_stamp_ns,
-            self.mission.obstacles_stamp_ns,
-            self._succession.rejections,
-            self._succession.current.sha256,
-            self._succession.fell_back,
-            self._swap.said,
+        self._status.tell(
+            self.wires.health,
+            decision,
+            self._succession,
+            self._beat.deadlines,
+            epoch=self._input_gate.epoch,
+            last_input_ns=self._flags.last_input_ns,
         )
-        now = time.monotonic()
-        if changed == self._said and now - self._said_at < STATUS_PERIOD_S:
-            return
-        self._said, self._said_at = changed, now
-        level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
-        fell_back = self._succession.fell_back
-        level = "warn" if level == "ok" and fell_back else level
-        age_ms = (time.monotonic_ns() - self._flags.last_input_ns) / 1e6 if self._flags.last_input_ns else 0.0
-        values = {
-            "mode": decision.mode.value,
-            "reason": decision.reason,
-            "sha256": self._succession.current.sha256,
-            "controller": self.controller.name,
-            "fell_back": fell_back,
-            "swap": self._swap.said,
-            "epoch": str(self._input_gate.epoch),
-            "goal_stamp_ns": str(self.mission.goal_stamp_ns),
-            "obstacles_stamp_ns": str(self.mission.obstacles_stamp_ns),
-            "goals_done": str(self.mission.done),
-            "steps": str(self._steps),
-            "observation_age_ms": f"{age_ms:.1f}",
-            "control_rate_hz": f"{self._deadlines.rate_hz:.4f}",
-            "overruns": str(self._deadlines.overruns),
-            "rejections": str(self._succession.rejections),
-            **self._inference_ms.percentiles("inference_ms"),
-            **self._deadlines.period_error_ms.percentiles("period_error_ms"),
-        }
-        self.wires.health.publish(level, decision.reason or decision.mode.value, values)

@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
+from fulmar_core.safety.arbiter import Flags
 from fulmar_core.safety.area import NO_AREA, check_area
+from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
 
 MOST_COPIES = 3
@@ -33,6 +35,7 @@ class ControllerSettings:
     max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
     area: tuple[float, ...] = NO_AREA  # x_min, x_max, y_min, y_max that the robot must not leave [m]
     overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
+    odometry_may_repeat: bool = False  # to the last bit, while the robot stands: that of encoders does
     copies: int = 1  # of each command, within its period; in real time only
     autostart: bool = True
 
@@ -59,3 +62,21 @@ class ControllerSettings:
         hz = self.control_rate(robot)
         pause_s = 1.75 / hz if self.lockstep else default_timeout(1.0 / hz) * max(self.rate, 1.0)
         return round(1e9 * pause_s)
+
+    def flags(self, robot: Robot) -> Flags:
+        """What the arbiter knows before anything has happened."""
+        timeout_s = self.input_timeout_s or default_timeout(1.0 / self.control_rate(robot)) / min(
+            self.rate, 1.0
+        )
+        return Flags(
+            input_timeout_ns=round(timeout_s * 1e9),
+            geofence=robot.limits.geofence,
+            max_run_time_s=self.max_run_time_s,
+        )
+
+    def input_gate(self, robot: Robot) -> InputGate:
+        """What lets measurements in; in lock step they may repeat themselves, and episodes begin anywhere."""
+        if self.lockstep:
+            return InputGate(robot.limits, frozen_after=0)
+        repeats = self.odometry_may_repeat or robot.sensors.odometry.position.std == 0.0
+        return InputGate(robot.limits, frozen_after=0 if repeats else FROZEN_AFTER, jump_m=JUMP_M)

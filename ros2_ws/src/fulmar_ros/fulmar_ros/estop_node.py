@@ -34,6 +34,8 @@ from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 FLUSH = Duration(seconds=0.3)
+# So often "pressed" is said before the release of a reset, which those who heard a button die would not believe else.
+STILL_PRESSED = 3
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,7 @@ class EstopNode(Node):
         self._button = EstopButton()
         self._button.pressed = settings.pressed
         self._told_s = 0.0
+        self._still_pressed = 0  # messages that still say so after a reset
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
         diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._health = Health(f"{robot.name}: estop", [diagnostics])
@@ -98,20 +101,22 @@ class EstopNode(Node):
 
     def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         problem = self._button.reset(time.monotonic_ns())
+        self._still_pressed = 0 if problem else STILL_PRESSED
         self._tell()
         self.get_logger().warning(f"e-stop reset {problem}" if problem else "e-stop reset: released")
         response.success = not problem
-        response.message = problem or "released: controllers wait for a new goal"
+        response.message = problem or "released within a second: controllers wait for a new goal"
         return response
 
     def _beat(self) -> None:
         if not self._prior:  # in the executor's thread, which is not there before
             take_priority_with_helpers(CONTROL_PRIORITY)  # its silence stops the robot
             self._prior = True
+        self._still_pressed = max(0, self._still_pressed - 1)
         self._tell()
 
     def _tell(self) -> None:
-        pressed = self._button.pressed
+        pressed = self._button.pressed or self._still_pressed > 0
         self._publisher.publish(Bool(data=pressed))
         if time.monotonic() - self._told_s >= 1.0:
             self._told_s = time.monotonic()

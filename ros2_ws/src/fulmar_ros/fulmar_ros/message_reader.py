@@ -115,3 +115,11 @@ def obstacles_of(message: Any) -> tuple[np.ndarray | None, str]:
     if not np.isfinite(found).all() or (found[:, 2] < 0.0).any():
         return None, "an obstacle holds a value that is not finite, or a negative size"
     return found, ""
+
+
+def block_of(message: Any) -> tuple[np.ndarray | None, str]:
+    """Where a message says that the block is, shape (2,) [m], or None and why it says nothing."""
+    place = message.pose.position
+    if message.header.frame_id != "odom" or not np.isfinite((place.x, place.y)).all():
+        return None, "it must be finite and in 'odom'"
+    return np.array([place.x, place.y]), ""

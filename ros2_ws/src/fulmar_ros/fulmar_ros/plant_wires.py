@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Sequence
 from functools import partial
 
@@ -43,10 +42,10 @@ from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.sent_states import SentStates
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
-REMEMBERED = 256  # odometry messages whose answer may still come
 
 
 class PlantWires:
@@ -84,7 +83,9 @@ class PlantWires:
         self.answers = 0  # states that a command has answered
         self.listening = True  # whether commands of controllers are heard
         self._guard = guard
-        self._sent_ns: OrderedDict[int, int] = OrderedDict()
+        self._sent = SentStates(guard.watchdog.timeout_ns)
+        # Who knows where the robot is from elsewhere answers stamps of another clock.
+        self._knows_ages = simulated or odometry
         self._answered: int | None = None
         self._clock_ns = 0
         self._captured_ns = 0
@@ -148,9 +149,8 @@ class PlantWires:
             if 0 <= self._captured_ns - sample.stamp_ns <= BACK_NS:
                 return  # a device that has nothing new; further back, somebody has set the clock
             time_ns = self._captured_ns = sample.stamp_ns
-        self._sent_ns.setdefault(time_ns, time.monotonic_ns())  # of a resent one, the first sending counts
-        while len(self._sent_ns) > REMEMBERED:
-            self._sent_ns.popitem(last=False)
+        with self.lock:
+            self._sent.note(time_ns, time.monotonic_ns())
         if sample.block is not None:
             self._publish_block(sample.block, time_ns)
         if self._odometry is not None and sample.odometry is not None:
@@ -189,9 +189,9 @@ class PlantWires:
             self._publish(self._state, self._write_state.write(command, time_ns))
 
     def expect_no_answers(self) -> None:
-        """Time no command any more that answers what was sent so far: the plant does not listen now."""
+        """Take and time no command any more that answers what was sent so far."""
         with self.lock:
-            self._sent_ns.clear()
+            self._sent.close()
 
     def flush(self) -> None:
         """Wait, not for ever, until every subscriber has the last states."""
@@ -230,10 +230,11 @@ class PlantWires:
             take_priority_with_helpers(CONTROL_PRIORITY)
             self._prior = True
         with self.lock:
-            taken = self._guard.offer(names, values, now, stamp_ns=stamp)
-            sent = self._sent_ns.pop(stamp, None)
-            if taken and sent is not None:
-                self.latency_ms.add((now - sent) / 1e6)
+            outdated = self._knows_ages and self._sent.outdated(stamp, now)
+            taken = self._guard.offer(names, values, now, stamp_ns=stamp, outdated=outdated)
+            latency_ns = self._sent.answered(stamp, now)
+            if taken and latency_ns is not None:
+                self.latency_ms.add(latency_ns / 1e6)
                 self.answers += 1
             if taken:
                 self._answered = stamp

@@ -37,6 +37,7 @@ from fulmar_ros.runtime import RequestExit, run_node
 
 RATE_HZ = 20.0
 SAFE_REPEATS = 5
+ANSWER_S = 2.0  # a plant that does not answer a request by then is asked again
 FLUSH = Duration(seconds=0.3)
 HELP = "w/s ahead, back · a/d turn · q/e left, right · hold a key: it is the dead-man switch · g give back · x end"
 
@@ -93,7 +94,9 @@ class TeleopNode(Node):
         self._command_for, self._safe = hand_mapping(robot), robot.actuators.safe_command
         self._keyboard, self._gamepad = Keyboard(), Gamepad(settings.layout)
         self._lock = threading.Lock()
-        self._has_robot, self._asked, self._over = False, False, threading.Event()
+        self._has_robot, self._over = False, threading.Event()
+        self._request: Future | None = None  # to give back, under way
+        self._asked_at = 0.0
         self._said = ""
         self._publisher = self.create_publisher(JointState, TELEOP.name, publisher_qos(TELEOP))
         self._writer = VectorWriter(robot.actuators.names)
@@ -145,16 +148,22 @@ class TeleopNode(Node):
 
     def _give_back(self) -> None:
         """Ask the plant to listen to the controller again; it refuses while the hand still moves something."""
-        if self._asked or not self._has_robot:
+        if not self._has_robot or (self._request and time.monotonic() - self._asked_at < ANSWER_S):
             return
+        if self._request is not None:  # who was asked has died meanwhile, or hangs
+            self._service.remove_pending_request(self._request)
+            self._request = None
         if not self._service.service_is_ready():
             self._say("nobody takes the robot back: is its plant running?")
             return
-        self._asked = True
-        self._service.call_async(Trigger.Request()).add_done_callback(self._on_given_back)
+        self._asked_at = time.monotonic()
+        self._request = self._service.call_async(Trigger.Request())
+        self._request.add_done_callback(self._on_given_back)
 
     def _on_given_back(self, future: Future) -> None:
-        self._asked = False
+        if future.cancelled():
+            return
+        self._request = None
         answer = future.result()
         with self._lock:
             self._has_robot = not answer.success

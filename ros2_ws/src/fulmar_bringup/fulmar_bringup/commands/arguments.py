@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from fulmar_core.errors import ConfigError
+from fulmar_core.safety.area import check_area
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")]
 TaskArgument = Annotated[str, typer.Argument(metavar="TASK", help="A name from `fulmar list tasks`.")]
@@ -37,6 +38,28 @@ BagArgument = Annotated[
     Path, typer.Argument(metavar="BAG", help="A bag folder, or the .mcap or .db3 file in it.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+Area = tuple[float, float, float, float]  # x_min, x_max, y_min, y_max [m]
+
+
+def read_area(text: str | None) -> Area | None:
+    """Read `x_min,x_max,y_min,y_max` of --area [m].
+
+    Raises:
+        ConfigError: If it is not such an area.
+    """
+    if text is None:
+        return None
+    try:
+        x_min, x_max, y_min, y_max = (float(part) for part in text.split(","))
+        check_area((x_min, x_max, y_min, y_max))
+    except ValueError as error:
+        raise ConfigError(
+            f"--area = '{text}' must be x_min,x_max,y_min,y_max in m with x_min < x_max and y_min < y_max, "
+            "such as --area=-2,2,-1,1."
+        ) from error
+    return x_min, x_max, y_min, y_max
 
 
 def read_pose(text: str | None, option: str) -> tuple[float, float, float] | None:

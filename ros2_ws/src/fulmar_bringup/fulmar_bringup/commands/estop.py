@@ -23,8 +23,9 @@ def estop(
 ) -> None:
     """Press the emergency stop of every robot in this ROS domain: actuators go to their safe state, at once.
 
-    A robot that runs without an e-stop node is stopped too, and stays so until one is started and says otherwise. After
-    a reset controllers wait for a new goal. Exit code 1 if a robot could not be stopped, or a reset was refused.
+    A robot whose e-stop node hangs, or that runs without one, is stopped too, and stays so until one is started and
+    reset. After a reset controllers wait for a new goal. Exit code 1 if a robot could not be stopped, or a reset was
+    refused.
 
     Try:
 
@@ -39,16 +40,16 @@ def estop(
     answers = []
     with operator() as person:
         spaces = person.robots_with(service, robot, wait_s=FIND_S)
+        asked = {space: f"{space}/{service}" for space in spaces}
+        heard: set[str] = set()
+        if reset:
+            said = person.ask_all(list(asked.values()))
+        else:  # the wire itself stops those that run without a node for it, or with one that hangs
+            spaces = sorted({*spaces, *person.plants(robot, wait_s=0.5 if spaces else FIND_S)})
+            heard, said = person.stop_all(spaces, list(asked.values()))
         for space in spaces:
-            done, words = person.ask(f"{space}/{service}")
+            done, words = said.get(asked.get(space, "")) or _unanswered(space in asked, space in heard)
             answers.append({"robot": space.strip("/"), "done": done, "said": words})
-        if not reset:  # the wire itself stops those that run without a node for it
-            for space in person.plants(robot, wait_s=0.5 if spaces else FIND_S):
-                if space not in spaces:
-                    heard = person.say_stop(space)
-                    words = "stopped, without an e-stop node: it stays so until one says otherwise"
-                    words = words if heard else "nobody hears it: cut the power"
-                    answers.append({"robot": space.strip("/"), "done": heard, "said": words})
     if not answers:
         whom = f"'{robot}'" if robot else "any robot"
         raise RunFailed(
@@ -65,3 +66,11 @@ def estop(
         where.print(f"{answer['robot']}: {answer['said']}", markup=False)
     if not all(answer["done"] for answer in answers):
         raise typer.Exit(FAILED)
+
+
+def _unanswered(has_node: bool, heard: bool) -> tuple[bool, str]:
+    """Whether a robot is stopped whose e-stop node says nothing, or that has none; and words for it."""
+    node = "its e-stop node does not answer" if has_node else "it has no e-stop node"
+    if heard:
+        return True, f"stopped on the wire, since {node}: it stays so until one is started and reset"
+    return False, f"{node}, and nobody hears the wire: cut the power"

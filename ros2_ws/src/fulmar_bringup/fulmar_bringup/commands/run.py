@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from fulmar_bringup.commands.arguments import (
+    Area,
     CalibrationOption,
     ControllerOption,
     JsonOption,
@@ -17,6 +18,7 @@ from fulmar_bringup.commands.arguments import (
     RobotArgument,
     ScenarioOption,
     SeedOption,
+    read_area,
     read_pose,
 )
 from fulmar_bringup.console import console, output, print_json
@@ -103,6 +105,19 @@ def run(
         Path | None,
         typer.Option(metavar="FILE|DIR", help="Public keys: run no bundle that none of them has signed."),
     ] = None,
+    area: Annotated[
+        str | None,
+        typer.Option(
+            metavar="x,x,y,y",
+            help="x_min, x_max, y_min, y_max that the robot must not leave [m]: --area=-2,2,-1,1.",
+        ),
+    ] = None,
+    max_run_time: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", min=0.1, help="Acting seconds after which the robot stops; none by default."
+        ),
+    ] = None,
     recording: Annotated[
         str | None,
         typer.Option(
@@ -177,7 +192,8 @@ def run(
         goals=goals,
         hardware=hardware,
         emulate=emulate,
-        guards=asked_guards(estimator, estop, fallback, trusted_keys),
+        guards=asked_guards(estimator, estop, fallback, trusted_keys)
+        | asked_limits(read_area(area), max_run_time),
         recording=recording,
         copies=copies,
         controller_network=controller_network,
@@ -207,6 +223,12 @@ def asked_guards(
         "fallback": fallback,
         "trusted_keys": str(trusted_keys) if trusted_keys else None,
     }
+    return {key: value for key, value in asked.items() if value is not None}
+
+
+def asked_limits(area: Area | None, max_run_time: float | None) -> dict[str, Any]:
+    """The limits of the run that were asked for, by name of their guard."""
+    asked = {"area": area, "max_run_time_s": max_run_time}
     return {key: value for key, value in asked.items() if value is not None}
 
 

@@ -14,6 +14,9 @@ from fulmar_core.safety.watchdog import Watchdog
 LAST_WORDS_NS = (
     200_000_000  # so long after a person gave back, safe commands by hand may still have been under way
 )
+LEFTOVERS_NS = (
+    2_000_000_000  # so long after the last command, one that is older may still come out of a queue
+)
 
 
 class ActuatorGuard:
@@ -65,26 +68,34 @@ class ActuatorGuard:
         self.watchdog.reset()
 
     def offer(
-        self, names: Sequence[str], values: Sequence[float], now_ns: int, *, stamp_ns: int | None = None
+        self,
+        names: Sequence[str],
+        values: Sequence[float],
+        now_ns: int,
+        *,
+        stamp_ns: int | None = None,
+        outdated: bool = False,
     ) -> bool:
         """Take a controller's command if it can be carried out and no person has the actuators.
 
-        A refused command does not feed the watchdog: a controller that sends nothing but nonsense counts as silent.
+        A refused command does not feed the watchdog: a controller that sends nothing but nonsense, or what it should
+        have said long ago, counts as silent.
 
         Args:
             names: Actuator names as sent.
             values: Values as sent.
             now_ns: Steady clock [ns].
             stamp_ns: Stamp of the observation that it answers; None or 0 where the sender sets none [ns].
+            outdated: Whether that observation is known to be older than the watchdog.
 
         Returns:
             Whether it was taken.
         """
         if self.person:
             return False
-        if self.watchdog.tripped:
+        if self.watchdog.silent_ns(now_ns) > LEFTOVERS_NS:
             self._stamp_ns = 0  # one stray stamp from the future must not lock everybody out for good
-        if not self._check(names, values, self._stamp_problem(stamp_ns or 0)):
+        if not self._check(names, values, self._stamp_problem(stamp_ns or 0, outdated=outdated)):
             return False
         answers_anew = bool(stamp_ns) and (stamp_ns or 0) > self._stamp_ns
         self._take(values, now_ns, self._control_dt if answers_anew else None)
@@ -203,7 +214,10 @@ class ActuatorGuard:
         )
         return near
 
-    def _stamp_problem(self, stamp_ns: int) -> str | None:
+    def _stamp_problem(self, stamp_ns: int, *, outdated: bool) -> str | None:
+        if outdated and not self._lockstep:
+            limit_ms = self.watchdog.timeout_ns / 1e6
+            return f"command answers an observation older than the watchdog's {limit_ms:.0f} ms"
         if stamp_ns and stamp_ns < self._stamp_ns:
             return f"command answers an observation {(self._stamp_ns - stamp_ns) / 1e6:.0f} ms older than the last"
         return None

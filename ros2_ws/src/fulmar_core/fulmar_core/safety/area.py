@@ -29,6 +29,6 @@ def outside(x: float, y: float, area: Sequence[float]) -> str:
     if tuple(area) == NO_AREA or (area[0] <= x <= area[1] and area[2] <= y <= area[3]):
         return ""
     return (
-        f"the robot is at x = {x:.2f} m, y = {y:.2f} m, outside its area of x {area[0]:g} to {area[1]:g} m, "
-        f"y {area[2]:g} to {area[3]:g} m. Bring it back by hand."
+        f"the robot was at x = {x:.2f} m, y = {y:.2f} m, outside its area of x {area[0]:g} to {area[1]:g} m, "
+        f"y {area[2]:g} to {area[3]:g} m. Bring it back by hand, then give a goal."
     )

@@ -25,18 +25,25 @@ class EstopWatch:
         self._heard_ns: int | None = None
         self._pressed_ns: int | None = None
         self._released = False
+        self._orphaned = False  # pressed, and its button has fallen silent since
         self.was_released = False  # whether it ever allowed anything
 
     def hear(self, pressed: bool, now_ns: int) -> None:
         """Note a message, at this time of a steady clock [ns].
 
-        Of two buttons the pressed one counts: a release within the timeout after a press is not believed.
+        Of two buttons the pressed one counts: a release within the timeout after a press is not believed. Nor is one
+        from a button that was silent while it was pressed: whoever started it anew knows nothing of the press. A reset
+        says "pressed" first, which makes it believed.
         """
+        silent = self._heard_ns is not None and now_ns - self._heard_ns > self._timeout_ns
+        self._orphaned = not pressed and (self._orphaned or (silent and not self._released))
         self._heard_ns = now_ns
         if pressed:
             self._pressed_ns = now_ns
             self._released = False
-        elif self._pressed_ns is None or now_ns - self._pressed_ns > self._timeout_ns:
+        elif not self._orphaned and (
+            self._pressed_ns is None or now_ns - self._pressed_ns > self._timeout_ns
+        ):
             self._released = True
             self.was_released = True
 
@@ -52,6 +59,8 @@ class EstopWatch:
         silent_ns = now_ns - self._heard_ns
         if silent_ns > self._timeout_ns:
             return f"e-stop: silent for {silent_ns / 1e6:.0f} ms (limit {self._timeout_ns / 1e6:.0f} ms)"
+        if self._orphaned:
+            return "e-stop: it was pressed when it fell silent. Reset it: fulmar estop --reset"
         return "" if self._released else "e-stop: pressed"
 
 

@@ -12,6 +12,7 @@ from fulmar_core.state import RigidBodyState
 
 FROZEN_AFTER = 10  # repeats of one measurement that no noisy sensor gives
 BACK_NS = 1_000_000_000  # further back than this is no reordering: whoever measures has begun again
+JUMP_M = 1.0  # beyond what speed explains: a correction of a fix or of a filter is less
 FORWARD_NS = 10_000_000_000  # further ahead than this is no gap: it is another clock, or one wrong stamp
 
 
@@ -28,19 +29,21 @@ class Measurement:
 class InputGate:
     """Checks measurements one after the other.
 
-    A jump of time is told once and begins a new epoch, so that neither a restarted plant nor one wrong stamp shuts
-    the gate for ever. `epoch` counts these jumps.
+    A jump of time or place is told once and begins a new epoch, so that neither a restarted plant nor one wrong stamp
+    shuts the gate for ever. `epoch` counts these jumps.
     """
 
-    def __init__(self, limits: Limits, *, frozen_after: int = FROZEN_AFTER) -> None:
+    def __init__(self, limits: Limits, *, frozen_after: int = FROZEN_AFTER, jump_m: float = math.inf) -> None:
         """Check against a robot's limits.
 
         Args:
             limits: What the robot can possibly do.
             frozen_after: Repeats of one measurement that count as a stuck sensor; 0 never does, as for
                 simulated sensors without noise.
+            jump_m: So much further from the last place than the highest speed explains is a jump; infinite where
+                episodes may begin anywhere [m].
         """
-        self._limits, self._frozen_after = limits, frozen_after
+        self._limits, self._frozen_after, self._jump_m = limits, frozen_after, jump_m
         self._last: Measurement | None = None
         self._equal = 0
         self.epoch = 0
@@ -98,12 +101,25 @@ class InputGate:
 
     def _stamp_problem(self, measurement: Measurement, ahead_ns: int) -> str | None:
         if not -BACK_NS <= ahead_ns <= FORWARD_NS:
-            self.epoch += 1
-            self._last, self._equal = measurement, 0
-            return f"odom time jumped by {ahead_ns / 1e9:+.1f} s: a new epoch begins"
+            return self._new_epoch(measurement, f"odom time jumped by {ahead_ns / 1e9:+.1f} s")
         if ahead_ns < 0:
             return f"odom stamp went back by {-ahead_ns / 1e6:.0f} ms"
-        return None if ahead_ns else "odom stamp did not advance"
+        return self._place_problem(measurement, ahead_ns) if ahead_ns else "odom stamp did not advance"
+
+    def _place_problem(self, measurement: Measurement, ahead_ns: int) -> str | None:
+        assert self._last is not None
+        way = measurement.state.position_in_world - self._last.state.position_in_world
+        distance = math.hypot(*way.tolist())
+        if distance <= self._limits.speed * ahead_ns / 1e9 + self._jump_m:
+            return None
+        return self._new_epoch(
+            measurement, f"odom place jumped by {distance:.1f} m within {ahead_ns / 1e6:.0f} ms"
+        )
+
+    def _new_epoch(self, measurement: Measurement, reason: str) -> str:
+        self.epoch += 1
+        self._last, self._equal = measurement, 0
+        return f"{reason}: a new epoch begins"
 
     def _frozen_problem(self, measurement: Measurement) -> str | None:
         if not self._frozen_after:

@@ -1,0 +1,95 @@
+"""What a controller node tells of itself on `controller/status` and `/diagnostics`."""
+
+from __future__ import annotations
+
+import time
+
+from fulmar_core.safety.arbiter import Decision, Mode
+from fulmar_core.safety.succession import Succession
+from fulmar_ros.deadline import Deadlines, Spread
+from fulmar_ros.health import Health
+from fulmar_ros.mission import Mission
+from fulmar_ros.policy_swap import PolicySwap
+from fulmar_ros.standby import Standby
+
+PERIOD_S = 0.4  # at least 2 Hz
+
+
+class ControllerStatus:
+    """Publishes when something changed, and at least twice a second.
+
+    Attributes:
+        steps: Control steps so far.
+        inference_ms: Time that the controller took to act.
+    """
+
+    def __init__(self, mission: Mission, swap: PolicySwap, *, goals_streamed: bool) -> None:
+        """Tell of a mission and of changes of policies; goals that are streamed are no news each."""
+        self._mission, self._swap, self._goals_streamed = mission, swap, goals_streamed
+        self.steps = 0
+        self.inference_ms = Spread()
+        self._said: tuple[object, ...] = ()
+        self._said_at = 0.0
+
+    def repeat(self) -> None:
+        """Say it the next time whether or not anything changes."""
+        self._said_at = 0.0
+
+    def tell(
+        self,
+        health: Health,
+        decision: Decision,
+        succession: Succession[Standby],
+        deadlines: Deadlines,
+        *,
+        epoch: int,
+        last_input_ns: int | None,
+    ) -> None:
+        """Publish, if it is time to.
+
+        Args:
+            health: Where to.
+            decision: Of the arbiter, for now.
+            succession: Who controls.
+            deadlines: The beat.
+            epoch: Jumps of the measurements so far.
+            last_input_ns: When the newest measurement came, on the steady clock [ns].
+        """
+        mission, standby = self._mission, succession.current
+        changed = (
+            decision.mode,
+            decision.reason.split(" (")[0][:24],
+            not self._goals_streamed and mission.goal_stamp_ns,
+            mission.obstacles_stamp_ns,
+            succession.rejections,
+            standby.sha256,
+            succession.fell_back,
+            self._swap.said,
+        )
+        now = time.monotonic()
+        if changed == self._said and now - self._said_at < PERIOD_S:
+            return
+        self._said, self._said_at = changed, now
+        level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
+        level = "warn" if level == "ok" and succession.fell_back else level
+        age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
+        values = {
+            "mode": decision.mode.value,
+            "reason": decision.reason,
+            "sha256": standby.sha256,
+            "controller": standby.controller.name,
+            "fell_back": succession.fell_back,
+            "swap": self._swap.said,
+            "epoch": str(epoch),
+            "goal_stamp_ns": str(mission.goal_stamp_ns),
+            "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),
+            "goals_done": str(mission.done),
+            "steps": str(self.steps),
+            "observation_age_ms": f"{age_ms:.1f}",
+            "control_rate_hz": f"{deadlines.rate_hz:.4f}",
+            "overruns": str(deadlines.overruns),
+            "rejections": str(succession.rejections),
+            **self.inference_ms.percentiles("inference_ms"),
+            **deadlines.period_error_ms.percentiles("period_error_ms"),
+        }
+        health.publish(level, decision.reason or decision.mode.value, values)

@@ -1,0 +1,77 @@
+"""Who controls at first, and who stands by: the controller that was asked for, and its fallback."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from fulmar_core.controllers.classical import load_classical
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.robot import Robot
+from fulmar_core.safety.succession import Succession
+from fulmar_core.tasks import Task
+from fulmar_ros.controller_settings import ControllerSettings
+from fulmar_ros.standby import Standby, ready
+
+MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
+
+
+def line_up(
+    make_controller: MakeController,
+    robot: Robot,
+    task: Task,
+    settings: ControllerSettings,
+    complain: Callable[[str], object],
+) -> Succession[Standby]:
+    """The controller that was asked for, or, where it is refused and one is named, its fallback.
+
+    Args:
+        make_controller: Loads the one that was asked for.
+        robot: The robot.
+        task: What it shall do.
+        settings: Of the node.
+        complain: Told why the fallback begins.
+
+    Raises:
+        FulmarError: Both are refused, or the one is and no other is named.
+        ImportError: A library is missing, and no fallback is named.
+    """
+    fallback = _fallback(robot, task, settings)
+    try:
+        controller = make_controller(robot, task, settings)
+    except (FulmarError, ImportError) as error:
+        if fallback is None:
+            raise
+        complain(f"falling back to {settings.fallback}: {error}")
+        return Succession(None, fallback, refused=str(error))
+    return Succession(ready(controller, robot), fallback)
+
+
+def load_other(
+    make_controller: MakeController,
+    robot: Robot,
+    task: Task,
+    settings: ControllerSettings,
+    folder: str,
+    *,
+    like: Controller,
+) -> Standby:
+    """Another policy, ready to take over from `like`; the other arguments as of `line_up`.
+
+    Raises:
+        FulmarError: It cannot take the place of the one that runs.
+    """
+    controller = make_controller(robot, task, dataclasses.replace(settings, policy=folder))
+    if controller.observation_names != like.observation_names:
+        raise ConfigError("it sees something else than the controller that runs")
+    return ready(controller, robot)
+
+
+def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby | None:
+    name = settings.fallback
+    if not name:
+        return None
+    law = None if name == "classical" else name
+    controller = load_classical(robot, task, control_hz=settings.control_rate(robot), law=law)
+    return ready(controller, robot, said={"fallback": True})
