@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from fulmar_core.actuators.slowdown import slowdown
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
@@ -24,7 +25,6 @@ from hardware_drivers.kobuki_protocol import (
 )
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import Kobuki
-from hardware_drivers.slowdown import slowdown
 from hardware_drivers.wheel_odometry import WheelOdometry
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous

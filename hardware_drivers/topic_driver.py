@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fulmar_core.actuators.slowdown import slowdown
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
-from hardware_drivers.slowdown import slowdown
 
 Send = Callable[[np.ndarray], None]
 STOPS = 5

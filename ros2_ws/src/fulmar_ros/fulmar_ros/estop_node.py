@@ -6,7 +6,6 @@ import sys
 import time
 from dataclasses import dataclass
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from rclpy.clock import Clock, ClockType
@@ -85,7 +84,7 @@ class EstopNode(Node):
         self._tell()
 
     def _on_command(self, source: str, message: JointState) -> None:
-        zero = not np.any(np.asarray(message.effort, dtype=float))
+        zero = not any(message.effort)  # ends at the first value that is not
         self._button.hear_command(source, zero, time.monotonic_ns())
 
     def _on_velocity(self, message: TwistStamped) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fulmar_core.actuators.slowdown import slowed
 from fulmar_core.robot import Actuators, Rolling
 from fulmar_core.safety.command_gate import command_problem, name_problem
 from fulmar_core.safety.estop import EstopWatch
@@ -140,13 +141,7 @@ class ActuatorGuard:
         since_ns = self._ended_ns(now_ns)
         if since_ns is None:
             return self.command
-        slew = self._actuators.response.slew
-        if not slew or not isinstance(self._actuators, Rolling):
-            return self._actuators.safe_command
-        since_s = max(0, now_ns - since_ns) / 1e9
-        left = np.maximum(np.abs(self.command) - since_s * np.asarray(slew), 0.0)
-        slowed: np.ndarray = np.where(left > 0.0, np.copysign(left, self.command), 0.0)
-        return slowed
+        return slowed(self._actuators, self.command, max(0, now_ns - since_ns) / 1e9)
 
     def answer(self, now_ns: int) -> np.ndarray:
         """What to apply in lock step, where time stands still between commands and only the e-stop may end one."""
