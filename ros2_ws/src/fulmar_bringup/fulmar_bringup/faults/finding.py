@@ -27,7 +27,7 @@ class Outcome:
     # From the fault to the last moment at which anything moved; None: it went on [s].
     time_to_safe_s: float | None = None
     limit_s: float | None = None  # None: the robot is to go on [s]
-    recorded_until_s: float | None = None  # when nobody recorded any more, by the fault's own doing [s]
+    recorder_away: tuple[float, float] | None = None  # from when to when the fault kept it from its work [s]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Finding:
     time_to_safe_s: float | None
     limit_s: float | None
     data_lost: int | None  # messages that came and are not in the bag; None: the fault could not be done
-    bag_intact: bool | None  # it opens and has no gap; None: same
+    bag_intact: bool | None  # it opens, and has no gap while its recorder could work; None: same
     passed: bool
 
     @property
@@ -81,7 +81,7 @@ def went_on(
     detected_by: str,
     reaction: str,
     told: bool,
-    recorded_until_s: float | None = None,
+    recorder_away: tuple[float, float] | None = None,
 ) -> Outcome:
     """Whether a robot went on, without a pause as long as its watchdog, and the right thing was said.
 
@@ -91,11 +91,11 @@ def went_on(
         detected_by: Who said it; empty if nobody did.
         reaction: What was said.
         told: Whether that is what had to be said.
-        recorded_until_s: As of `Outcome`.
+        recorder_away: As of `Outcome`.
     """
     words = live.witness.words_since(since_s - WORDS_S)  # with one from before, to compare with
     trips = {word.values.get("watchdog_trips", "") for word in words if word.who == "plant"}
     moved = any(moves for _, moves in live.witness.applied_since(since_s))
     said = reaction if moved else f"the robot stood still; {reaction}"
     passed = told and moved and len(trips) == 1
-    return Outcome(detected_by, said, passed, recorded_until_s=recorded_until_s)
+    return Outcome(detected_by, said, passed, recorder_away=recorder_away)

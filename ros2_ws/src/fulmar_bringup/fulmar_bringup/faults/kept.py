@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import numpy as np
 
 from fulmar_bringup.bags.contents import open_bag
 from fulmar_bringup.bags.decode import stamps_ns
+from fulmar_bringup.faults.witness import Witness
 from fulmar_core.errors import BagError
-from fulmar_core.topics import Wire
+
+TORN_S = 1.0  # a recorder that dies takes no more than so much with it
 
 
 @dataclass(frozen=True)
@@ -18,36 +21,38 @@ class Kept:
     """The bag, judged."""
 
     lost: int  # messages that came and are not in it
-    intact: bool  # it opens, and nothing is missing but what the end of its recorder tore off
+    intact: bool  # it opens, and lacks nothing of the time in which its recorder could work
     words: str = ""  # what is wrong; empty if nothing is
 
 
-def kept_of(record: Path, wire: Wire, heard_ns: np.ndarray, last_ns: int | None) -> Kept:
+def kept_of(record: Path, witness: Witness, away: tuple[float, float] | None) -> Kept:
     """Compare a bag with what somebody else heard.
 
     Args:
         record: The bag, as it lies there after everybody has ended.
-        wire: What was heard.
-        heard_ns: Stamps of it, as long as a recorder ran [ns].
-        last_ns: What the recorder must have kept at least, where it was itself harmed: all up to this stamp; None
-            where it was not, and must have kept all [ns].
+        witness: Has heard what actuators did.
+        away: From when to when a fault kept the recorder from its work; for ever, where it ended it [s].
     """
+    heard_s, heard_ns = witness.heard()
+    from_s, to_s = away or (math.inf, math.inf)
+    dead = away is not None and math.isinf(to_s)
+    if dead:  # what comes after its end is nobody's loss
+        heard_s, heard_ns = heard_s[heard_s < from_s], heard_ns[heard_s < from_s]
+        from_s -= TORN_S
     try:
         bag = open_bag(record)
     except BagError as error:
         return Kept(len(heard_ns), False, str(error))
-    found = stamps_ns(bag.of(wire))
+    found = stamps_ns(bag.of(witness.wire))
     if found is None or not len(found):
-        return Kept(len(heard_ns), False, f"the bag has nothing of {wire.name}")
+        return Kept(len(heard_ns), False, f"it has nothing of {witness.wire.name}")
     # A recorder may find the plant a little later than the bystander did.
-    missing = np.setdiff1d(heard_ns[heard_ns >= found.min()], found)
+    missing = (heard_ns >= found.min()) & ~np.isin(heard_ns, found)
+    gaps = int(np.sum(missing & ~((heard_s >= from_s) & (heard_s < to_s))))
     dropped = sum((bag.recording.get("dropped") or {}).values())
-    gaps = missing[missing < found.max()]
-    tail_lost = found.max() < (last_ns if last_ns is not None else heard_ns.max(initial=0))
     problems = [
-        *([f"{len(gaps)} of {wire.name} are missing in between"] if len(gaps) else []),
-        *(["its end is missing"] if tail_lost else []),
-        *(bag.warnings if last_ns is None else ()),
-        *([f"the recorder dropped {dropped}"] if dropped else []),
+        *([f"lacks {gaps} of {witness.wire.name}"] if gaps else []),
+        *([f"its recorder dropped {dropped}"] if dropped and not dead else []),
+        *(() if dead else bag.warnings),
     ]
-    return Kept(len(missing) + dropped, not problems, "; ".join(problems))
+    return Kept(int(np.sum(missing)) + dropped, not problems, "; ".join(problems))

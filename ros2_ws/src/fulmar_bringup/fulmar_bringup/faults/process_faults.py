@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import time
 from collections.abc import Callable
@@ -105,20 +106,23 @@ def recorder_killed(live: LiveSystem) -> Outcome:
     since_s = live.until_it_moves()
     time.sleep(PAUSE_S)  # the bag gets something to lose
     live.send("recorder", signal.SIGKILL)
-    until_s = time.monotonic()
+    away_s = time.monotonic()
     time.sleep(PAUSE_S)
     who, said = _launcher_on(live, "recorder")
-    return went_on(live, since_s, detected_by=who, reaction=said, told=bool(who), recorded_until_s=until_s)
+    return went_on(
+        live, since_s, detected_by=who, reaction=said, told=bool(who), recorder_away=(away_s, math.inf)
+    )
 
 
 def recorder_hangs(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the recorder for a while: nobody waits for it, and what it missed is in the bag afterwards."""
+    """SIGSTOP of the recorder for a while: nobody waits for it. It misses what streams do not keep for so long."""
     since_s = live.until_it_moves()
     live.send("recorder", signal.SIGSTOP)
     time.sleep(PAUSE_S)
     live.send("recorder", signal.SIGCONT)
+    away = since_s, time.monotonic()
     time.sleep(PAUSE_S)
-    return went_on(live, since_s, detected_by="", reaction="control goes on", told=True)
+    return went_on(live, since_s, detected_by="", reaction="control goes on", told=True, recorder_away=away)
 
 
 def disk_full(live: LiveSystem) -> Outcome:
@@ -127,7 +131,7 @@ def disk_full(live: LiveSystem) -> Outcome:
     time.sleep(PAUSE_S)
     recorder = live.group.process("recorder")
     recorder.rlimit(psutil.RLIMIT_FSIZE, (0, recorder.rlimit(psutil.RLIMIT_FSIZE)[1]))
-    until_s = time.monotonic()
+    away_s = time.monotonic()
     wait_for(lambda: _complaint(live, since_s) is not None, COMPLAINT_S)
     word = _complaint(live, since_s)
     said = f"{word.text}; control goes on" if word else "control goes on"
@@ -137,7 +141,7 @@ def disk_full(live: LiveSystem) -> Outcome:
         detected_by=word.who if word else "",
         reaction=said,
         told=word is not None,
-        recorded_until_s=until_s,
+        recorder_away=(away_s, math.inf),
     )
 
 

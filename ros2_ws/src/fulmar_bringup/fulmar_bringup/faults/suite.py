@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import multiprocessing
 import tempfile
 from collections.abc import Callable
@@ -25,7 +24,6 @@ from fulmar_bringup.faults.policy_faults import POLICY_FAULTS
 from fulmar_bringup.faults.process_faults import PROCESS_FAULTS
 from fulmar_bringup.faults.surroundings import request_of
 from fulmar_bringup.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
-from fulmar_bringup.faults.witness import Witness
 from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.robot import load_robot
 
@@ -39,7 +37,6 @@ EVERY = (
     *NETWORK_FAULTS,
 )
 ATTEMPTS = 3  # a robot may stand still just when something is done to it
-TORN_S = 1.0  # a recorder that dies takes no more than so much with it
 
 
 @dataclass(frozen=True)
@@ -148,10 +145,4 @@ def _do(robot: str, fault: Fault, folder: Path, hosts: TwoHosts | None) -> tuple
         if fault.begins:
             live.begin()
         outcome = fault.do(live)
-    return outcome, _kept(live.witness, request.record, outcome.recorded_until_s)
-
-
-def _kept(witness: Witness, record: Path, until_s: float | None) -> Kept:
-    heard_ns = witness.stamps_until(math.inf if until_s is None else until_s)
-    last_ns = None if until_s is None else int(witness.stamps_until(until_s - TORN_S).max(initial=0))
-    return kept_of(record, witness.wire, heard_ns, last_ns)
+    return outcome, kept_of(request.record, live.witness, outcome.recorder_away)

@@ -81,11 +81,11 @@ class Witness:
         with self._lock:
             return [(heard_s, moves) for heard_s, _, moves in self._applied if heard_s >= since_s]
 
-    def stamps_until(self, until_s: float) -> np.ndarray:
-        """Stamps of what was heard before then [ns]."""
+    def heard(self) -> tuple[np.ndarray, np.ndarray]:
+        """When something was applied, and its stamps, shapes (n,) [s] and int64 [ns]."""
         with self._lock:
-            stamps = [stamp for heard_s, stamp, _ in self._applied if heard_s < until_s]
-        return np.array(stamps, dtype=np.int64)
+            times = np.array([heard_s for heard_s, _, _ in self._applied], dtype=float)
+            return times, np.array([stamp for _, stamp, _ in self._applied], dtype=np.int64)
 
     def words_since(self, since_s: float) -> list[Word]:
         """What was said from then on."""
