@@ -42,8 +42,7 @@ def faults(
     from fulmar_bringup.faults.suite import faults_of, run_faults
     from fulmar_bringup.system import modules_of
 
-    names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
-    chosen, skipped = faults_of(robot, names)
+    chosen, skipped = faults_of(robot, names_in(only))
     require(*modules_of("policy", "mujoco"))
     with work_bar("harming") as moved:
         findings = run_faults(robot, chosen, lambda done: moved(done, len(chosen)))
@@ -59,6 +58,11 @@ def faults(
         _print(robot, findings, skipped)
     if not all(finding.passed for finding in findings):
         raise typer.Exit(FAILED)
+
+
+def names_in(only: str | None) -> list[str] | None:
+    """Names between commas; None where nothing was said."""
+    return None if only is None else [name.strip() for name in only.split(",") if name.strip()]
 
 
 def _print(robot: str, findings: list[Finding], skipped: list[Skipped]) -> None:

@@ -94,13 +94,14 @@ class Witness:
 
     def complaint_since(self, since_s: float) -> Word | None:
         """The first thing that a node said which was wrong from then on, and not wrong shortly before."""
-        standing = set()
-        for word in self.words_since(since_s - STANDING_S):
-            if word.heard_s < since_s:
-                standing.add(word.complaint)
-            elif word.complaint is not None and word.complaint not in standing:
-                return word
-        return None
+        return first_complaint(self.words_since(since_s - STANDING_S), since_s)
+
+
+def first_complaint(words: list[Word], since_s: float) -> Word | None:
+    """The first thing wrong from a time on that is not among the words from before it."""
+    standing = {word.complaint for word in words if word.heard_s < since_s}
+    new = (word for word in words if word.heard_s >= since_s and word.complaint is not None)
+    return next((word for word in new if word.complaint not in standing), None)
 
 
 def wait_for(condition: Callable[[], bool], timeout_s: float) -> bool:
