@@ -39,11 +39,10 @@ def faults(
     fulmar faults --robot turtlebot2 --only controller_killed,odometry_silent
     """
     from fulmar_bringup.extras import require
-    from fulmar_bringup.faults.suite import faults_of, run_faults
-    from fulmar_bringup.system import modules_of
+    from fulmar_bringup.faults.suite import faults_of, modules_for, run_faults
 
     chosen, skipped = faults_of(robot, names_in(only))
-    require(*modules_of("policy", "mujoco"))
+    require(*modules_for(robot, chosen))
     with work_bar("harming") as moved:
         findings = run_faults(robot, chosen, lambda done: moved(done, len(chosen)))
     if as_json:

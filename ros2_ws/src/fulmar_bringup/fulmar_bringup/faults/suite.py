@@ -24,6 +24,7 @@ from fulmar_bringup.faults.policy_faults import POLICY_FAULTS
 from fulmar_bringup.faults.process_faults import PROCESS_FAULTS
 from fulmar_bringup.faults.surroundings import request_of
 from fulmar_bringup.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
+from fulmar_bringup.system import Guards, default_hardware, modules_of
 from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.robot import load_robot
 
@@ -78,6 +79,17 @@ def faults_of(robot: str, names: list[str] | None = None) -> tuple[list[Fault], 
     return [known[name] for name in dict.fromkeys(names)], []
 
 
+def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
+    """Modules of extras that the systems of some faults import."""
+    needed: dict[str, None] = {}
+    for about in (fault.about for fault in faults):
+        backend, hardware = ("hardware", default_hardware(robot)) if about.emulated else ("mujoco", "")
+        guards = Guards(**about.guards)
+        modules = modules_of("policy", backend, guards=guards, hardware=hardware, emulated=about.emulated)
+        needed |= dict.fromkeys(modules)
+    return tuple(needed)
+
+
 def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[Finding]:
     """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
 
@@ -85,7 +97,14 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
         robot: Whose system.
         faults: From `faults_of`.
         progress: Told how many are over.
+
+    Raises:
+        FulmarError: The robot has no policy to run.
     """
+    with tempfile.TemporaryDirectory() as folder:
+        request_of(
+            robot, Path(folder) / "bag"
+        )  # a robot without a policy is refused once, not by every fault
     findings = []
     with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
         for count, fault in enumerate(faults, 1):
