@@ -13,7 +13,6 @@ from fulmar_bringup.faults.fault import Fault
 from fulmar_bringup.faults.finding import STAYS_S, Outcome, stopped
 from fulmar_bringup.faults.live_system import LiveSystem
 from fulmar_bringup.faults.spoiler import Spoil, delayed, lost
-from fulmar_bringup.faults.witness import wait_for
 from fulmar_core.safety.input_gate import FROZEN_AFTER
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.message_reader import stamp_ns
@@ -120,10 +119,10 @@ def _jump(live: LiveSystem, by_ns: int) -> Outcome:
         message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
 
     live.until_it_moves()
-    wait_for(lambda: False, BEFORE_S)
+    time.sleep(BEFORE_S)
     since_s = time.monotonic()
     live.spoiler.spoil = _changed(change)
-    wait_for(lambda: False, EPOCH_S)
+    time.sleep(EPOCH_S)
     words = [word for word in live.witness.words_since(since_s) if "epoch" in word.values]
     epoch, mode = (words[-1].values["epoch"], words[-1].values["mode"]) if words else ("", "silent")
     told = epoch not in ("", "0")

@@ -19,7 +19,6 @@ from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import subscriber_qos
 
 DEPTH = 100  # messages that may wait while this process does something else
-STANDING_S = 2.0  # what was wrong so shortly before is nothing new
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
@@ -93,13 +92,13 @@ class Witness:
             return [word for word in self._words if word.heard_s >= since_s]
 
     def complaint_since(self, since_s: float) -> Word | None:
-        """The first thing that a node said which was wrong from then on, and not wrong shortly before."""
-        return first_complaint(self.words_since(since_s - STANDING_S), since_s)
+        """The first thing that a node said from then on which was wrong, and not its last word before."""
+        return first_complaint(self.words_since(0.0), since_s)
 
 
 def first_complaint(words: list[Word], since_s: float) -> Word | None:
-    """The first thing wrong from a time on that is not among the words from before it."""
-    standing = {word.complaint for word in words if word.heard_s < since_s}
+    """The first thing that is wrong from a time on, and was not some node's last word before it."""
+    standing = {word.who: word.complaint for word in words if word.heard_s < since_s}.values()
     new = (word for word in words if word.heard_s >= since_s and word.complaint is not None)
     return next((word for word in new if word.complaint not in standing), None)
 
