@@ -189,9 +189,9 @@ def _specs(request: RunRequest, about: Surroundings, robot: Robot, wires: Path) 
 
 
 def _publisher_of(wire: Wire, plan: RunPlan) -> str:
-    if wire is ODOMETRY:
+    if wire == ODOMETRY:  # it may have come from another process
         return "estimator" if plan.guards.estimator else "plant"
-    return "plant" if wire is MOCAP else "controller"
+    return "plant" if wire == MOCAP else "controller"
 
 
 def _teleop_spec(plan: RunPlan) -> NodeSpec:
