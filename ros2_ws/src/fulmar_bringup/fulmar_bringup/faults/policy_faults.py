@@ -72,9 +72,9 @@ def bundle_refused(live: LiveSystem) -> Outcome:
         time.sleep(STAYS_S)
         applied = live.witness.applied_since(began_s)
         stands = bool(applied) and not any(moves for _, moves in applied)
-        return Outcome(
-            "controller" if ended else "", live.group.last_words("controller"), ended and stands, 0.0, 0.0
-        )
+        said = live.group.last_words("controller").replace(live.plan.policy, "the bundle")
+        who = "controller" if ended else ""
+        return Outcome(who, said, ended and stands, 0.0 if stands else None, limit_s=0.0)
     return Outcome("", "the controller took the bundle", False)
 
 
@@ -84,7 +84,8 @@ def bundle_refused_with_fallback(live: LiveSystem) -> Outcome:
     time.sleep(STAYS_S)
     words = [word for word in live.witness.words_since(since_s) if word.who == "controller"]
     why = words[-1].values.get("fell_back", "") if words else ""
-    return went_on(live, since_s, detected_by="controller" if why else "", reaction=why, told=bool(why))
+    said = why.replace(live.plan.policy, "the bundle")
+    return went_on(live, since_s, detected_by="controller" if why else "", reaction=said, told=bool(why))
 
 
 POLICY_FAULTS = (
