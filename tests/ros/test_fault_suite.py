@@ -10,8 +10,8 @@ import pytest
 from fulmar_bringup.commands.faults import names_in
 from fulmar_bringup.faults import network_faults
 from fulmar_bringup.faults.fault import Fault
-from fulmar_bringup.faults.finding import NothingShown, Outcome, stopped
-from fulmar_bringup.faults.live_system import LiveSystem, live_system
+from fulmar_bringup.faults.finding import Outcome, stopped
+from fulmar_bringup.faults.live_system import LiveSystem, NothingShown, live_system
 from fulmar_bringup.faults.suite import EVERY, faults_of, run_faults
 from fulmar_bringup.faults.surroundings import request_of
 from fulmar_core.errors import ConfigError, UnknownNameError

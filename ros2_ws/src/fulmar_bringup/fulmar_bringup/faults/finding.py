@@ -5,16 +5,11 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from fulmar_bringup.faults.live_system import LiveSystem
+from fulmar_bringup.faults.live_system import LiveSystem, NothingShown
 from fulmar_bringup.faults.witness import wait_for
-from fulmar_core.errors import RunFailed
 
 WORDS_S = 2.0  # a node says what is wrong within a second, on a machine that has time for it
 STAYS_S = 1.0  # what is safe must stay so
-
-
-class NothingShown(RunFailed):
-    """The robot stood still when the fault was done: what it does then shows nothing."""
 
 
 @dataclass(frozen=True)

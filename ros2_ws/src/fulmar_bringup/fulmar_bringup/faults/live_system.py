@@ -52,6 +52,10 @@ from hardware_drivers.settings import load_hardware
 MOVING_S = 20.0  # a robot that has far to go moves by then
 
 
+class NothingShown(RunFailed):
+    """The robot stood still when the fault was done: what it does then shows nothing."""
+
+
 class LiveSystem:
     """Recorder, plant, e-stop, controller, and a bystander who hears them."""
 
@@ -121,10 +125,10 @@ class LiveSystem:
             Now, on the monotonic clock [s].
 
         Raises:
-            RunFailed: They stay off.
+            NothingShown: They stay off.
         """
         if not wait_for(self.witness.moves, MOVING_S):
-            raise RunFailed(f"the robot did not move within {MOVING_S:g} s; the fault would show nothing")
+            raise NothingShown(f"the robot did not move within {MOVING_S:g} s; the fault would show nothing")
         return time.monotonic()
 
     def send(self, name: str, number: signal.Signals) -> None:

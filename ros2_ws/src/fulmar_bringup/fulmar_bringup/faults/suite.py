@@ -14,11 +14,11 @@ from fulmar_bringup.environment import environment
 from fulmar_bringup.faults.command_faults import COMMAND_FAULTS
 from fulmar_bringup.faults.driver_faults import DRIVER_FAULTS
 from fulmar_bringup.faults.fault import Fault
-from fulmar_bringup.faults.finding import Finding, NothingShown, Outcome
+from fulmar_bringup.faults.finding import Finding, Outcome
 from fulmar_bringup.faults.hand_faults import HAND_FAULTS
 from fulmar_bringup.faults.input_faults import INPUT_FAULTS
 from fulmar_bringup.faults.kept import Kept, kept_of
-from fulmar_bringup.faults.live_system import live_system
+from fulmar_bringup.faults.live_system import NothingShown, live_system
 from fulmar_bringup.faults.network_faults import NETWORK_FAULTS
 from fulmar_bringup.faults.policy_faults import POLICY_FAULTS
 from fulmar_bringup.faults.process_faults import PROCESS_FAULTS
