@@ -43,7 +43,7 @@ def commands_with_wrong_names(live: LiveSystem) -> Outcome:
 def commands_late(live: LiveSystem) -> Outcome:
     """Each command comes long after its observation: nobody knows any more whether it would still be right."""
     since_s = live.until_it_moves()
-    limit_s = live.watchdog_s + live.tick_s + live.ramp_s
+    limit_s = live.silenced_s
     live.spoiler.spoil = delayed(math.ceil((limit_s + STAYS_S / 4.0) / live.beat_s))
     return stopped(live, since_s, limit_s)
 
@@ -72,7 +72,7 @@ def _nonsense(live: LiveSystem, names: list[str], values: list[float]) -> Outcom
         thread = threading.Thread(target=talk, name="stranger", daemon=True)
         thread.start()
         try:
-            return stopped(live, since_s, live.watchdog_s + live.tick_s + live.ramp_s)
+            return stopped(live, since_s, live.silenced_s)
         finally:
             over.set()
             thread.join()

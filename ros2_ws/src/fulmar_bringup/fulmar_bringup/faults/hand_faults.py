@@ -42,7 +42,7 @@ def _hand(live: LiveSystem, number: signal.Signals) -> Outcome:
             raise RunFailed(f"the hand did not get the robot within {TAKES_S:g} s")
         since_s = live.until_it_moves()
         live.send("teleop", number)
-        return stopped(live, since_s, live.watchdog_s + live.tick_s + live.ramp_s)
+        return stopped(live, since_s, live.silenced_s)
 
 
 def _commanded_by(live: LiveSystem) -> str:

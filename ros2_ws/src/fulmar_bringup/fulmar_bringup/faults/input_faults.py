@@ -28,7 +28,7 @@ def _spoilt(live: LiveSystem, spoil: Spoil, detection_s: float) -> Outcome:
     """Spoil every message from now on; the controller commands what is safe with its next beat."""
     since_s = live.until_it_moves()
     live.spoiler.spoil = spoil
-    return stopped(live, since_s, detection_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s)
+    return stopped(live, since_s, detection_s + live.corrected_s)
 
 
 def _changed(change: Callable[[Odometry], None]) -> Spoil:
@@ -97,7 +97,7 @@ def odometry_out_of_order(live: LiveSystem) -> Outcome:
 
 def odometry_late(live: LiveSystem) -> Outcome:
     """Everything comes later by the same time, longer than the robot may be blind; it is judged before that is over."""
-    limit_s = live.watchdog_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s
+    limit_s = live.watchdog_s + live.corrected_s
     late_s = limit_s + STAYS_S + MARGIN_S
     return _spoilt(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
 

@@ -33,7 +33,7 @@ from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.errors import RunFailed
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.robot import Robot, Rolling, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
@@ -77,14 +77,15 @@ class LiveSystem:
         self.spoiler = Spoiler(bystander, about.spoilt or command_wire(robot))
         self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz
         self.watchdog_s = default_timeout(self.beat_s)
-        self.unseen_s = (
-            self.watchdog_s + self.beat_s + 2.0 * self.tick_s
-        )  # from the last odometry to the safe command
-        slew = robot.actuators.response.slew
-        # A drive that stops at once would slide: it slows down as fast as its commands may change.
-        self.ramp_s = max(
-            (most / rate for most, rate in zip(robot.actuators.scale, slew, strict=False)), default=0.0
-        )
+        actuators = robot.actuators
+        pairs = zip(actuators.scale, actuators.response.slew, strict=False)
+        # As fast as commands may change. A plant that stops by itself asks for it only where wheels would slide.
+        slew_s = max((most / rate for most, rate in pairs), default=0.0)
+        self.ramp_s = slew_s if isinstance(actuators, Rolling) else 0.0
+        self.silenced_s = self.watchdog_s + self.tick_s + self.ramp_s  # from the last command to standstill
+        self.corrected_s = (
+            self.beat_s + 2.0 * self.tick_s + slew_s
+        )  # from what a controller notices to the same
 
     @property
     def hosts(self) -> TwoHosts:

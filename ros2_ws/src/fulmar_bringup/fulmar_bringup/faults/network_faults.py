@@ -18,7 +18,7 @@ def cable_cut(live: LiveSystem) -> Outcome:
     """Nothing passes any more, in either direction."""
     since_s = live.until_it_moves()
     live.hosts.cable.quality = CUT
-    return stopped(live, since_s, live.watchdog_s + live.tick_s + live.ramp_s)
+    return stopped(live, since_s, live.silenced_s)
 
 
 def cable_lossy(live: LiveSystem) -> Outcome:
