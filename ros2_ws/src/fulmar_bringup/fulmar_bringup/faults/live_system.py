@@ -82,10 +82,10 @@ class LiveSystem:
         # As fast as commands may change. A plant that stops by itself asks for it only where wheels would slide.
         slew_s = max((most / rate for most, rate in pairs), default=0.0)
         self.ramp_s = slew_s if isinstance(actuators, Rolling) else 0.0
-        self.silenced_s = self.watchdog_s + self.tick_s + self.ramp_s  # from the last command to standstill
-        self.corrected_s = (
-            self.beat_s + 2.0 * self.tick_s + slew_s
-        )  # from what a controller notices to the same
+        # From the last command to standstill.
+        self.silenced_s = self.watchdog_s + self.tick_s + self.ramp_s
+        # From what a controller notices to the same.
+        self.corrected_s = self.beat_s + 2.0 * self.tick_s + slew_s
 
     @property
     def hosts(self) -> TwoHosts:
