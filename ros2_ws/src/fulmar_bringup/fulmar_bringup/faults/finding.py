@@ -91,6 +91,11 @@ def went_on(
     words = live.witness.words_since(since_s - WORDS_S)  # with one from before, to compare with
     trips = {word.values.get("watchdog_trips", "") for word in words if word.who == "plant"}
     moved = any(moves for _, moves in live.witness.applied_since(since_s))
-    said = reaction if moved else f"the robot stood still; {reaction}"
-    passed = told and moved and len(trips) == 1
-    return Outcome(detected_by, said, passed, recorder_away=recorder_away)
+    wrong = [] if moved else ["the robot stood still"]
+    wrong += (
+        []
+        if len(trips) == 1
+        else [f"the watchdog tripped (trips told: {', '.join(sorted(trips)) or 'none'})"]
+    )
+    said = "; ".join([*wrong, reaction])
+    return Outcome(detected_by, said, told and not wrong, recorder_away=recorder_away)
