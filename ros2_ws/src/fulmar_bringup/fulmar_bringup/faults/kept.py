@@ -14,6 +14,7 @@ from fulmar_bringup.faults.witness import Witness
 from fulmar_core.errors import BagError
 
 TORN_S = 1.0  # a recorder that dies takes no more than so much with it
+IN_FLIGHT_S = 0.1  # so long before it hangs a message may be sent that it has not taken yet
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ def kept_of(record: Path, witness: Witness, away: tuple[float, float] | None) ->
     dead = away is not None and math.isinf(to_s)
     if dead:  # what comes after its end is nobody's loss
         heard_s, heard_ns = heard_s[heard_s < from_s], heard_ns[heard_s < from_s]
-        from_s -= TORN_S
+    from_s, to_s = from_s - (TORN_S if dead else IN_FLIGHT_S), to_s + IN_FLIGHT_S
     try:
         bag = open_bag(record)
     except BagError as error:
