@@ -15,6 +15,7 @@ from fulmar_core.exit_codes import FAILED
 
 if TYPE_CHECKING:
     from fulmar_bringup.faults.finding import Finding
+    from fulmar_bringup.faults.suite import Skipped
 
 
 def faults(
@@ -30,51 +31,64 @@ def faults(
     """Kill, stop, spoil and deceive the parts of a live system, and measure how long it takes to be safe.
 
     Each fault is done to a system of its own, which runs in real time in MuJoCo with the shipped policy. The time to
-    the safe state goes from the fault to the first applied state that is safe and stays so. The exit code is 1 where
-    one fails.
+    the safe state goes from the fault to the first applied state that is safe and stays so. Afterwards the bag is
+    opened and compared with what a bystander heard. The exit code is 1 where one fails or cannot be done.
 
     Try:
 
     fulmar faults --robot turtlebot2 --only controller_killed,odometry_silent
     """
     from fulmar_bringup.extras import require
-    from fulmar_bringup.faults.suite import faults_of, run_faults, skipped_here
-    from fulmar_bringup.faults.two_hosts import why_not
-    from fulmar_bringup.system import modules_of
+    from fulmar_bringup.faults.suite import faults_of, modules_for, run_faults
 
-    chosen = faults_of(robot, [name.strip() for name in only.split(",")] if only else None)
-    require(*modules_of("policy", "mujoco"))
-    if skipped_here() and not only:
-        names = ", ".join(fault.__name__ for fault in skipped_here())
-        console.print(f"skipped: {names}: {why_not()}", markup=False)
+    chosen, skipped = faults_of(robot, names_in(only))
+    require(*modules_for(robot, chosen))
     with work_bar("harming") as moved:
         findings = run_faults(robot, chosen, lambda done: moved(done, len(chosen)))
     if as_json:
-        print_json({"robot": robot, "faults": [asdict(finding) for finding in findings]})
+        print_json(
+            {
+                "robot": robot,
+                "faults": [asdict(finding) for finding in findings],
+                "skipped": [asdict(fault) for fault in skipped],
+            }
+        )
     else:
-        _print(robot, findings)
+        _print(robot, findings, skipped)
     if not all(finding.passed for finding in findings):
         raise typer.Exit(FAILED)
 
 
-def _print(robot: str, findings: list[Finding]) -> None:
+def names_in(only: str | None) -> list[str] | None:
+    """Names between commas; None where nothing was said."""
+    return None if only is None else [name.strip() for name in only.split(",") if name.strip()]
+
+
+def _print(robot: str, findings: list[Finding], skipped: list[Skipped]) -> None:
     table = Table(title=f"faults of a live {robot}")
     for column in ("fault", "detected by", "reaction"):
         table.add_column(column)
-    for column in ("safe after", "limit", ""):
+    for column in ("safe after", "limit", "data lost", "bag", ""):
         table.add_column(column, justify="right")
     for finding in findings:
-        time_s, limit_s = finding.time_to_safe_s, finding.limit_s
         table.add_row(
             finding.name,
             finding.detected_by or "nobody",
             finding.reaction,
-            "goes on"
-            if time_s is None and limit_s is None
-            else "never"
-            if time_s is None
-            else f"{time_s:.3f} s",
-            "" if limit_s is None else f"{limit_s:.3f} s",
-            "passed" if finding.passed else "FAILED",
+            _time_to_safe(finding),
+            "" if finding.limit_s is None else f"{finding.limit_s:.3f} s",
+            "" if finding.data_lost is None else str(finding.data_lost),
+            {True: "intact", False: "damaged", None: ""}[finding.bag_intact],
+            finding.verdict,
         )
     output.print(table)
+    for fault in skipped:
+        console.print(f"skipped: {fault.name}: {fault.reason}", markup=False)
+
+
+def _time_to_safe(finding: Finding) -> str:
+    if finding.time_to_safe_s is not None:
+        return f"{finding.time_to_safe_s:.3f} s"
+    if finding.bag_intact is None:
+        return ""
+    return "goes on" if finding.limit_s is None else "never"

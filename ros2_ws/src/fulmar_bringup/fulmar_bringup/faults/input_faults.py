@@ -5,15 +5,14 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections import deque
 from collections.abc import Callable
 
 from nav_msgs.msg import Odometry
 
-from fulmar_bringup.faults.finding import STAYS_S, Finding, stopped
+from fulmar_bringup.faults.fault import Fault
+from fulmar_bringup.faults.finding import STAYS_S, Outcome, stopped
 from fulmar_bringup.faults.live_system import LiveSystem
-from fulmar_bringup.faults.spoiler import Spoil
-from fulmar_bringup.faults.witness import wait_for
+from fulmar_bringup.faults.spoiler import Spoil, delayed, lost
 from fulmar_core.safety.input_gate import FROZEN_AFTER
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.message_reader import stamp_ns
@@ -25,11 +24,11 @@ EPOCH_S = 6.0  # in which it is seen whether a robot goes on
 BACK_NS = 1_000_000  # so little, with each message, that it is no jump of time
 
 
-def _spoilt(live: LiveSystem, name: str, spoil: Spoil, detection_s: float) -> Finding:
+def _spoilt(live: LiveSystem, spoil: Spoil, detection_s: float) -> Outcome:
     """Spoil every message from now on; the controller commands what is safe with its next beat."""
     since_s = live.until_it_moves()
     live.spoiler.spoil = spoil
-    return stopped(live, name, since_s, detection_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s)
+    return stopped(live, since_s, detection_s + live.corrected_s)
 
 
 def _changed(change: Callable[[Odometry], None]) -> Spoil:
@@ -40,12 +39,12 @@ def _changed(change: Callable[[Odometry], None]) -> Spoil:
     return spoil
 
 
-def odometry_silent(live: LiveSystem) -> Finding:
+def odometry_silent(live: LiveSystem) -> Outcome:
     """Nothing comes any more."""
-    return _spoilt(live, "odometry_silent", lambda _message: None, live.watchdog_s)
+    return _spoilt(live, lost, live.watchdog_s)
 
 
-def odometry_frozen(live: LiveSystem) -> Finding:
+def odometry_frozen(live: LiveSystem) -> Outcome:
     """The same measurement with new stamps."""
     kept: list[Odometry] = []
 
@@ -55,37 +54,37 @@ def odometry_frozen(live: LiveSystem) -> Finding:
         frozen.header.stamp = message.header.stamp
         return frozen
 
-    return _spoilt(live, "odometry_frozen", spoil, (FROZEN_AFTER + 1) * live.tick_s)
+    return _spoilt(live, spoil, (FROZEN_AFTER + 1) * live.tick_s)
 
 
-def odometry_not_a_number(live: LiveSystem) -> Finding:
+def odometry_not_a_number(live: LiveSystem) -> Outcome:
     """A velocity is NaN."""
 
     def change(message: Odometry) -> None:
         message.twist.twist.linear.x = math.nan
 
-    return _spoilt(live, "odometry_not_a_number", _changed(change), live.tick_s)
+    return _spoilt(live, _changed(change), live.tick_s)
 
 
-def odometry_in_a_wrong_frame(live: LiveSystem) -> Finding:
+def odometry_in_a_wrong_frame(live: LiveSystem) -> Outcome:
     """The frame is another one."""
 
     def change(message: Odometry) -> None:
         message.header.frame_id = "map"
 
-    return _spoilt(live, "odometry_in_a_wrong_frame", _changed(change), live.tick_s)
+    return _spoilt(live, _changed(change), live.tick_s)
 
 
-def odometry_with_a_wrong_quaternion(live: LiveSystem) -> Finding:
+def odometry_with_a_wrong_quaternion(live: LiveSystem) -> Outcome:
     """The quaternion has no unit length."""
 
     def change(message: Odometry) -> None:
         message.pose.pose.orientation.w += 1.0
 
-    return _spoilt(live, "odometry_with_a_wrong_quaternion", _changed(change), live.tick_s)
+    return _spoilt(live, _changed(change), live.tick_s)
 
 
-def odometry_out_of_order(live: LiveSystem) -> Finding:
+def odometry_out_of_order(live: LiveSystem) -> Outcome:
     """Stamps go back from message to message."""
     first: list[int] = []
 
@@ -93,42 +92,37 @@ def odometry_out_of_order(live: LiveSystem) -> Finding:
         first.append(stamp_ns(message.header.stamp))
         message.header.stamp = stamp_of(first[0] - BACK_NS * len(first))
 
-    return _spoilt(live, "odometry_out_of_order", _changed(change), live.tick_s)
+    return _spoilt(live, _changed(change), live.tick_s)
 
 
-def odometry_late(live: LiveSystem) -> Finding:
+def odometry_late(live: LiveSystem) -> Outcome:
     """Everything comes later by the same time, longer than the robot may be blind; it is judged before that is over."""
-    limit_s = live.watchdog_s + live.beat_s + 2.0 * live.tick_s + live.ramp_s
-    waiting: deque[Odometry] = deque()
-
-    def spoil(message: Odometry) -> Odometry | None:
-        waiting.append(message)
-        return waiting.popleft() if len(waiting) * live.tick_s > limit_s + STAYS_S + MARGIN_S else None
-
-    return _spoilt(live, "odometry_late", spoil, live.watchdog_s)
+    limit_s = live.watchdog_s + live.corrected_s
+    late_s = limit_s + STAYS_S + MARGIN_S
+    return _spoilt(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
 
 
-def time_jump_forwards(live: LiveSystem) -> Finding:
+def time_jump_forwards(live: LiveSystem) -> Outcome:
     """The clock of the measurements is set."""
-    return _jump(live, "time_jump_forwards", FORWARD_NS)
+    return _jump(live, FORWARD_NS)
 
 
-def time_jump_backwards(live: LiveSystem) -> Finding:
+def time_jump_backwards(live: LiveSystem) -> Outcome:
     """The same, back to where the run began."""
-    return _jump(live, "time_jump_backwards", -BACKWARD_NS)
+    return _jump(live, -BACKWARD_NS)
 
 
-def _jump(live: LiveSystem, name: str, by_ns: int) -> Finding:
+def _jump(live: LiveSystem, by_ns: int) -> Outcome:
     """A new epoch begins, in words, and the robot goes on in it."""
 
     def change(message: Odometry) -> None:
         message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
 
     live.until_it_moves()
-    wait_for(lambda: False, BEFORE_S)
+    time.sleep(BEFORE_S)
     since_s = time.monotonic()
     live.spoiler.spoil = _changed(change)
-    wait_for(lambda: False, EPOCH_S)
+    time.sleep(EPOCH_S)
     words = [word for word in live.witness.words_since(since_s) if "epoch" in word.values]
     epoch, mode = (words[-1].values["epoch"], words[-1].values["mode"]) if words else ("", "silent")
     told = epoch not in ("", "0")
@@ -136,17 +130,20 @@ def _jump(live: LiveSystem, name: str, by_ns: int) -> Finding:
         moved for _, moved in live.witness.applied_since(since_s + EPOCH_S / 2.0)
     )
     said = f"epoch {epoch} begins; {'goes on' if goes_on else mode}"
-    return Finding(name, "controller" if told else "", said, None, None, told and goes_on)
+    return Outcome("controller" if told else "", said, told and goes_on)
 
 
-INPUT_FAULTS = (
-    odometry_silent,
-    odometry_late,
-    odometry_frozen,
-    odometry_not_a_number,
-    odometry_in_a_wrong_frame,
-    odometry_with_a_wrong_quaternion,
-    odometry_out_of_order,
-    time_jump_forwards,
-    time_jump_backwards,
+INPUT_FAULTS = tuple(
+    Fault(do)
+    for do in (
+        odometry_silent,
+        odometry_late,
+        odometry_frozen,
+        odometry_not_a_number,
+        odometry_in_a_wrong_frame,
+        odometry_with_a_wrong_quaternion,
+        odometry_out_of_order,
+        time_jump_forwards,
+        time_jump_backwards,
+    )
 )

@@ -4,37 +4,56 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import rclpy
+from rclpy.node import Node
 
-from fulmar_bringup.faults.spoiler import MEASURED, Spoiler
+from fulmar_bringup.emulation import emulation_of
+from fulmar_bringup.faults.spoiler import Spoiler, source_of
+from fulmar_bringup.faults.surroundings import USUAL, Surroundings
 from fulmar_bringup.faults.two_hosts import TwoHosts
 from fulmar_bringup.faults.witness import Witness, wait_for
 from fulmar_bringup.node_table import (
     NodeSpec,
     RunPlan,
     controller_spec,
+    emulator_spec,
     guard_specs,
     plant_spec,
     recorder_spec,
+    run_goals_spec,
 )
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
-from fulmar_bringup.supervisor import supervisor
+from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.errors import RunFailed
-from fulmar_core.robot import load_robot
+from fulmar_core.robot import Robot, Rolling, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ODOMETRY, SIMULATION_START_NS
+from fulmar_core.topics import (
+    ACTUATORS_STATE,
+    DEVICE_STATE,
+    MOCAP,
+    ODOMETRY,
+    SIMULATION_START_NS,
+    Wire,
+    command_wire,
+)
 from fulmar_ros.controller_settings import MOST_COPIES
 from fulmar_ros.runtime import spinning
+from hardware_drivers.settings import load_hardware
 
 MOVING_S = 20.0  # a robot that has far to go moves by then
+
+
+class NothingShown(RunFailed):
+    """The robot stood still when the fault was done: what it does then shows nothing."""
 
 
 class LiveSystem:
@@ -42,32 +61,63 @@ class LiveSystem:
 
     def __init__(
         self,
-        plan: RunPlan,
-        record: Path,
+        request: RunRequest,
         group: ProcessGroup,
-        witness: Witness,
-        spoiler: Spoiler,
+        overseer: Supervisor,
+        bystander: Node,
+        about: Surroundings,
         hosts: TwoHosts | None,
     ) -> None:
         """Hold the parts together."""
-        self.plan, self.record, self.group = plan, record, group
-        self._hosts = hosts
-        self.witness, self.spoiler = witness, spoiler
-        robot = load_robot(plan.robot)
+        self.plan, self.record, self.group = request.plan, request.record, group
+        self.bystander, self._request, self._overseer, self._hosts = bystander, request, overseer, hosts
+        robot = load_robot(self.plan.robot)
         self.robot = robot
-        self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / plan.control_hz
+        self.witness = Witness(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
+        self.spoiler = Spoiler(bystander, about.spoilt or command_wire(robot))
+        self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz
         self.watchdog_s = default_timeout(self.beat_s)
-        slew = robot.actuators.response.slew
-        # A drive that stops at once would slide: it slows down as fast as its commands may change.
-        self.ramp_s = max(
-            (most / rate for most, rate in zip(robot.actuators.scale, slew, strict=False)), default=0.0
-        )
+        actuators = robot.actuators
+        pairs = zip(actuators.scale, actuators.response.slew, strict=False)
+        # As fast as commands may change. A plant that stops by itself asks for it only where wheels would slide.
+        slew_s = max((most / rate for most, rate in pairs), default=0.0)
+        self.ramp_s = slew_s if isinstance(actuators, Rolling) else 0.0
+        # From the last command to standstill.
+        self.silenced_s = self.watchdog_s + self.tick_s + self.ramp_s
+        # From what a controller notices to the same.
+        self.corrected_s = self.beat_s + 2.0 * self.tick_s + slew_s
 
     @property
     def hosts(self) -> TwoHosts:
         """The hosts that plant and controller are on; there must be two."""
         assert self._hosts is not None
         return self._hosts
+
+    def begin(self) -> None:
+        """Give the goal, and start the plant.
+
+        Raises:
+            RunFailed: A node has ended, or is not ready in time.
+        """
+        alive, controller = while_starting(self.group, self._overseer), self._overseer.controller
+        if self.plan.goals:
+            self._overseer.wait_until(lambda: controller.values.get("mode") == "armed", alive)
+        else:
+            self._overseer.give_goal(
+                self._request.mission,
+                time_ns=time.time_ns() if self.plan.hardware else SIMULATION_START_NS,
+                alive=alive,
+                listeners=CONTROLLER_AND_RECORDER,
+            )
+        self._overseer.start_plant(alive, lambda: self.group.last_words("plant"))
+
+    def start_plant_alone(self) -> None:
+        """Start the plant, whoever has ended.
+
+        Raises:
+            RunFailed: It refuses.
+        """
+        self._overseer.start_plant(lambda: None, lambda: self.group.last_words("plant"))
 
     def until_it_moves(self) -> float:
         """Wait until actuators are on.
@@ -76,10 +126,10 @@ class LiveSystem:
             Now, on the monotonic clock [s].
 
         Raises:
-            RunFailed: They stay off.
+            NothingShown: They stay off.
         """
         if not wait_for(self.witness.moves, MOVING_S):
-            raise RunFailed(f"the robot did not move within {MOVING_S:g} s; the fault would show nothing")
+            raise NothingShown(f"the robot did not move within {MOVING_S:g} s; the fault would show nothing")
         return time.monotonic()
 
     def send(self, name: str, number: signal.Signals) -> None:
@@ -88,11 +138,14 @@ class LiveSystem:
 
 
 @contextlib.contextmanager
-def live_system(request: RunRequest, hosts: TwoHosts | None = None) -> Iterator[LiveSystem]:
-    """A system on its way to its goal, with its odometry passing through a spoiler; ended at the end.
+def live_system(
+    request: RunRequest, about: Surroundings = USUAL, hosts: TwoHosts | None = None
+) -> Iterator[LiveSystem]:
+    """The processes of a system, which `begin` sets on its way to its goal; ended at the end.
 
     Args:
         request: What to run.
+        about: What is unusual about it; the same that the request was made with.
         hosts: The controller is on the other one, everything else on the robot's, which this thread has to be on.
 
     Raises:
@@ -101,32 +154,57 @@ def live_system(request: RunRequest, hosts: TwoHosts | None = None) -> Iterator[
     plan = replace(request.plan, supervised=True)
     if hosts is not None:
         plan = replace(plan, controller_network=hosts.other, copies=MOST_COPIES)
-    group = ProcessGroup()
-    robot, task = load_robot(plan.robot), load_task(plan.task)
-    with supervisor(plan.robot, task) as overseer:
-        node = rclpy.create_node("bystander", namespace=f"/{plan.robot}")
-        errors: list[Exception] = []
-        with spinning(node, errors.append):
-            live = LiveSystem(plan, request.record, group, Witness(node, robot), Spoiler(node), hosts)
-            try:
-                for spec in _specs(plan, request.record):
-                    group.start(spec)
-                alive = while_starting(group, overseer)
-                overseer.give_goal(
-                    request.mission,
-                    time_ns=SIMULATION_START_NS,
-                    alive=alive,
-                    listeners=CONTROLLER_AND_RECORDER,
-                )
-                overseer.start_plant(alive, lambda: group.last_words("plant"))
-                yield live
-            finally:
-                group.stop("controller")
-                group.stop_all()
+    request, group = replace(request, plan=plan), ProcessGroup()
+    errors: list[Exception] = []
+    with contextlib.ExitStack() as stack:
+        wires = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="fulmar_")))
+        overseer = stack.enter_context(supervisor(plan.robot, load_task(plan.task)))
+        bystander = rclpy.create_node("bystander", namespace=f"/{plan.robot}")
+        stack.enter_context(spinning(bystander, errors.append))
+        live = LiveSystem(request, group, overseer, bystander, about, hosts)
+        try:
+            for spec in _specs(request, about, live.robot, wires):
+                group.start(spec)
+            yield live
+        finally:
+            group.stop("controller")
+            group.stop_all()
     if errors:
         raise RunFailed(f"the bystander failed: {errors[0]!r}") from errors[0]
 
 
-def _specs(plan: RunPlan, record: Path) -> list[NodeSpec]:
-    plant = replace(plant_spec(plan, subscribers=1), remappings={ODOMETRY.name: MEASURED})
-    return [recorder_spec(plan, directory=str(record)), plant, *guard_specs(plan), controller_spec(plan)]
+def _specs(request: RunRequest, about: Surroundings, robot: Robot, wires: Path) -> list[NodeSpec]:
+    plan = request.plan
+    emulation = emulation_of(load_hardware(plan.hardware), wires) if plan.emulated else None
+    specs = [
+        recorder_spec(plan, directory=str(request.record)),
+        *([emulator_spec(plan, emulation)] if emulation else []),
+        plant_spec(plan, subscribers=1, port=emulation.port if emulation else ""),
+        *guard_specs(plan),
+        controller_spec(plan),
+        *([run_goals_spec(plan)] if plan.goals else []),
+        *([_teleop_spec(plan)] if about.by_hand else []),
+    ]
+    wire = about.spoilt or command_wire(robot)
+    source = _publisher_of(wire, plan)
+    return [
+        replace(spec, remappings={wire.name: source_of(wire)}) if spec.name == source else spec
+        for spec in specs
+    ]
+
+
+def _publisher_of(wire: Wire, plan: RunPlan) -> str:
+    if wire == ODOMETRY:  # it may have come from another process
+        return "estimator" if plan.guards.estimator else "plant"
+    return "plant" if wire == MOCAP else "controller"
+
+
+def _teleop_spec(plan: RunPlan) -> NodeSpec:
+    return NodeSpec(
+        "teleop",
+        "fulmar_ros",
+        "teleop_node",
+        "fulmar_ros.teleop_node",
+        f"/{plan.robot}",
+        {"robot": plan.robot, "keyboard": False},
+    )

@@ -6,60 +6,88 @@ import multiprocessing
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.environment import environment
-from fulmar_bringup.faults.command_faults import command_faults
-from fulmar_bringup.faults.finding import Finding
+from fulmar_bringup.faults.command_faults import COMMAND_FAULTS
+from fulmar_bringup.faults.driver_faults import DRIVER_FAULTS
+from fulmar_bringup.faults.fault import Fault
+from fulmar_bringup.faults.finding import Finding, Outcome
+from fulmar_bringup.faults.hand_faults import HAND_FAULTS
 from fulmar_bringup.faults.input_faults import INPUT_FAULTS
-from fulmar_bringup.faults.live_system import LiveSystem, live_system
+from fulmar_bringup.faults.kept import Kept, kept_of
+from fulmar_bringup.faults.live_system import NothingShown, live_system
 from fulmar_bringup.faults.network_faults import NETWORK_FAULTS
 from fulmar_bringup.faults.policy_faults import POLICY_FAULTS
 from fulmar_bringup.faults.process_faults import PROCESS_FAULTS
-from fulmar_bringup.faults.two_hosts import ACROSS, inside, two_hosts, why_not
-from fulmar_bringup.planning import RunRequest, default_task, plan_run
-from fulmar_core.errors import ConfigError, RunFailed, UnknownNameError
+from fulmar_bringup.faults.surroundings import request_of
+from fulmar_bringup.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
+from fulmar_bringup.system import Guards, default_hardware, modules_of
+from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.robot import load_robot
-from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 
-Fault = Callable[[LiveSystem], Finding]
-FAR_M = 6.0  # the robot is under way for seconds
+EVERY = (
+    *PROCESS_FAULTS,
+    *HAND_FAULTS,
+    *DRIVER_FAULTS,
+    *INPUT_FAULTS,
+    *COMMAND_FAULTS,
+    *POLICY_FAULTS,
+    *NETWORK_FAULTS,
+)
+ATTEMPTS = 3  # a robot may stand still just when something is done to it
 
 
-def faults_of(robot: str, names: list[str] | None = None) -> list[Fault]:
+@dataclass(frozen=True)
+class Skipped:
+    """A fault that is left out."""
+
+    name: str
+    reason: str
+
+
+def faults_of(robot: str, names: list[str] | None = None) -> tuple[list[Fault], list[Skipped]]:
     """The faults that a robot can have, or some of them by name.
 
+    Args:
+        robot: Its name.
+        names: Which; None for all.
+
     Returns:
-        Those asked for; by default every one that this machine can do.
+        Those to do, and those of all that this robot or this machine cannot have.
 
     Raises:
-        UnknownNameError: There is no such fault for it.
-        ConfigError: This machine cannot do it.
+        UnknownNameError: There is no such fault.
+        ConfigError: No name was given, or this robot or this machine cannot have the fault.
     """
-    has_names = command_wire(load_robot(robot)) is not VELOCITY_COMMAND
-    every = {
-        fault.__name__: fault
-        for fault in (
-            *PROCESS_FAULTS,
-            *INPUT_FAULTS,
-            *command_faults(has_names),
-            *POLICY_FAULTS,
-            *NETWORK_FAULTS,
-        )
-    }
-    for name in names or ():
-        if name not in every:
-            raise UnknownNameError("fault", name, every)
-        if every[name] in skipped_here():
-            raise ConfigError(f"{name}: {why_not()}.")
-    return [every[name] for name in names or every if every[name] not in skipped_here()]
+    known = {fault.name: fault for fault in EVERY}
+    the_robot = load_robot(robot)
+    if names is None:
+        reasons = {fault.name: fault.why_not(the_robot) for fault in EVERY}
+        skipped = [Skipped(name, reason) for name, reason in reasons.items() if reason]
+        return [fault for fault in EVERY if not reasons[fault.name]], skipped
+    if not names:
+        raise ConfigError(f"no fault is named. Leave it out for all, or name some of: {', '.join(known)}.")
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("fault", name, known)
+        reason = known[name].why_not(the_robot)
+        if reason:
+            raise ConfigError(f"{name}: {reason}.")
+    return [known[name] for name in dict.fromkeys(names)], []
 
 
-def skipped_here() -> tuple[Fault, ...]:
-    """Faults that this machine cannot do; `why_not` says why."""
-    return NETWORK_FAULTS if why_not() else ()
+def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
+    """Modules of extras that the systems of some faults import."""
+    needed: dict[str, None] = {}
+    for about in (fault.about for fault in faults):
+        backend, hardware = ("hardware", default_hardware(robot)) if about.emulated else ("mujoco", "")
+        guards = Guards(**about.guards)
+        modules = modules_of("policy", backend, guards=guards, hardware=hardware, emulated=about.emulated)
+        needed |= dict.fromkeys(modules)
+    return tuple(needed)
 
 
 def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[Finding]:
@@ -69,64 +97,71 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
         robot: Whose system.
         faults: From `faults_of`.
         progress: Told how many are over.
+
+    Raises:
+        FulmarError: The robot has no policy to run.
     """
+    with tempfile.TemporaryDirectory() as folder:
+        request_of(
+            robot, Path(folder) / "bag"
+        )  # a robot without a policy is refused once, not by every fault
     findings = []
     with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
         for count, fault in enumerate(faults, 1):
-            with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
-                findings.append(_run(robot, fault, Path(folder)))
+            findings.append(_found(robot, fault))
             progress(count)
     return findings
 
 
-def _run(robot: str, fault: Fault, folder: Path) -> Finding:
-    if fault in NETWORK_FAULTS:
-        # In a process of its own: the middleware asks once in a process which networks there are.
-        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-            return pool.submit(_run_on_two_hosts, robot, fault, folder).result()
-    try:
-        with live_system(request_of(robot, folder / "bag")) as live:
-            return fault(live)
-    except RunFailed as error:
-        return _not_done(fault, error)
+def _found(robot: str, fault: Fault) -> Finding:
+    """What came of a fault; whatever prevents it is told, and the others go on."""
+    problem = ""
+    for _ in range(ATTEMPTS):
+        with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
+            try:
+                return _finding(fault, *_done(robot, fault, Path(folder)))
+            except NothingShown as error:
+                problem = str(error)
+            except FulmarError as error:
+                problem = str(error)
+                break
+            except Exception as error:  # noqa: BLE001 - one fault that cannot be done must not lose the others
+                problem = f"{type(error).__name__}: {error}"
+                break
+    return Finding(fault.name, "", problem, None, None, None, None, passed=False)
 
 
-def _run_on_two_hosts(robot: str, fault: Fault, folder: Path) -> Finding:
-    request = request_of(robot, folder / "bag")
-    try:
-        with (
-            environment(ACROSS),
-            two_hosts() as hosts,
-            inside(hosts.robot),
-            live_system(request, hosts) as live,
-        ):
-            return fault(live)
-    except RunFailed as error:
-        return _not_done(fault, error)
-
-
-def _not_done(fault: Fault, error: RunFailed) -> Finding:
-    return Finding(fault.__name__, "", str(error), None, None, False)
-
-
-def request_of(robot: str, record: Path) -> RunRequest:
-    """A robot that has far to go, with an e-stop."""
-    request = plan_run(
-        robot=robot,
-        task=default_task(robot),
-        controller="policy",
-        backend="mujoco",
-        policy=None,
-        goal=(FAR_M, 0.0, 0.0),
-        start=(0.0, 0.0, 0.0),
-        duration_s=None,
-        lockstep=False,
-        rate=1.0,
-        control_hz=None,
-        scenario="nominal",
-        seed=0,
-        record=record,
-        command="fulmar faults",
-        guards={"estop": True},
+def _finding(fault: Fault, outcome: Outcome, kept: Kept) -> Finding:
+    words = "; ".join(text for text in (outcome.reaction, kept.words and f"bag: {kept.words}") if text)
+    return Finding(
+        fault.name,
+        outcome.detected_by,
+        words,
+        outcome.time_to_safe_s,
+        outcome.limit_s,
+        kept.lost,
+        kept.intact,
+        outcome.passed and kept.intact,
     )
-    return replace(request, plan=replace(request.plan, duration_s=0.0))
+
+
+def _done(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, Kept]:
+    if not fault.about.two_hosts:
+        return _do(robot, fault, folder, None)
+    # In a process of its own: the middleware asks once in a process which networks there are.
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(_do_on_two_hosts, robot, fault, folder).result()
+
+
+def _do_on_two_hosts(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, Kept]:
+    with environment(ACROSS), two_hosts() as hosts, inside(hosts.robot):
+        return _do(robot, fault, folder, hosts)
+
+
+def _do(robot: str, fault: Fault, folder: Path, hosts: TwoHosts | None) -> tuple[Outcome, Kept]:
+    request = request_of(robot, folder / "bag", fault.about)
+    with live_system(request, fault.about, hosts) as live:
+        if fault.begins:
+            live.begin()
+        outcome = fault.do(live)
+    return outcome, kept_of(request.record, live.witness, outcome.recorder_away)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable
@@ -13,10 +14,12 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from fulmar_core.robot import Robot
-from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS
+from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire
+from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import subscriber_qos
 
 DEPTH = 100  # messages that may wait while this process does something else
+NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)
@@ -29,27 +32,32 @@ class Word:
     text: str
     values: dict[str, str]
 
+    @property
+    def complaint(self) -> tuple[str, str] | None:
+        """Who says that what is wrong, whatever its figures; None if nothing is."""
+        return None if self.level == "ok" else (self.who, NUMBER.sub("#", self.text))
+
 
 class Witness:
     """Listens, from a node that spins in a thread of its own."""
 
-    def __init__(self, node: Node, robot: Robot) -> None:
-        """Listen to what is applied, and to the health of every node."""
+    def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
+        """Listen to what actuators do, on the wire that tells it, and to the health of every node."""
+        self.wire = wire
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
-        self._applied: list[tuple[float, bool]] = []
+        self._applied: list[tuple[float, int, bool]] = []  # heard [s], stamp [ns], whether it moves
         self._words: list[Word] = []
         listen = node.create_subscription
-        qos = subscriber_qos(ACTUATORS_STATE, reliable=True, depth=DEPTH)
-        listen(JointState, ACTUATORS_STATE.name, self._on_applied, qos)
-        for wire in (DIAGNOSTICS, STATUS):
-            qos = subscriber_qos(wire, reliable=True, depth=DEPTH)
-            listen(DiagnosticArray, wire.name, self._on_health, qos)
+        listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))
+        for health in (DIAGNOSTICS, STATUS):
+            qos = subscriber_qos(health, reliable=True, depth=DEPTH)
+            listen(DiagnosticArray, health.name, self._on_health, qos)
 
     def _on_applied(self, message: JointState) -> None:
         moves = bool(np.any(np.asarray(message.effort) != self._safe))
         with self._lock:
-            self._applied.append((time.monotonic(), moves))
+            self._applied.append((time.monotonic(), stamp_ns(message.header.stamp), moves))
 
     def _on_health(self, message: DiagnosticArray) -> None:
         levels = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn"}
@@ -65,24 +73,34 @@ class Witness:
     def moves(self) -> bool:
         """Whether the newest applied command is another than the safe one."""
         with self._lock:
-            return bool(self._applied) and self._applied[-1][1]
+            return bool(self._applied) and self._applied[-1][2]
 
     def applied_since(self, since_s: float) -> list[tuple[float, bool]]:
         """When something was applied, and whether it moved the robot."""
         with self._lock:
-            return [entry for entry in self._applied if entry[0] >= since_s]
+            return [(heard_s, moves) for heard_s, _, moves in self._applied if heard_s >= since_s]
+
+    def heard(self) -> tuple[np.ndarray, np.ndarray]:
+        """When something was applied, and its stamps, shapes (n,) [s] and int64 [ns]."""
+        with self._lock:
+            times = np.array([heard_s for heard_s, _, _ in self._applied], dtype=float)
+            return times, np.array([stamp for _, stamp, _ in self._applied], dtype=np.int64)
 
     def words_since(self, since_s: float) -> list[Word]:
         """What was said from then on."""
         with self._lock:
             return [word for word in self._words if word.heard_s >= since_s]
 
-    def complaint_since(self, since_s: float, *, settled: frozenset[str] = frozenset()) -> Word | None:
-        """The first thing that a node said which was wrong, and not wrong before."""
-        for word in self.words_since(since_s):
-            if word.level != "ok" and word.text not in settled:
-                return word
-        return None
+    def complaint_since(self, since_s: float) -> Word | None:
+        """The first thing that a node said from then on which was wrong, and not its last word before."""
+        return first_complaint(self.words_since(0.0), since_s)
+
+
+def first_complaint(words: list[Word], since_s: float) -> Word | None:
+    """The first thing that is wrong from a time on, and was not some node's last word before it."""
+    standing = {word.who: word.complaint for word in words if word.heard_s < since_s}.values()
+    new = (word for word in words if word.heard_s >= since_s and word.complaint is not None)
+    return next((word for word in new if word.complaint not in standing), None)
 
 
 def wait_for(condition: Callable[[], bool], timeout_s: float) -> bool:
