@@ -89,6 +89,11 @@ class BagFile:
         if not self._on_disk:
             self._nameless.unlink(missing_ok=True)
 
+    def discard(self) -> None:
+        """Let go of the file and remove it."""
+        self.close()
+        self._path.unlink(missing_ok=True)
+
     def _append(self, end: bytes) -> None:
         try:
             self._write_at(self._on_disk, bytes(self._waiting) + end)

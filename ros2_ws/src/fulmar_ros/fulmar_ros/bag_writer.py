@@ -63,7 +63,11 @@ class BagWriter:
         try:
             directory.mkdir(parents=True, exist_ok=True)
             self._part = self._new_part()
-            self.flush()
+            try:
+                self.flush()
+            except OSError:  # the folder stays free for another try
+                self._part.discard()
+                raise
         except OSError as error:
             raise BagError(f"{directory}: cannot write a bag here: {error.strerror}.") from error
 
