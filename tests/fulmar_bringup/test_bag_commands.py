@@ -198,6 +198,41 @@ def test_a_topic_under_a_wrong_schema_is_no_answer(tmp_path):
     assert "holds no nav_msgs/msg/Odometry" in str(done.exception)
 
 
+@pytest.mark.parametrize("garbage", [b"\x00\x01\x00\x00" + bytes(range(200)), b"", bytes(3), b"\xff" * 720])
+def test_bytes_that_are_not_what_the_schema_says_are_counted_and_left_out(tmp_path, garbage):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_to_pose"})
+    odometry = open_bag(POLICY).of(ODOMETRY)
+    bag.add_topic(odometry.name, odometry.type, "stream")
+    for index, data in enumerate(odometry.data):
+        bag.write(odometry.name, data if index % 2 else garbage, log_ns=odometry.log_ns[index])
+    bag.close()
+    told = (
+        f"{(len(odometry) + 1) // 2} of {len(odometry)} messages of {odometry.name} are no {odometry.type}."
+    )
+    found = answer("info", tmp_path / "bag")
+    assert found["damage"] == [told]
+    assert found["topics"][0]["rate_hz"] == pytest.approx(2.5)
+    assert ask("info", tmp_path / "bag").exit_code == 1
+    assert told in ask("plot", tmp_path / "bag", "--out", tmp_path / "p.png").stderr
+
+
+def test_where_no_message_is_what_the_schema_says_the_reason_is_told(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_to_pose"})
+    bag.add_topic("/floating_platform/odom", ODOMETRY.type, "stream")
+    for index in range(20):
+        bag.write("/floating_platform/odom", bytes([0, 1, 0, 0]) + bytes(range(200)), log_ns=index * 10**8)
+    bag.close()
+    (topic,) = answer("info", tmp_path / "bag")["topics"]
+    assert (topic["count"], topic["rate_hz"], topic["late"]) == (20, None, None)
+    for command in ("rerun", "plot"):
+        assert "20 of 20 messages of /floating_platform/odom" in str(ask(command, tmp_path / "bag").exception)
+
+
+def test_every_message_of_the_reference_bags_is_what_its_schema_says():
+    for folder in BAGS.iterdir():
+        assert not [topic.name for topic in open_bag(folder).topics.values() if topic.unreadable]
+
+
 def test_a_bag_without_messages_is_told(tmp_path):
     BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"}).close()
     assert answer("info", tmp_path / "bag")["messages"] == 0

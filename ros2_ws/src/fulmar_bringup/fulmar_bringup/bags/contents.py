@@ -13,6 +13,7 @@ import numpy as np
 import yaml
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
+from fulmar_bringup.bags.layout import unreadable
 from fulmar_core.errors import BagError, UnknownNameError
 from fulmar_core.topics import Wire
 from fulmar_ros.bag_metadata import METADATA_FILE
@@ -32,6 +33,7 @@ class Topic:
     data: list[bytes] = field(default_factory=list)  # in CDR
     log_ns: list[int] = field(default_factory=list)  # when each was recorded, since the epoch [ns]
     sequence: list[int] = field(default_factory=list)  # number of each, counted by its recorder; 0: not known
+    unreadable: list[int] = field(default_factory=list)  # indices of those that are not what the type says
 
     def __len__(self) -> int:
         """Number of messages."""
@@ -39,13 +41,23 @@ class Topic:
 
     def from_time(self, start_ns: int, end_ns: int) -> Topic:
         """The messages that were recorded from a time on and before another [ns]."""
-        kept = [i for i, log_ns in enumerate(self.log_ns) if start_ns <= log_ns < end_ns]
+        return self._of([i for i, log_ns in enumerate(self.log_ns) if start_ns <= log_ns < end_ns])
+
+    def readable(self) -> Topic:
+        """The messages that are what the type says."""
+        return (
+            self._of(sorted(set(range(len(self))).difference(self.unreadable))) if self.unreadable else self
+        )
+
+    def _of(self, kept: list[int]) -> Topic:
+        lost = set(self.unreadable)
         return Topic(
             self.name,
             self.type,
             [self.data[i] for i in kept],
             [self.log_ns[i] for i in kept],
             [self.sequence[i] for i in kept],
+            [place for place, i in enumerate(kept) if i in lost],
         )
 
 
@@ -105,7 +117,11 @@ class Bag:
             ConfigError: There is no such topic.
         """
         kind = "nav_msgs/msg/Odometry"
-        known = {name: topic for name, topic in self.topics.items() if topic.type == kind and len(topic)}
+        known = {
+            name: topic
+            for name, topic in self.topics.items()
+            if topic.type == kind and len(topic) > len(topic.unreadable)
+        }
         if chosen is not None:
             if chosen not in known:
                 raise UnknownNameError(f"odometry topic in {self.path}:", chosen, known)
@@ -116,7 +132,8 @@ class Bag:
         if len(known) == 1:
             return next(iter(known.values()))
         if not known:
-            raise BagError(f"{self.path}: holds no {kind}. It has: {', '.join(self.topics) or 'nothing'}.")
+            has = f"It has: {', '.join(self.topics) or 'nothing'}."
+            raise BagError(" ".join([f"{self.path}: holds no {kind}. {has}", *self.warnings]))
         raise BagError(
             f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC."
         )
@@ -145,6 +162,7 @@ def open_bag(path: Path) -> Bag:
             problems.append(str(error))
     if len(problems) == len(files):
         raise BagError(problems[0])
+    gathered.check_types()
     folder = path if path.is_dir() else path.parent
     info = gathered.info or _told_beside(folder, RUN_RECORD)
     return Bag(
@@ -189,6 +207,14 @@ class _Gathered:
             self._read_sqlite3(file)
         else:
             self._read_mcap(file)
+
+    def check_types(self) -> None:
+        """Find the messages that are not what their topic says."""
+        for topic in self.topics.values():
+            topic.unreadable = unreadable(topic.type, topic.data)
+            if topic.unreadable:
+                count = f"{len(topic.unreadable)} of {len(topic)} messages"
+                self.warnings.append(f"{count} of {topic.name} are no {topic.type}.")
 
     def _topic(self, name: str, kind: str) -> Topic:
         """The topic of a name; the same name with another type is told apart."""
