@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import random
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rosbags.rosbag2.enums import StoragePlugin
+from rosbags.rosbag2.enums import CompressionMode, StoragePlugin
 from typer.testing import CliRunner
 
 from fulmar_bringup.bags.contents import open_bag
@@ -284,6 +285,47 @@ def test_a_bag_that_others_recorded_loads_in_info_plot_and_rerun(tmp_path, stora
     assert not done["compared"]
     assert done["asked"] == done["steps"] > 30
     assert ask("rerun", bag, "--controller", "policy", *asked).exit_code == 0
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE, CompressionMode.STORAGE])
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_compressed_bag_is_the_same_as_a_plain_one(tmp_path, storage, mode):
+    if (storage, mode) == (StoragePlugin.SQLITE3, CompressionMode.STORAGE):
+        pytest.skip("sqlite3 has no compression of its own")
+    plain = open_bag(write_foreign(tmp_path / "plain", storage))
+    packed = open_bag(write_foreign(tmp_path / "packed", storage, compression=mode))
+    assert packed.warnings == ()
+    assert packed.storage == plain.storage
+    assert packed.topics == plain.topics
+    assert open_bag(packed.files[0]).topics == plain.topics
+
+
+def test_a_compressed_file_that_is_torn_is_read_up_to_the_tear(tmp_path):
+    folder = write_foreign(tmp_path / "bag", StoragePlugin.MCAP, compression=CompressionMode.FILE)
+    (file,) = folder.glob("*.zstd")
+    file.write_bytes(file.read_bytes()[:-40])
+    with contextlib.suppress(BagError):
+        assert open_bag(folder).warnings
+    file.write_bytes(b"garbage")
+    with pytest.raises(BagError, match=r"bag_0|bag\.mcap"):
+        open_bag(folder)
+
+
+def test_a_missing_file_of_a_split_bag_is_named(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={})
+    bag.add_topic("/words", "std_msgs/msg/String", "stream")
+    data = bytes(
+        type_store().serialize_cdr(type_store().types["std_msgs/msg/String"]("x"), "std_msgs/msg/String")
+    )
+    for index in range(3):
+        bag.write("/words", data, log_ns=index + 1)
+        bag.split()
+    bag.close()
+    (tmp_path / "bag" / "bag_1.mcap").unlink()
+    assert open_bag(tmp_path / "bag").warnings == (
+        "bag_1.mcap: the file is missing; metadata.yaml lists it.",
+    )
+    assert ask("info", tmp_path / "bag").exit_code == 1
 
 
 def test_a_foreign_bag_without_a_goal_or_a_robot_says_what_to_give(tmp_path):

@@ -11,6 +11,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
@@ -20,6 +21,10 @@ from mcap.writer import MCAP0_MAGIC
 from fulmar_core.errors import BagError
 
 Record = Schema | Channel | Message | Metadata | Attachment
+
+PACKED = ".zstd"  # ending of files that rosbag2 compressed as a whole
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+UNPACK_BYTES = 1 << 20  # at once
 
 _HEAD = struct.Struct("<BQ")  # opcode and length of every record
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time and publish time, before the content
@@ -71,14 +76,11 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
     Raises:
         BagError: The file cannot be opened, is empty, or is no MCAP file at all.
     """
-    try:
-        data = memoryview(path.read_bytes())
-    except OSError as error:
-        raise BagError(f"{path}: {error.strerror}.") from error
+    data = memoryview(file_bytes(path, damage))
     if not data:
         raise BagError(f"{path}: the file is empty. Was the recorder stopped before it wrote anything?")
     if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
-        raise BagError(f"{path}: this is no MCAP file. Give a bag folder, or the .mcap file in it.")
+        raise BagError(f"{path}: this is no MCAP file.")
     offset = len(MCAP0_MAGIC)
     while offset < len(data):
         if len(data) - offset < _HEAD.size:
@@ -96,6 +98,40 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
         if opcode in _READERS:
             body = bytes(data[start + _HEAD.size : offset])
             yield from _parse(opcode, body, f"{path.name}: the record at byte {start}", damage)
+
+
+def file_bytes(path: Path, damage: list[str]) -> bytes:
+    """What is in a file, unpacked where its name says that it is packed as a whole.
+
+    Args:
+        path: The file.
+        damage: Grows by one line where it cannot be unpacked to its end.
+
+    Raises:
+        BagError: It cannot be opened.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise BagError(f"{path}: {error.strerror}.") from error
+    if path.suffix != PACKED:
+        return data
+    pieces: list[bytes] = []
+    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
+    try:
+        while piece := reader.read(UNPACK_BYTES):
+            pieces.append(piece)
+    except zstandard.ZstdError as error:
+        damage.append(f"{path.name}: the rest cannot be unpacked ({error}).")
+    return b"".join(pieces)
+
+
+def unpack(data: bytes) -> bytes:
+    """One message that was compressed by itself; as it is where that fails, which is no message then."""
+    try:
+        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    except zstandard.ZstdError:
+        return data
 
 
 def _parse(opcode: int, body: bytes, where: str, damage: list[str]) -> list[Any]:

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import tempfile
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
+from fulmar_bringup.bags.folder import files_of, missing_files, storage_of, told_beside
 from fulmar_bringup.bags.layout import unreadable
 from fulmar_core.errors import BagError, UnknownNameError
 from fulmar_core.topics import Wire
-from fulmar_ros.bag_metadata import METADATA_FILE
-from fulmar_ros.bag_records import place_in_bag, read_records
+from fulmar_ros.bag_records import PACKED, ZSTD_MAGIC, file_bytes, read_records, unpack
 from fulmar_ros.bag_thread import RECORDING
 from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
-
-ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
 
 
 @dataclass
@@ -152,7 +151,7 @@ def open_bag(path: Path) -> Bag:
         BagError: There is no bag, or nothing of it can be read.
     """
     path = Path(path)
-    files = _files(path)
+    files = files_of(path)
     gathered = _Gathered()
     problems: list[str] = []
     for file in files:
@@ -163,34 +162,18 @@ def open_bag(path: Path) -> Bag:
     if len(problems) == len(files):
         raise BagError(problems[0])
     gathered.check_types()
-    folder = path if path.is_dir() else path.parent
-    info = gathered.info or _told_beside(folder, RUN_RECORD)
+    info = gathered.info or json_object(told_beside(path, RUN_RECORD))
+    problems += [f"{name}: the file is missing; metadata.yaml lists it." for name in missing_files(path)]
     return Bag(
         path=path,
-        storage=ENDINGS[files[0].suffix],
+        storage=storage_of(files[0]) or "",
         files=files,
         topics=dict(sorted(gathered.topics.items())),
         info=info,
-        recording=_told_beside(folder, RECORDING) or {},
+        recording=json_object(told_beside(path, RECORDING)) or {},
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )
-
-
-def _files(path: Path) -> tuple[Path, ...]:
-    """Files of a bag in the order of their numbers; a bag may be split into several."""
-    if path.is_file():
-        if path.suffix not in ENDINGS:
-            raise BagError(f"{path}: this is no bag. Give a bag folder, or the .mcap or .db3 file in it.")
-        return (path,)
-    if not path.is_dir():
-        raise BagError(f"{path}: there is no such bag. Give a bag folder, or the .mcap or .db3 file in it.")
-    for ending in ENDINGS:
-        files = sorted(path.glob(f"*{ending}"), key=place_in_bag)
-        if files:
-            return tuple(files)
-    found = ", ".join(sorted(each.name for each in path.iterdir())[:4]) or "nothing"
-    raise BagError(f"{path}: has no .mcap and no .db3 file, only {found}. Give a bag folder.")
 
 
 class _Gathered:
@@ -203,7 +186,7 @@ class _Gathered:
         self.warnings: list[str] = []
 
     def read(self, file: Path) -> None:
-        if file.suffix == ".db3":
+        if storage_of(file) == "sqlite3":
             self._read_sqlite3(file)
         else:
             self._read_mcap(file)
@@ -223,6 +206,13 @@ class _Gathered:
             return topic
         return self.topics.setdefault(f"{name} ({kind})", Topic(name, kind))
 
+    @staticmethod
+    def _add(topic: Topic, data: bytes, log_ns: int, sequence: int) -> None:
+        # Where bags are compressed message by message, nothing in an MCAP file says so; CDR begins with a zero.
+        topic.data.append(unpack(data) if data.startswith(ZSTD_MAGIC) else data)
+        topic.log_ns.append(log_ns)
+        topic.sequence.append(sequence)
+
     def _read_mcap(self, file: Path) -> None:
         schemas: dict[int, str] = {}
         channels: dict[int, Topic] = {}
@@ -233,9 +223,7 @@ class _Gathered:
                 if topic is None:
                     lost["messages of channels that nobody announced"] += 1
                     continue
-                topic.data.append(record.data)
-                topic.log_ns.append(record.log_time)
-                topic.sequence.append(record.sequence)
+                self._add(topic, record.data, record.log_time, record.sequence)
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
@@ -253,31 +241,31 @@ class _Gathered:
         from rosbags.rosbag2 import Reader
 
         try:
-            with Reader(file) as reader:
+            with _plain(file, self.warnings) as plain, Reader(plain) as reader:
                 topics = {each.id: self._topic(each.topic, each.msgtype) for each in reader.connections}
                 try:
                     for connection, log_ns, data in reader.messages():
-                        topic = topics[connection.id]
-                        topic.data.append(bytes(data))
-                        topic.log_ns.append(log_ns)
-                        topic.sequence.append(0)
+                        self._add(topics[connection.id], bytes(data), log_ns, 0)
                 except Exception as error:  # noqa: BLE001 - damage raises whatever it pleases, from sqlite3 or rosbags
                     self.warnings.append(f"{file.name}: the rest is damaged ({_first_line(error)}).")
         except Exception as error:
             raise BagError(f"{file}: this sqlite3 bag cannot be read: {_first_line(error)}.") from error
 
 
+@contextlib.contextmanager
+def _plain(file: Path, damage: list[str]) -> Iterator[Path]:
+    """The file itself, or, where it is packed as a whole, what is in it."""
+    if file.suffix != PACKED:
+        yield file
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / file.stem
+        plain.write_bytes(file_bytes(file, damage))
+        yield plain
+
+
 def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [""])[0].rstrip(".") or type(error).__name__
-
-
-def _told_beside(folder: Path, entry: str) -> dict[str, Any] | None:
-    """An entry of `custom_data` in the bag's `metadata.yaml`; None where it is not there."""
-    try:
-        document = yaml.safe_load((folder / METADATA_FILE).read_text())
-        return json_object(document["rosbag2_bagfile_information"]["custom_data"][entry])
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
-        return None
 
 
 def json_object(text: str) -> dict[str, Any] | None:
