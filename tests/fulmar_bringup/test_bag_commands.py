@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import itertools
 import json
 import random
 import re
@@ -22,6 +23,7 @@ from fulmar_bringup.bags.decode import joint_vectors, messages, odometries, stam
 from fulmar_bringup.bags.figures import describe
 from fulmar_bringup.cli import app
 from fulmar_core.errors import BagError, FulmarError
+from fulmar_core.paths import config_path
 from fulmar_core.topics import ACTION, ODOMETRY
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
@@ -287,11 +289,14 @@ def test_a_bag_that_others_recorded_loads_in_info_plot_and_rerun(tmp_path, stora
     assert ask("rerun", bag, "--controller", "policy", *asked).exit_code == 0
 
 
-@pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE, CompressionMode.STORAGE])
-@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize(
+    ("storage", "mode"),
+    [
+        *itertools.product(STORAGES, (CompressionMode.FILE, CompressionMode.MESSAGE)),
+        (StoragePlugin.MCAP, CompressionMode.STORAGE),
+    ],
+)
 def test_a_compressed_bag_is_the_same_as_a_plain_one(tmp_path, storage, mode):
-    if (storage, mode) == (StoragePlugin.SQLITE3, CompressionMode.STORAGE):
-        pytest.skip("sqlite3 has no compression of its own")
     plain = open_bag(write_foreign(tmp_path / "plain", storage))
     packed = open_bag(write_foreign(tmp_path / "packed", storage, compression=mode))
     assert packed.warnings == ()
@@ -309,6 +314,32 @@ def test_a_compressed_file_that_is_torn_is_read_up_to_the_tear(tmp_path):
     file.write_bytes(b"garbage")
     with pytest.raises(BagError, match=r"bag_0|bag\.mcap"):
         open_bag(folder)
+
+
+def test_a_flipped_bit_in_an_attachment_is_named_and_the_file_left_out(tmp_path):
+    robot = config_path("robots", "floating_platform").read_bytes()
+    BagWriter(
+        tmp_path / "bag",
+        run_info={"robot": "floating_platform"},
+        attachments={"robot.yaml": robot, "notes.txt": b"whole"},
+    ).close()
+    file = file_of(tmp_path / "bag")
+    data = bytearray(file.read_bytes())
+    data[data.index(robot) + 10] ^= 1
+    file.write_bytes(data)
+    found = answer("info", tmp_path / "bag")
+    (line,) = found["damage"]
+    assert "the attached 'robot.yaml'" in line
+    assert list(found["provenance"]["attachments"]) == ["notes.txt"]
+    assert found["provenance"]["config_changed_since"] == []
+
+
+def test_a_flipped_bit_in_the_run_record_is_named(tmp_path):
+    BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "seed": 7}).close()
+    file = file_of(tmp_path / "bag")
+    file.write_bytes(file.read_bytes().replace(b'"seed": 7', b'"seed": 3'))
+    (line,) = answer("info", tmp_path / "bag")["damage"]
+    assert "metadata.yaml differ" in line
 
 
 def test_a_missing_file_of_a_split_bag_is_named(tmp_path):

@@ -6,6 +6,7 @@ Needs no index and no footer: damage costs the chunk it is in, and a torn end co
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -27,13 +28,14 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 UNPACK_BYTES = 1 << 20  # at once
 
 _HEAD = struct.Struct("<BQ")  # opcode and length of every record
+_CHECKSUM = struct.Struct("<I")  # at the end of an attachment
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time and publish time, before the content
 _READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
     Opcode.SCHEMA: lambda stream, _: Schema.read(stream),
     Opcode.CHANNEL: lambda stream, _: Channel.read(stream),
     Opcode.MESSAGE: Message.read,
     Opcode.METADATA: lambda stream, _: Metadata.read(stream),
-    Opcode.ATTACHMENT: lambda stream, _: Attachment.read(stream),
+    Opcode.ATTACHMENT: lambda stream, length: _attachment(stream.read(length)),
     Opcode.CHUNK: lambda stream, _: Chunk.read(stream),
 }
 
@@ -134,10 +136,22 @@ def unpack(data: bytes) -> bytes:
         return data
 
 
+def _attachment(body: bytes) -> Attachment:
+    """`Attachment.read` with the checksum, which it skips; 0 stands for none."""
+    record = Attachment.read(ReadDataStream(BytesIO(body)))
+    (checksum,) = _CHECKSUM.unpack(body[-_CHECKSUM.size :])
+    if checksum and checksum != zlib.crc32(body[: -_CHECKSUM.size]):
+        raise BagError(f"the attached '{record.name}'")
+    return record
+
+
 def _parse(opcode: int, body: bytes, where: str, damage: list[str]) -> list[Any]:
     try:
         record = _READERS[opcode](ReadDataStream(BytesIO(body)), len(body))
         return _records_of(record) if isinstance(record, Chunk) else [record]
+    except BagError as error:
+        damage.append(f"{where}, {error}, is damaged and was left out (its checksum differs).")
+        return []
     except Exception as error:  # noqa: BLE001 - flipped bits raise whatever they please, from four libraries
         damage.append(f"{where} is damaged and was left out ({type(error).__name__}).")
         return []

@@ -162,7 +162,11 @@ def open_bag(path: Path) -> Bag:
     if len(problems) == len(files):
         raise BagError(problems[0])
     gathered.check_types()
-    info = gathered.info or json_object(told_beside(path, RUN_RECORD))
+    beside = json_object(told_beside(path, RUN_RECORD))
+    info = gathered.info or beside
+    if info and beside and json.dumps(info, sort_keys=True) != json.dumps(beside, sort_keys=True):
+        # A metadata record of MCAP has no checksum.
+        problems.append(f"the record '{RUN_RECORD}' and metadata.yaml differ: one of them is damaged.")
     problems += [f"{name}: the file is missing; metadata.yaml lists it." for name in missing_files(path)]
     return Bag(
         path=path,
