@@ -11,6 +11,8 @@ from typing import Any
 
 import yaml
 
+from fulmar_ros.bag_file import sync_folder
+
 METADATA_FILE = "metadata.yaml"
 # Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.
 _DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -114,6 +116,7 @@ def replace_file(path: Path, data: bytes) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         new.replace(path)
+        sync_folder(path.parent)
     except OSError:
         new.unlink(missing_ok=True)
         raise

@@ -20,6 +20,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from fulmar_core.errors import BagError
+from fulmar_ros.bag_file import BEGUN
 
 Record = Schema | Channel | Message | Metadata | Attachment
 
@@ -53,7 +54,8 @@ def bag_files(bag: Path) -> list[Path]:
         return [bag]
     if not bag.is_dir():
         raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
-    files = sorted(bag.glob("*.mcap"), key=place_in_bag)
+    named = (*bag.glob("*.mcap"), *bag.glob(f"*.mcap{BEGUN}"))
+    files = sorted((path for path in named if path.suffix != BEGUN or path.stat().st_size), key=place_in_bag)
     if not files:
         raise BagError(f"{bag}: 0 .mcap files where a bag folder has one or more. Give a bag folder.")
     return files
@@ -61,8 +63,14 @@ def bag_files(bag: Path) -> list[Path]:
 
 def place_in_bag(path: Path) -> tuple[str, int]:
     """What files of a bag are sorted by: `run_10.mcap` comes after `run_9.mcap`."""
-    stem, _, number = path.stem.rpartition("_")
-    return (stem, int(number)) if number.isdecimal() else (path.stem, 0)
+    name = plain_name(path).stem
+    stem, _, number = name.rpartition("_")
+    return (stem, int(number)) if number.isdecimal() else (name, 0)
+
+
+def plain_name(path: Path) -> Path:
+    """A file as it is called when it is neither packed as a whole nor without a name yet."""
+    return path.with_name(path.name.removesuffix(PACKED).removesuffix(BEGUN))
 
 
 def read_records(path: Path, damage: list[str]) -> Iterator[Record]:

@@ -8,8 +8,9 @@ from typing import Any
 import yaml
 
 from fulmar_core.errors import BagError
+from fulmar_ros.bag_file import BEGUN
 from fulmar_ros.bag_metadata import METADATA_FILE
-from fulmar_ros.bag_records import PACKED, place_in_bag
+from fulmar_ros.bag_records import place_in_bag, plain_name
 
 ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
 GIVE = "Give a bag folder, or the .mcap or .db3 file in it."
@@ -17,7 +18,7 @@ GIVE = "Give a bag folder, or the .mcap or .db3 file in it."
 
 def storage_of(file: Path) -> str | None:
     """`mcap` or `sqlite3`, also where the file is packed as a whole; None if neither."""
-    return ENDINGS.get(_unpacked(file.name).suffix)
+    return ENDINGS.get(plain_name(file).suffix)
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
@@ -32,13 +33,13 @@ def files_of(path: Path) -> tuple[Path, ...]:
         return (path,)
     if not path.is_dir():
         raise BagError(f"{path}: there is no such bag. {GIVE}")
-    there = [file for file in path.iterdir() if file.is_file()]
+    there = [
+        file for file in path.iterdir() if file.is_file() and (file.suffix != BEGUN or file.stat().st_size)
+    ]
     for storage in ENDINGS.values():
         files = [file for file in there if storage_of(file) == storage]
         if files:
-            return tuple(
-                sorted(files, key=lambda file: place_in_bag(file.with_name(_unpacked(file.name).name)))
-            )
+            return tuple(sorted(files, key=place_in_bag))
     found = ", ".join(sorted(each.name for each in path.iterdir())[:4])
     raise BagError(
         f"{path}: has no .mcap and no .db3 file, {f'only {found}' if found else 'it is empty'}. {GIVE}"
@@ -48,9 +49,13 @@ def files_of(path: Path) -> tuple[Path, ...]:
 def missing_files(path: Path) -> tuple[str, ...]:
     """Names that `metadata.yaml` lists and that are not in the folder; none where one file alone was given."""
     listed = _information(path).get("relative_file_paths") if path.is_dir() else None
-    there = {_unpacked(file.name).name for file in path.iterdir()} if path.is_dir() else set()
-    names = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
-    return tuple(name for name in names if _unpacked(Path(name).name).name not in there)
+    there = {plain_name(file).name for file in path.iterdir()} if path.is_dir() else set()
+    names = (
+        [name for name in listed if isinstance(name, str) and Path(name).name]
+        if isinstance(listed, list)
+        else []
+    )
+    return tuple(name for name in names if plain_name(Path(name)).name not in there)
 
 
 def told_beside(path: Path, entry: str) -> str:
@@ -67,7 +72,3 @@ def _information(path: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
-
-
-def _unpacked(name: str) -> Path:
-    return Path(name.removesuffix(PACKED))
