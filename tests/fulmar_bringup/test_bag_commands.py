@@ -342,6 +342,27 @@ def test_a_flipped_bit_in_the_run_record_is_named(tmp_path):
     assert "metadata.yaml differ" in line
 
 
+def test_a_torn_bag_is_recovered_with_all_that_is_told_about_it(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"})
+    bag.add_topic("/words", "std_msgs/msg/String", "stream")
+    data = bytes(
+        type_store().serialize_cdr(type_store().types["std_msgs/msg/String"]("x"), "std_msgs/msg/String")
+    )
+    bag.note("fulmar_recording", json.dumps({"complete": False, "dropped": {"/words": 7}}))
+    bag.write("/words", data, log_ns=1)
+    bag.flush()
+    file = file_of(tmp_path / "bag")
+    file.write_bytes(file.read_bytes()[:-60])
+    lost = answer("recover", tmp_path / "bag")["lost"]
+    assert len(lost) == 1
+    found = open_bag(tmp_path / "bag")
+    assert (len(found.topics["/words"]), found.warnings) == (1, ())
+    assert found.recording["dropped"] == {"/words": 7}
+    again = ask("recover", tmp_path / "bag")
+    assert (again.exit_code, "lost" in again.stdout) == (0, False)
+    assert "Give the folder" in str(ask("recover", file).exception)
+
+
 def test_a_missing_file_of_a_split_bag_is_named(tmp_path):
     bag = BagWriter(tmp_path / "bag", run_info={})
     bag.add_topic("/words", "std_msgs/msg/String", "stream")

@@ -86,6 +86,21 @@ def write_metadata(
     replace_file(directory / METADATA_FILE, text.encode())
 
 
+def read_information(directory: Path) -> dict[str, Any]:
+    """What the `metadata.yaml` of a folder tells, empty where there is none that can be read."""
+    try:
+        found = yaml.safe_load((directory / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def read_custom(directory: Path) -> dict[str, str]:
+    """Texts by name in the `custom_data` of a folder."""
+    custom = read_information(directory).get("custom_data")
+    return {str(k): v for k, v in custom.items() if isinstance(v, str)} if isinstance(custom, dict) else {}
+
+
 def _times(span: BagSpan) -> dict[str, dict[str, int]]:
     return {
         "duration": {"nanoseconds": span.end_ns - span.start_ns},

@@ -14,7 +14,7 @@ from mcap.writer import Writer
 
 from fulmar_core.errors import BagError
 from fulmar_ros.bag_file import BagFile, sync_folder
-from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
+from fulmar_ros.bag_metadata import BagSpan, TopicCount, read_custom, write_metadata
 from fulmar_ros.bag_records import bag_files, plain_name, read_records
 
 
@@ -48,7 +48,8 @@ def recover(directory: Path) -> tuple[str, ...]:
             raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
     if not copies:
         raise BagError(f"{directory}: nothing can be read. {damage[0]}")
-    custom = {name: text for copy in copies.values() for name, text in copy.custom.items()}
+    told = {name: text for copy in copies.values() for name, text in copy.custom.items()}
+    custom = {**read_custom(directory), **told}
     try:
         spans = {name: copy.span() for name, copy in copies.items()}
         write_metadata(directory, spans, _all_topics(list(copies.values())), custom)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from fulmar_core.errors import BagError
 from fulmar_ros.bag_file import BEGUN
-from fulmar_ros.bag_metadata import METADATA_FILE
+from fulmar_ros.bag_metadata import read_custom, read_information
 from fulmar_ros.bag_records import place_in_bag, plain_name
 
 ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
@@ -48,7 +45,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
 def missing_files(path: Path) -> tuple[str, ...]:
     """Names that `metadata.yaml` lists and that are not in the folder; none where one file alone was given."""
-    listed = _information(path).get("relative_file_paths") if path.is_dir() else None
+    listed = read_information(path).get("relative_file_paths") if path.is_dir() else None
     there = {plain_name(file).name for file in path.iterdir()} if path.is_dir() else set()
     names = (
         [name for name in listed if isinstance(name, str) and Path(name).name]
@@ -60,15 +57,4 @@ def missing_files(path: Path) -> tuple[str, ...]:
 
 def told_beside(path: Path, entry: str) -> str:
     """A text from `custom_data` in the bag's `metadata.yaml`; empty where it is not there."""
-    custom = _information(path).get("custom_data")
-    text = custom.get(entry) if isinstance(custom, dict) else None
-    return text if isinstance(text, str) else ""
-
-
-def _information(path: Path) -> dict[str, Any]:
-    folder = path if path.is_dir() else path.parent
-    try:
-        found = yaml.safe_load((folder / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
+    return read_custom(path if path.is_dir() else path.parent).get(entry, "")
