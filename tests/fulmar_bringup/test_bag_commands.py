@@ -25,6 +25,7 @@ from fulmar_bringup.cli import app
 from fulmar_core.errors import BagError, FulmarError
 from fulmar_core.paths import config_path
 from fulmar_core.topics import ACTION, ODOMETRY
+from fulmar_ros.bag_ring import FAULTS
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
 from tests.fulmar_bringup.foreign_bag import write_foreign
@@ -361,6 +362,23 @@ def test_a_torn_bag_is_recovered_with_all_that_is_told_about_it(tmp_path):
     again = ask("recover", tmp_path / "bag")
     assert (again.exit_code, "lost" in again.stdout) == (0, False)
     assert "Give the folder" in str(ask("recover", file).exception)
+
+
+@pytest.mark.parametrize("closed", [True, False], ids=["closed", "killed"])
+def test_info_tells_when_and_why_a_ring_was_written(tmp_path, closed):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"})
+    fault = {"time_ns": 1_700_000_000_000_000_000, "reason": "plant: the watchdog tripped"}
+    bag.note(FAULTS, json.dumps([fault]))
+    if closed:
+        bag.close()
+        (tmp_path / "bag" / "metadata.yaml").unlink()
+    else:
+        bag.flush()
+    assert answer("info", tmp_path / "bag")["faults"] == [fault]
+    assert re.search(
+        r"written for a fault at 2023-11-1\d .*: plant: the watchdog tripped",
+        ask("info", tmp_path / "bag").stdout,
+    )
 
 
 def test_a_missing_file_of_a_split_bag_is_named(tmp_path):

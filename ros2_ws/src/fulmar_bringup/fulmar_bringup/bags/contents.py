@@ -19,6 +19,7 @@ from fulmar_bringup.bags.layout import unreadable
 from fulmar_core.errors import BagError, UnknownNameError
 from fulmar_core.topics import Wire
 from fulmar_ros.bag_records import PACKED, ZSTD_MAGIC, file_bytes, read_records, unpack
+from fulmar_ros.bag_ring import FAULTS
 from fulmar_ros.bag_thread import RECORDING
 from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
 
@@ -61,6 +62,14 @@ class Topic:
 
 
 @dataclass(frozen=True)
+class Fault:
+    """Why a ring was written."""
+
+    time_ns: int  # of its first sign, since the epoch [ns]
+    reason: str
+
+
+@dataclass(frozen=True)
 class Bag:
     """One bag in memory."""
 
@@ -70,6 +79,7 @@ class Bag:
     topics: dict[str, Topic]  # by absolute name, sorted
     info: dict[str, Any] | None  # what kind of run this is; None: Fulmar did not record it
     recording: dict[str, Any]  # what became of the messages, as far as the recorder told it
+    faults: tuple[Fault, ...]  # that a ring was written for
     attachments: dict[str, bytes]
     warnings: tuple[str, ...]  # what could not be read
 
@@ -175,6 +185,7 @@ def open_bag(path: Path) -> Bag:
         topics=dict(sorted(gathered.topics.items())),
         info=info,
         recording=json_object(told_beside(path, RECORDING)) or {},
+        faults=_faults(gathered.faults or told_beside(path, FAULTS)),
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )
@@ -186,6 +197,7 @@ class _Gathered:
     def __init__(self) -> None:
         self.topics: dict[str, Topic] = {}
         self.info: dict[str, Any] | None = None
+        self.faults = ""  # JSON
         self.attachments: dict[str, bytes] = {}
         self.warnings: list[str] = []
 
@@ -237,6 +249,8 @@ class _Gathered:
                     lost[f"'{record.message_encoding}' as encoding of {record.topic}, only cdr is read"] = 1
             elif isinstance(record, Metadata) and record.name == RUN_RECORD:
                 self.info = json_object(record.metadata.get(RUN_KEY, "")) or self.info
+            elif isinstance(record, Metadata) and record.name == FAULTS:
+                self.faults = record.metadata.get(FAULTS, "")
             elif isinstance(record, Attachment):
                 self.attachments[record.name] = record.data
         self.warnings += [f"{file.name}: {count} {what}." for what, count in lost.items()]
@@ -279,6 +293,14 @@ def json_object(text: str) -> dict[str, Any] | None:
     except ValueError:
         return None
     return value if isinstance(value, dict) else None
+
+
+def _faults(text: str) -> tuple[Fault, ...]:
+    """None where the text is not what a ring writes."""
+    try:
+        return tuple(Fault(int(each["time_ns"]), str(each["reason"])) for each in json.loads(text or "[]"))
+    except (ValueError, TypeError, KeyError):
+        return ()
 
 
 def span_ns(topics: Iterable[Topic]) -> tuple[int, int]:

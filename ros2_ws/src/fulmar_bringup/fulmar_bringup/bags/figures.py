@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "messages": sum(len(topic) for topic in bag.topics.values()),
         "topics": topics,
         "silent_topics": [name for name, topic in bag.topics.items() if not len(topic)],
+        "faults": [asdict(fault) for fault in bag.faults],
         "provenance": provenance(bag),
         "damage": list(bag.warnings),
     }
