@@ -21,6 +21,7 @@ def write_foreign(
     count: int = 200,
     topic: str = "/base/odometry",
     compression: CompressionMode = CompressionMode.NONE,
+    stamped: bool = True,
 ) -> Path:
     """A circle of half a metre at 0.5 m/s and 50 Hz, in frames `map` and `base_footprint`, with a text beside it."""
     store = type_store()
@@ -34,7 +35,7 @@ def write_foreign(
             time_ns, angle = 5 * NS + i * 20_000_000, 0.02 * i
             message = new[ODOMETRY](
                 header=new["std_msgs/msg/Header"](
-                    stamp=new["builtin_interfaces/msg/Time"](sec=time_ns // NS, nanosec=time_ns % NS),
+                    stamp=new["builtin_interfaces/msg/Time"](*(divmod(time_ns, NS) if stamped else (0, 0))),
                     frame_id="map",
                 ),
                 child_frame_id="base_footprint",

@@ -398,6 +398,14 @@ def test_a_missing_file_of_a_split_bag_is_named(tmp_path):
     assert ask("info", tmp_path / "bag").exit_code == 1
 
 
+def test_odometry_whose_stamps_stay_zero_is_run_again_by_the_times_of_recording(tmp_path):
+    asked = ("--controller", "policy", "--robot", "turtlebot2", "--task", "go_to_position", "--goal", "0,0,0")
+    stamped = answer("rerun", write_foreign(tmp_path / "stamped", StoragePlugin.MCAP), *asked)
+    done = answer("rerun", write_foreign(tmp_path / "bag", StoragePlugin.MCAP, stamped=False), *asked)
+    assert done["asked"] == done["steps"] == stamped["steps"]
+    assert any("do not advance" in warning for warning in done["warnings"])
+
+
 def test_a_foreign_bag_without_a_goal_or_a_robot_says_what_to_give(tmp_path):
     bag = write_foreign(tmp_path / "bag", StoragePlugin.SQLITE3, count=5)
     assert "--robot" in str(ask("rerun", bag, "--controller", "lqr").exception)
