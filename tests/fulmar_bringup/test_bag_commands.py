@@ -175,19 +175,25 @@ def test_flipped_bits_end_in_figures_or_in_one_clear_line(tmp_path_factory, seed
 
 
 @pytest.mark.parametrize(
-    ("content", "told"), [(b"", "the file is empty"), (b"not a bag at all", "no MCAP file")]
+    ("content", "told"),
+    [(b"", "the file is empty"), (b"not a bag at all", "no MCAP file"), (b"\x89MCAP", "no MCAP file")],
 )
 def test_an_empty_file_and_one_of_another_kind_are_refused(tmp_path, content, told):
     file = tmp_path / "bag_0.mcap"
     file.write_bytes(content)
-    with pytest.raises(BagError, match=told):
-        open_bag(file)
+    with pytest.raises(BagError, match=told) as refused:
+        open_bag(tmp_path)
+    assert str(file) in str(refused.value)
+    assert "Give a bag folder" not in str(refused.value)
 
 
 def test_what_is_not_there_is_refused(tmp_path):
     with pytest.raises(BagError, match="no such bag"):
         open_bag(tmp_path / "nothing")
-    with pytest.raises(BagError, match=r"no \.mcap and no \.db3"):
+    with pytest.raises(BagError, match=r"no \.mcap and no \.db3 file: it is empty"):
+        open_bag(tmp_path)
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(BagError, match=r"no \.mcap and no \.db3 file, only notes\.txt"):
         open_bag(tmp_path)
 
 
@@ -492,6 +498,12 @@ def test_a_dataset_holds_an_episode_for_each_bag_and_a_frame_for_each_step(tmp_p
         tmp_path / "mixed",
     )
     assert "another kind" in str(refused.exception)
+
+
+def test_a_picture_of_another_kind_is_refused_as_what_it_is(tmp_path):
+    refused = str(ask("plot", POLICY, "--out", tmp_path / "run.pdf").exception)
+    assert "'.pdf' cannot be drawn" in refused
+    assert "report" not in refused.split(": ", 1)[1]
 
 
 def test_a_run_is_plotted_with_its_goal(tmp_path):

@@ -39,7 +39,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
             return tuple(sorted(files, key=place_in_bag))
     found = ", ".join(sorted(each.name for each in path.iterdir())[:4])
     raise BagError(
-        f"{path}: has no .mcap and no .db3 file, {f'only {found}' if found else 'it is empty'}. {GIVE}"
+        f"{path}: has no .mcap and no .db3 file{f', only {found}' if found else ': it is empty'}. {GIVE}"
     )
 
 
