@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from rosbags.rosbag2 import Writer
-from rosbags.rosbag2.enums import StoragePlugin
+from rosbags.rosbag2.enums import CompressionFormat, CompressionMode, StoragePlugin
 
 from fulmar_ros.bag_types import type_store
 
@@ -15,19 +15,27 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 
 
 def write_foreign(
-    folder: Path, storage: StoragePlugin, *, count: int = 200, topic: str = "/base/odometry"
+    folder: Path,
+    storage: StoragePlugin,
+    *,
+    count: int = 200,
+    topic: str = "/base/odometry",
+    compression: CompressionMode = CompressionMode.NONE,
+    stamped: bool = True,
 ) -> Path:
     """A circle of half a metre at 0.5 m/s and 50 Hz, in frames `map` and `base_footprint`, with a text beside it."""
     store = type_store()
     new = store.types
-    with Writer(folder, version=9, storage_plugin=storage) as writer:
+    writer = Writer(folder, version=9, storage_plugin=storage)
+    writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
         odometry = writer.add_connection(topic, ODOMETRY, typestore=store)
         words = writer.add_connection("/words", "std_msgs/msg/String", typestore=store)
         for i in range(count):
             time_ns, angle = 5 * NS + i * 20_000_000, 0.02 * i
             message = new[ODOMETRY](
                 header=new["std_msgs/msg/Header"](
-                    stamp=new["builtin_interfaces/msg/Time"](sec=time_ns // NS, nanosec=time_ns % NS),
+                    stamp=new["builtin_interfaces/msg/Time"](*(divmod(time_ns, NS) if stamped else (0, 0))),
                     frame_id="map",
                 ),
                 child_frame_id="base_footprint",

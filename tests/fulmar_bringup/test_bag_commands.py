@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import itertools
 import json
 import random
 import re
@@ -13,7 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rosbags.rosbag2.enums import StoragePlugin
+from rosbags.rosbag2.enums import CompressionMode, StoragePlugin
 from typer.testing import CliRunner
 
 from fulmar_bringup.bags.contents import open_bag
@@ -21,7 +23,9 @@ from fulmar_bringup.bags.decode import joint_vectors, messages, odometries, stam
 from fulmar_bringup.bags.figures import describe
 from fulmar_bringup.cli import app
 from fulmar_core.errors import BagError, FulmarError
+from fulmar_core.paths import config_path
 from fulmar_core.topics import ACTION, ODOMETRY
+from fulmar_ros.bag_ring import FAULTS
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
 from tests.fulmar_bringup.foreign_bag import write_foreign
@@ -171,19 +175,25 @@ def test_flipped_bits_end_in_figures_or_in_one_clear_line(tmp_path_factory, seed
 
 
 @pytest.mark.parametrize(
-    ("content", "told"), [(b"", "the file is empty"), (b"not a bag at all", "no MCAP file")]
+    ("content", "told"),
+    [(b"", "the file is empty"), (b"not a bag at all", "no MCAP file"), (b"\x89MCAP", "no MCAP file")],
 )
 def test_an_empty_file_and_one_of_another_kind_are_refused(tmp_path, content, told):
     file = tmp_path / "bag_0.mcap"
     file.write_bytes(content)
-    with pytest.raises(BagError, match=told):
-        open_bag(file)
+    with pytest.raises(BagError, match=told) as refused:
+        open_bag(tmp_path)
+    assert str(file) in str(refused.value)
+    assert "Give a bag folder" not in str(refused.value)
 
 
 def test_what_is_not_there_is_refused(tmp_path):
     with pytest.raises(BagError, match="no such bag"):
         open_bag(tmp_path / "nothing")
-    with pytest.raises(BagError, match=r"no \.mcap and no \.db3"):
+    with pytest.raises(BagError, match=r"no \.mcap and no \.db3 file: it is empty"):
+        open_bag(tmp_path)
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(BagError, match=r"no \.mcap and no \.db3 file, only notes\.txt"):
         open_bag(tmp_path)
 
 
@@ -196,6 +206,41 @@ def test_a_topic_under_a_wrong_schema_is_no_answer(tmp_path):
     done = ask("rerun", tmp_path / "bag", "--controller", "lqr")
     assert isinstance(done.exception, BagError)
     assert "holds no nav_msgs/msg/Odometry" in str(done.exception)
+
+
+@pytest.mark.parametrize("garbage", [b"\x00\x01\x00\x00" + bytes(range(200)), b"", bytes(3), b"\xff" * 720])
+def test_bytes_that_are_not_what_the_schema_says_are_counted_and_left_out(tmp_path, garbage):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_to_pose"})
+    odometry = open_bag(POLICY).of(ODOMETRY)
+    bag.add_topic(odometry.name, odometry.type, "stream")
+    for index, data in enumerate(odometry.data):
+        bag.write(odometry.name, data if index % 2 else garbage, log_ns=odometry.log_ns[index])
+    bag.close()
+    told = (
+        f"{(len(odometry) + 1) // 2} of {len(odometry)} messages of {odometry.name} are no {odometry.type}."
+    )
+    found = answer("info", tmp_path / "bag")
+    assert found["damage"] == [told]
+    assert found["topics"][0]["rate_hz"] == pytest.approx(2.5)
+    assert ask("info", tmp_path / "bag").exit_code == 1
+    assert told in ask("plot", tmp_path / "bag", "--out", tmp_path / "p.png").stderr
+
+
+def test_where_no_message_is_what_the_schema_says_the_reason_is_told(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_to_pose"})
+    bag.add_topic("/floating_platform/odom", ODOMETRY.type, "stream")
+    for index in range(20):
+        bag.write("/floating_platform/odom", bytes([0, 1, 0, 0]) + bytes(range(200)), log_ns=index * 10**8)
+    bag.close()
+    (topic,) = answer("info", tmp_path / "bag")["topics"]
+    assert (topic["count"], topic["rate_hz"], topic["late"]) == (20, None, None)
+    for command in ("rerun", "plot"):
+        assert "20 of 20 messages of /floating_platform/odom" in str(ask(command, tmp_path / "bag").exception)
+
+
+def test_every_message_of_the_reference_bags_is_what_its_schema_says():
+    for folder in BAGS.iterdir():
+        assert not [topic.name for topic in open_bag(folder).topics.values() if topic.unreadable]
 
 
 def test_a_bag_without_messages_is_told(tmp_path):
@@ -249,6 +294,122 @@ def test_a_bag_that_others_recorded_loads_in_info_plot_and_rerun(tmp_path, stora
     assert not done["compared"]
     assert done["asked"] == done["steps"] > 30
     assert ask("rerun", bag, "--controller", "policy", *asked).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("storage", "mode"),
+    [
+        *itertools.product(STORAGES, (CompressionMode.FILE, CompressionMode.MESSAGE)),
+        (StoragePlugin.MCAP, CompressionMode.STORAGE),
+    ],
+)
+def test_a_compressed_bag_is_the_same_as_a_plain_one(tmp_path, storage, mode):
+    plain = open_bag(write_foreign(tmp_path / "plain", storage))
+    packed = open_bag(write_foreign(tmp_path / "packed", storage, compression=mode))
+    assert packed.warnings == ()
+    assert packed.storage == plain.storage
+    assert packed.topics == plain.topics
+    assert open_bag(packed.files[0]).topics == plain.topics
+
+
+def test_a_compressed_file_that_is_torn_is_read_up_to_the_tear(tmp_path):
+    folder = write_foreign(tmp_path / "bag", StoragePlugin.MCAP, compression=CompressionMode.FILE)
+    (file,) = folder.glob("*.zstd")
+    file.write_bytes(file.read_bytes()[:-40])
+    with contextlib.suppress(BagError):
+        assert open_bag(folder).warnings
+    file.write_bytes(b"garbage")
+    with pytest.raises(BagError, match=r"bag_0|bag\.mcap"):
+        open_bag(folder)
+
+
+def test_a_flipped_bit_in_an_attachment_is_named_and_the_file_left_out(tmp_path):
+    robot = config_path("robots", "floating_platform").read_bytes()
+    BagWriter(
+        tmp_path / "bag",
+        run_info={"robot": "floating_platform"},
+        attachments={"robot.yaml": robot, "notes.txt": b"whole"},
+    ).close()
+    file = file_of(tmp_path / "bag")
+    data = bytearray(file.read_bytes())
+    data[data.index(robot) + 10] ^= 1
+    file.write_bytes(data)
+    found = answer("info", tmp_path / "bag")
+    (line,) = found["damage"]
+    assert "the attached 'robot.yaml'" in line
+    assert list(found["provenance"]["attachments"]) == ["notes.txt"]
+    assert found["provenance"]["config_changed_since"] == []
+
+
+def test_a_flipped_bit_in_the_run_record_is_named(tmp_path):
+    BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "seed": 7}).close()
+    file = file_of(tmp_path / "bag")
+    file.write_bytes(file.read_bytes().replace(b'"seed": 7', b'"seed": 3'))
+    (line,) = answer("info", tmp_path / "bag")["damage"]
+    assert "metadata.yaml differ" in line
+
+
+def test_a_torn_bag_is_recovered_with_all_that_is_told_about_it(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"})
+    bag.add_topic("/words", "std_msgs/msg/String", "stream")
+    data = bytes(
+        type_store().serialize_cdr(type_store().types["std_msgs/msg/String"]("x"), "std_msgs/msg/String")
+    )
+    bag.note("fulmar_recording", json.dumps({"complete": False, "dropped": {"/words": 7}}))
+    bag.write("/words", data, log_ns=1)
+    bag.flush()
+    file = file_of(tmp_path / "bag")
+    file.write_bytes(file.read_bytes()[:-60])
+    lost = answer("recover", tmp_path / "bag")["lost"]
+    assert len(lost) == 1
+    found = open_bag(tmp_path / "bag")
+    assert (len(found.topics["/words"]), found.warnings) == (1, ())
+    assert found.recording["dropped"] == {"/words": 7}
+    again = ask("recover", tmp_path / "bag")
+    assert (again.exit_code, "lost" in again.stdout) == (0, False)
+    assert "Give the folder" in str(ask("recover", file).exception)
+
+
+@pytest.mark.parametrize("closed", [True, False], ids=["closed", "killed"])
+def test_info_tells_when_and_why_a_ring_was_written(tmp_path, closed):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"})
+    fault = {"time_ns": 1_700_000_000_000_000_000, "reason": "plant: the watchdog tripped"}
+    bag.note(FAULTS, json.dumps([fault]))
+    if closed:
+        bag.close()
+        (tmp_path / "bag" / "metadata.yaml").unlink()
+    else:
+        bag.flush()
+    assert answer("info", tmp_path / "bag")["faults"] == [fault]
+    assert re.search(
+        r"written for a fault at 2023-11-1\d .*: plant: the watchdog tripped",
+        ask("info", tmp_path / "bag").stdout,
+    )
+
+
+def test_a_missing_file_of_a_split_bag_is_named(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={})
+    bag.add_topic("/words", "std_msgs/msg/String", "stream")
+    data = bytes(
+        type_store().serialize_cdr(type_store().types["std_msgs/msg/String"]("x"), "std_msgs/msg/String")
+    )
+    for index in range(3):
+        bag.write("/words", data, log_ns=index + 1)
+        bag.split()
+    bag.close()
+    (tmp_path / "bag" / "bag_1.mcap").unlink()
+    assert open_bag(tmp_path / "bag").warnings == (
+        "bag_1.mcap: the file is missing; metadata.yaml lists it.",
+    )
+    assert ask("info", tmp_path / "bag").exit_code == 1
+
+
+def test_odometry_whose_stamps_stay_zero_is_run_again_by_the_times_of_recording(tmp_path):
+    asked = ("--controller", "policy", "--robot", "turtlebot2", "--task", "go_to_position", "--goal", "0,0,0")
+    stamped = answer("rerun", write_foreign(tmp_path / "stamped", StoragePlugin.MCAP), *asked)
+    done = answer("rerun", write_foreign(tmp_path / "bag", StoragePlugin.MCAP, stamped=False), *asked)
+    assert done["asked"] == done["steps"] == stamped["steps"]
+    assert any("do not advance" in warning for warning in done["warnings"])
 
 
 def test_a_foreign_bag_without_a_goal_or_a_robot_says_what_to_give(tmp_path):
@@ -337,6 +498,12 @@ def test_a_dataset_holds_an_episode_for_each_bag_and_a_frame_for_each_step(tmp_p
         tmp_path / "mixed",
     )
     assert "another kind" in str(refused.exception)
+
+
+def test_a_picture_of_another_kind_is_refused_as_what_it_is(tmp_path):
+    refused = str(ask("plot", POLICY, "--out", tmp_path / "run.pdf").exception)
+    assert "'.pdf' cannot be drawn" in refused
+    assert "report" not in refused.split(": ", 1)[1]
 
 
 def test_a_run_is_plotted_with_its_goal(tmp_path):

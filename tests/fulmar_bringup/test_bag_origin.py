@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.node_table import RunPlan, list_nodes, recorder_spec
+from fulmar_bringup.system import Guards, System
 from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
+from fulmar_core.config import load_config
 from fulmar_core.recording import Recording
+from fulmar_ros.recorder_settings import RecorderSettings
 
 LQR = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
 POLICY = RunPlan("floating_platform", "go_to_pose", "policy", "mujoco", 5.0)
 
 
-def names(plan, system=""):
-    return {name: Path(path).name for name, path in json.loads(attachments(plan, system)).items()}
+def names(plan):
+    files = json.loads(attachments(plan))
+    return {name: Path(path).name for name, path in files.items() if isinstance(path, str)}
 
 
 def test_a_run_of_a_law_carries_its_files_and_its_gains():
@@ -25,9 +30,21 @@ def test_a_run_of_a_law_carries_its_files_and_its_gains():
         "robot.yaml": "floating_platform.yaml",
         "task.yaml": "go_to_pose.yaml",
         "scenario.yaml": "nominal.yaml",
-        "system.yaml": "mujoco_lqr.yaml",
         "controller.yaml": "floating_platform_lqr.yaml",
     }
+
+
+@pytest.mark.parametrize("controller", ["lqr", "mpc", "excite"])
+def test_a_run_carries_its_settings_as_a_system_file_that_loads(tmp_path, controller):
+    guards = Guards(max_run_time_s=10.0, area=(-1.0, 1.0, -2.0, 2.0))
+    plan = replace(
+        LQR, controller=controller, control_hz=25.0, guards=guards, recording=Recording(split_s=60.0)
+    )
+    file = tmp_path / "system.yaml"
+    file.write_bytes(RecorderSettings(attachments=attachments(plan)).files()["system.yaml"])
+    system = load_config(System, file)
+    assert (system.controller, system.control_hz, system.guards) == (controller, 25.0, guards)
+    assert system.recorder == plan.recording
 
 
 def test_a_run_of_a_policy_carries_its_passport():

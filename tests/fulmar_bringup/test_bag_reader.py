@@ -183,4 +183,4 @@ def test_a_topic_of_another_type_is_left_out_and_named(tmp_path):
     bag.close()
     record = read_run(tmp_path / "bag")
     assert len(record.odom) == 0
-    assert record.warnings == ("1 messages of /floating_platform/odom cannot be read.",)
+    assert record.warnings == ("1 messages of /floating_platform/odom have another type.",)

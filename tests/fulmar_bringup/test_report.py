@@ -144,7 +144,7 @@ def test_text_of_a_run_cannot_become_markup(reached, tmp_path):
 
 
 def test_another_kind_of_file_is_refused(reached, tmp_path):
-    with pytest.raises(ConfigError, match=r"\.html page or a \.png picture"):
+    with pytest.raises(ConfigError, match=r"'\.pdf' cannot be drawn"):
         write_report([read_run(reached)], tmp_path / "report.pdf")
     with pytest.raises(ConfigError, match="at least one bag"):
         write_report([], tmp_path / "report.html")

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import resource
+import signal
 
 import pytest
 import yaml
 from rosbags.rosbag2 import Reader
 
+from fulmar_core.errors import BagError
 from fulmar_ros.bag_records import bag_files
 from fulmar_ros.bag_ring import BagRing
+from fulmar_ros.bag_thread import BagThread
 from fulmar_ros.bag_writer import BagWriter
 from tests.fulmar_ros.bags import INFO, START_NS, TOPIC, TYPE, word, words_by_mcap, words_by_rosbags
 
@@ -46,9 +51,11 @@ def make_ring(folder, **options):
 
 
 def hear(ring, seconds, topic=TOPIC, text="word"):
-    """One word a second."""
+    """One word a second, and a tick after each."""
     for second in seconds:
         ring.write(topic, word(f"{text} {second}"), log_ns=START_NS + second * S)
+        with contextlib.suppress(BagError):
+            ring.tick(second)
 
 
 def test_without_a_fault_nothing_reaches_the_disk(ring, folder):
@@ -139,3 +146,54 @@ def test_a_memory_that_is_too_small_keeps_the_newest_and_says_so(folder):
     hear(ring, [3], text="fault")
     ring.close()
     assert words_by_mcap(folder) == ["word 1", "word 2", "fault 3"]
+
+
+@pytest.fixture
+def full_disk():
+    """No file may hold a byte; gives what makes room."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    old = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    make_room = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, before)  # noqa: E731
+    yield make_room
+    make_room()
+    signal.signal(signal.SIGXFSZ, old)
+
+
+def test_a_fault_on_a_full_disk_is_written_as_soon_as_there_is_room(ring, folder, full_disk):
+    hear(ring, range(10))
+    hear(ring, [10], text="fault")
+    hear(ring, range(11, 13))
+    assert list(folder.iterdir()) == []
+    assert (ring.messages, ring.messages_on_disk) == (6, 0)
+    full_disk()
+    hear(ring, range(13, 20))
+    hear(ring, [20], text="fault")
+    ring.close()
+    first = ["word 7", "word 8", "word 9", "fault 10", "word 11", "word 12", "word 13"]
+    assert words_by_mcap(folder) == [*first, "word 17", "word 18", "word 19", "fault 20"]
+    assert [fault["time_ns"] for fault in ring.faults] == [START_NS + 10 * S, START_NS + 20 * S]
+
+
+def test_a_second_fault_on_a_full_disk_waits_for_room_too(ring, folder, tmp_path):
+    hear(ring, [0], text="fault")
+    hear(ring, range(1, 10))
+    blocked = folder / "bag_1.mcap.begun"
+    blocked.touch()  # the next file cannot be created
+    with pytest.raises(OSError, match="exists"):
+        hear(ring, [10], text="fault")
+    blocked.unlink()
+    hear(ring, [11])
+    ring.close()
+    assert words_by_mcap(folder)[-5:] == ["word 7", "word 8", "word 9", "fault 10", "word 11"]
+
+
+def test_a_fault_that_was_never_written_counts_as_lost(ring, folder, full_disk):
+    told = []
+    thread = BagThread(ring, on_error=told.append)
+    thread.put(TOPIC, word("word 0"), START_NS)
+    thread.put(TOPIC, word("fault 1"), START_NS + S)
+    account = thread.stop()
+    assert (account.received, account.recorded, account.lost) == (2, 0, 2)
+    assert "cannot write a bag here" in account.problem
+    assert len(told) == 1

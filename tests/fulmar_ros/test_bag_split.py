@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+from pathlib import Path
 
 import pytest
 import yaml
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
+from fulmar_bringup.bags.contents import open_bag
 from fulmar_ros.bag_part import BagPart
 from fulmar_ros.bag_records import bag_files
 from fulmar_ros.bag_recovery import recover
@@ -129,3 +132,29 @@ def test_recovery_keeps_whole_files_and_what_can_be_read_of_a_torn_one(bag):
     assert len(kept) >= 10
     with Reader(bag) as reader:
         assert reader.message_count == len(kept)
+
+
+def test_a_new_name_is_on_the_disk_before_anything_else_counts_on_it(tmp_path, monkeypatch):
+    done = []
+    rename, fsync = os.rename, os.fsync
+    monkeypatch.setattr(os, "rename", lambda old, new: (done.append(Path(new).name), rename(old, new)))
+    monkeypatch.setattr(os, "fsync", lambda fd: (done.append(os.readlink(f"/proc/self/fd/{fd}")), fsync(fd)))
+    folder = tmp_path / "bag"
+    bag = BagWriter(folder, run_info=INFO)
+    assert done[0] == str(tmp_path), "the name of the folder"
+    assert done[done.index("bag_0.mcap") + 1] == str(folder)
+    assert done[-1] == str(folder), "the name of metadata.yaml"
+    bag.close()
+
+
+def test_a_file_that_lost_its_name_with_the_power_is_read_and_recovered(bag):
+    expected = words_by_mcap(bag)
+    last = bag_files(bag)[-1]
+    last.rename(f"{last}.begun")
+    (bag / "bag_99.mcap.begun").touch()
+    bag_now = open_bag(bag)
+    assert bag_now.warnings == ()
+    assert len(bag_now.topics[TOPIC]) == len(expected)
+    assert recover(bag) == ()
+    assert last in bag_files(bag)
+    assert words_by_mcap(bag) == expected

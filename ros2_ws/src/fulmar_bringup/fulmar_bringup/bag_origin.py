@@ -8,9 +8,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fulmar_bringup.system import System
 from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_path
-from fulmar_core.paths import config_names, config_path
+from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
 from fulmar_ros.provenance import fulmar_version, git_revision
@@ -40,20 +41,13 @@ def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
     )
 
 
-def attachments(plan: RunPlan, system: str = "") -> str:
-    """Files to carry along, as the JSON object of names and paths that the recorder is given.
-
-    Args:
-        plan: What is run.
-        system: File of `configs/systems` that it was made from; that of backend and controller by default.
-    """
-    system = system or f"{plan.backend}_{plan.controller}"
+def attachments(plan: RunPlan) -> str:
+    """Files to carry along, as the JSON object that the recorder is given: paths by name, and what it writes itself."""
     calibration = calibration_path()
     files = {
         "robot.yaml": config_path("robots", plan.robot),
         "task.yaml": config_path("tasks", plan.task),
         "scenario.yaml": config_path("scenarios", plan.scenario),
-        **({"system.yaml": config_path("systems", system)} if system in config_names("systems") else {}),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
         **(
@@ -64,7 +58,19 @@ def attachments(plan: RunPlan, system: str = "") -> str:
         **({CALIBRATION: calibration} if calibration else {}),
         **_of_controller(plan),
     }
-    return json.dumps({name: str(path.absolute()) for name, path in files.items()})
+    paths = {name: str(path.absolute()) for name, path in files.items()}
+    return json.dumps({**paths, "system.yaml": asdict(effective_system(plan))})
+
+
+def effective_system(plan: RunPlan) -> System:
+    """The settings of a run as a file of `configs/systems` would say them, whatever they came from."""
+    return System(
+        f"{plan.robot}, {plan.task}, {plan.controller} on {plan.backend}, as it was run",
+        *(plan.robot, plan.task, plan.controller, plan.backend),
+        control_hz=plan.control_hz,
+        guards=plan.guards,
+        recorder=plan.recording,
+    )
 
 
 def _of_controller(plan: RunPlan) -> dict[str, Path]:

@@ -87,7 +87,7 @@ class _Reader:
             warnings=tuple(self._warnings),
         )
 
-    def _lost(self, wire: Wire, count: int, why: str = "cannot be read") -> None:
+    def _lost(self, wire: Wire, count: int = 0, why: str = "have another type") -> None:
         topic = self._bag.topic_name(wire)
         others = sum(len(t) for t in self._bag.topics.values() if t.name == topic and t.type != wire.type)
         if count + others:
@@ -95,26 +95,24 @@ class _Reader:
 
     def _messages(self, wire: Wire) -> Decoded:
         topic = self._bag.of(wire)
-        found = messages(topic)
-        self._lost(wire, len(topic) - len(found))
-        return found
+        self._lost(wire)
+        return messages(topic)
 
     def _odometries(self, wire: Wire) -> Odometries:
-        found = odometries(self._bag.of(wire))
-        self._lost(wire, found.left_out)
-        return found
+        self._lost(wire)
+        return odometries(self._bag.of(wire))
 
     def _vectors(self, wire: Wire) -> Vectors:
         found = joint_vectors(self._bag.of(wire), "effort")
-        self._lost(wire, found.left_out, "have other names or lengths than the first, or cannot be read")
+        others = found.left_out - len(self._bag.of(wire).unreadable)
+        self._lost(wire, others, "have other names or lengths than the first, or another type")
         return found
 
     def _commands(self) -> Vectors:
         if not len(self._bag.of(VELOCITY_COMMAND)):
             return self._vectors(COMMAND)
-        found = twist_vectors(self._bag.of(VELOCITY_COMMAND))
-        self._lost(VELOCITY_COMMAND, found.left_out)
-        return found
+        self._lost(VELOCITY_COMMAND)
+        return twist_vectors(self._bag.of(VELOCITY_COMMAND))
 
     def _goals(self) -> list[GivenGoal]:
         goals = []

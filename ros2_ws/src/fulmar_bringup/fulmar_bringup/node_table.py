@@ -291,7 +291,7 @@ def list_nodes(
             base.guards if base.backend == "hardware" else default_guards(plan.controller, "hardware", path)
         )
         plan = replace(plan, hardware=path, guards=guards)
-    recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan, system or "mujoco_policy"))
+    recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan))
     nodes = recorder, plant_spec(plan), *guard_specs(plan)
     if not goals:
         return *nodes, controller_spec(plan)

@@ -23,7 +23,20 @@ def _provisional_end() -> bytes:
 
 
 PROVISIONAL_END = _provisional_end()
-BEGUN = ".begun"  # ending of a file without content
+BEGUN = ".begun"  # ending of a file without content; a power cut may leave it to one with content
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names in a folder to the disk: a new name is lost with the power until then.
+
+    Raises:
+        OSError: The disk refuses.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 class BagFile:
@@ -46,6 +59,7 @@ class BagFile:
         self._path, self._nameless = path, path.with_name(path.name + BEGUN)
         self._descriptor = os.open(self._nameless, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o644)
         self._waiting = bytearray()
+        self._named = False
         self._on_disk = 0  # bytes, without the provisional end
 
     @property
@@ -86,20 +100,27 @@ class BagFile:
     def close(self) -> None:
         """Let go of the file; what waits is lost, and so is a file that never got a name."""
         os.close(self._descriptor)
-        if not self._on_disk:
+        if not self._named:
             self._nameless.unlink(missing_ok=True)
+
+    def discard(self) -> None:
+        """Let go of the file and remove it."""
+        self.close()
+        self._path.unlink(missing_ok=True)
 
     def _append(self, end: bytes) -> None:
         try:
             self._write_at(self._on_disk, bytes(self._waiting) + end)
             os.ftruncate(self._descriptor, self._on_disk + len(self._waiting) + len(end))
             os.fdatasync(self._descriptor)
-            if not self._on_disk:
-                os.rename(self._nameless, self._path)
         except OSError:
             os.ftruncate(self._descriptor, self._on_disk)
             self._write_at(self._on_disk, PROVISIONAL_END)
             raise
+        if not self._named:
+            os.rename(self._nameless, self._path)
+            self._named = True
+            sync_folder(self._path.parent)
         self._on_disk += len(self._waiting)
         self._waiting.clear()
 

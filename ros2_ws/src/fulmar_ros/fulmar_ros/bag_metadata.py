@@ -11,6 +11,8 @@ from typing import Any
 
 import yaml
 
+from fulmar_ros.bag_file import sync_folder
+
 METADATA_FILE = "metadata.yaml"
 # Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.
 _DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -84,6 +86,21 @@ def write_metadata(
     replace_file(directory / METADATA_FILE, text.encode())
 
 
+def read_information(directory: Path) -> dict[str, Any]:
+    """What the `metadata.yaml` of a folder tells, empty where there is none that can be read."""
+    try:
+        found = yaml.safe_load((directory / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def read_custom(directory: Path) -> dict[str, str]:
+    """Texts by name in the `custom_data` of a folder."""
+    custom = read_information(directory).get("custom_data")
+    return {str(k): v for k, v in custom.items() if isinstance(v, str)} if isinstance(custom, dict) else {}
+
+
 def _times(span: BagSpan) -> dict[str, dict[str, int]]:
     return {
         "duration": {"nanoseconds": span.end_ns - span.start_ns},
@@ -114,6 +131,7 @@ def replace_file(path: Path, data: bytes) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         new.replace(path)
+        sync_folder(path.parent)
     except OSError:
         new.unlink(missing_ok=True)
         raise

@@ -149,6 +149,10 @@ class BagPart:
         finally:
             self._file.close()
 
+    def discard(self) -> None:
+        """Let go of the file and remove it."""
+        self._file.discard()
+
     def finish_if_there_is_room(self) -> None:
         """As `finish`, but without an index, which readers can do without, if the disk refuses that."""
         with contextlib.suppress(OSError):

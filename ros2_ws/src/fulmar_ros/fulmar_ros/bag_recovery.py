@@ -13,16 +13,16 @@ from mcap.well_known import Profile
 from mcap.writer import Writer
 
 from fulmar_core.errors import BagError
-from fulmar_ros.bag_file import BagFile
-from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
-from fulmar_ros.bag_records import bag_files, read_records
+from fulmar_ros.bag_file import BagFile, sync_folder
+from fulmar_ros.bag_metadata import BagSpan, TopicCount, read_custom, write_metadata
+from fulmar_ros.bag_records import bag_files, plain_name, read_records
 
 
 def recover(directory: Path) -> tuple[str, ...]:
     """Rewrite the MCAP files of a bag and its `metadata.yaml` with everything that can still be read.
 
-    Each new file replaces the old one in one step. Where something could not be read, the old file stays
-    beside it as `<name>.damaged`; one that holds nothing at all goes.
+    A file that lost its name with the power gets it back. Each new file replaces the old one in one step. Where
+    something could not be read, the old file stays beside it as `<name>.damaged`; one that holds nothing at all goes.
 
     Args:
         directory: The bag.
@@ -38,7 +38,7 @@ def recover(directory: Path) -> tuple[str, ...]:
     paths = bag_files(directory)
     for path in paths:
         try:
-            copies[path.name] = _rewritten(path, damage)
+            copies[plain_name(path).name] = _rewritten(path, damage)
         except BagError as error:  # a disk that failed while a file was begun
             if len(paths) == 1:
                 raise
@@ -48,7 +48,8 @@ def recover(directory: Path) -> tuple[str, ...]:
             raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
     if not copies:
         raise BagError(f"{directory}: nothing can be read. {damage[0]}")
-    custom = {name: text for copy in copies.values() for name, text in copy.custom.items()}
+    told = {name: text for copy in copies.values() for name, text in copy.custom.items()}
+    custom = {**read_custom(directory), **told}
     try:
         spans = {name: copy.span() for name, copy in copies.items()}
         write_metadata(directory, spans, _all_topics(list(copies.values())), custom)
@@ -70,7 +71,10 @@ def _rewritten(path: Path, damage: list[str]) -> _Copy:
         if len(damage) > already:
             path.with_name(f"{path.name}.damaged").unlink(missing_ok=True)
             os.link(path, path.with_name(f"{path.name}.damaged"))
-        new.replace(path)
+        new.replace(plain_name(path))
+        if path != plain_name(path):
+            path.unlink()
+        sync_folder(path.parent)
     finally:
         new.unlink(missing_ok=True)
     return copy

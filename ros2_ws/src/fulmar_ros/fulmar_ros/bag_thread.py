@@ -165,12 +165,7 @@ class BagThread:
             if self._bag.waiting >= self._max_waiting:
                 self._refused[topic] += 1
                 continue
-            try:
-                self._bag.write(topic, data, log_ns=log_ns)
-            except (BagError, OSError) as error:  # a ring that cannot begin its bag
-                self._refused[topic] += 1
-                self._problem = str(error)
-                self._tell_once(self._problem, self._problem)
+            self._bag.write(topic, data, log_ns=log_ns)
 
     def _note(self, *, complete: bool) -> None:
         account = self.account(complete=complete)
@@ -181,6 +176,9 @@ class BagThread:
         began = time.monotonic()
         try:
             action()
+        except BagError as error:  # a ring that cannot begin its bag
+            self._problem = str(error)
+            self._tell_once(self._problem, self._problem)
         except OSError as error:
             self._problem = f"{_words(error)}: what comes waits in memory"
             self._tell_once(str(error.errno), self._refusal(error))

@@ -12,6 +12,7 @@ from typing import Any
 
 from fulmar_core.errors import BagError
 from fulmar_core.topics import Delivery
+from fulmar_ros.bag_file import sync_folder
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
 from fulmar_ros.bag_part import BagPart, Topic
 from fulmar_ros.bag_types import message_type, offered_qos
@@ -62,8 +63,13 @@ class BagWriter:
         self._split_at = float("inf")
         try:
             directory.mkdir(parents=True, exist_ok=True)
+            sync_folder(directory.parent)
             self._part = self._new_part()
-            self.flush()
+            try:
+                self.flush()
+            except OSError:  # the folder stays free for another try
+                self._part.discard()
+                raise
         except OSError as error:
             raise BagError(f"{directory}: cannot write a bag here: {error.strerror}.") from error
 

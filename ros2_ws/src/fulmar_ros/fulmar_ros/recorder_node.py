@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 import threading
@@ -71,7 +72,7 @@ class RecorderNode(Node):
         if self._ring is None:
             return "recording"
         short = ": memory is too small for more" if self._ring.cut_short else ""
-        return f"ring: {self._ring.kept_s:.0f} s in memory, {len(self._ring.faults)} faults written{short}"
+        return f"ring: {self._ring.kept_s:.0f} s in memory, {len(self._ring.faults)} faults{short}"
 
     def _open_bag(self) -> BagWriter:
         """Make the bag, with its topics."""
@@ -84,7 +85,6 @@ class RecorderNode(Node):
         )
         for wire, topic in self._topics.items():
             bag.add_topic(topic, wire.type, wire.delivery)
-        bag.flush()
         return bag
 
     def _new_ring(self) -> BagRing:
@@ -128,7 +128,8 @@ class RecorderNode(Node):
             time.sleep(QUIET_S)
         account = self._thread.stop()
         if self._ring is not None and not self._ring.faults:
-            self._directory.rmdir()
+            with contextlib.suppress(OSError):  # somebody else has put something into it
+                self._directory.rmdir()
             sys.stdout.write(f"no fault in {account.received} messages: nothing was written\n")
         else:
             sys.stdout.write(

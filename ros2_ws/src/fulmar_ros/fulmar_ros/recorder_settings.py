@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.recording import Recording
 
@@ -17,7 +19,9 @@ class RecorderSettings(Recording):
 
     directory: str = ""  # bag folder to make; "" makes one under `runs/` that is named after robot and time
     run_info: str = "{}"  # JSON object: what kind of run this is
-    attachments: str = "{}"  # JSON object: name to path of files to carry along
+    attachments: str = (
+        "{}"  # JSON object: name to path of files to carry along, or to what a YAML file is to say
+    )
 
     def run(self) -> dict[str, Any]:
         """What kind of run this is.
@@ -35,10 +39,16 @@ class RecorderSettings(Recording):
             BagError: A file cannot be read.
         """
         try:
-            paths = _json_object("attachments", self.attachments)
-            return {name: Path(path).read_bytes() for name, path in paths.items()}
+            files = _json_object("attachments", self.attachments)
+            return {name: _content(what) for name, what in files.items()}
         except OSError as error:
             raise BagError(f"cannot attach {error.filename}: {error.strerror}.") from error
+
+
+def _content(what: str | dict[str, Any]) -> bytes:
+    return (
+        yaml.safe_dump(what, sort_keys=False).encode() if isinstance(what, dict) else Path(what).read_bytes()
+    )
 
 
 def _json_object(parameter: str, text: str) -> dict[str, Any]:

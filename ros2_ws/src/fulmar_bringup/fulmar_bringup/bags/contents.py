@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import tempfile
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
+from fulmar_bringup.bags.folder import files_of, missing_files, storage_of, told_beside
+from fulmar_bringup.bags.layout import unreadable
 from fulmar_core.errors import BagError, UnknownNameError
 from fulmar_core.topics import Wire
-from fulmar_ros.bag_metadata import METADATA_FILE
-from fulmar_ros.bag_records import place_in_bag, read_records
+from fulmar_ros.bag_records import PACKED, ZSTD_MAGIC, file_bytes, read_records, unpack
+from fulmar_ros.bag_ring import FAULTS
 from fulmar_ros.bag_thread import RECORDING
 from fulmar_ros.bag_writer import RUN_KEY, RUN_RECORD
-
-ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
 
 
 @dataclass
@@ -32,6 +33,7 @@ class Topic:
     data: list[bytes] = field(default_factory=list)  # in CDR
     log_ns: list[int] = field(default_factory=list)  # when each was recorded, since the epoch [ns]
     sequence: list[int] = field(default_factory=list)  # number of each, counted by its recorder; 0: not known
+    unreadable: list[int] = field(default_factory=list)  # indices of those that are not what the type says
 
     def __len__(self) -> int:
         """Number of messages."""
@@ -39,14 +41,32 @@ class Topic:
 
     def from_time(self, start_ns: int, end_ns: int) -> Topic:
         """The messages that were recorded from a time on and before another [ns]."""
-        kept = [i for i, log_ns in enumerate(self.log_ns) if start_ns <= log_ns < end_ns]
+        return self._of([i for i, log_ns in enumerate(self.log_ns) if start_ns <= log_ns < end_ns])
+
+    def readable(self) -> Topic:
+        """The messages that are what the type says."""
+        return (
+            self._of(sorted(set(range(len(self))).difference(self.unreadable))) if self.unreadable else self
+        )
+
+    def _of(self, kept: list[int]) -> Topic:
+        lost = set(self.unreadable)
         return Topic(
             self.name,
             self.type,
             [self.data[i] for i in kept],
             [self.log_ns[i] for i in kept],
             [self.sequence[i] for i in kept],
+            [place for place, i in enumerate(kept) if i in lost],
         )
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why a ring was written."""
+
+    time_ns: int  # of its first sign, since the epoch [ns]
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -59,6 +79,7 @@ class Bag:
     topics: dict[str, Topic]  # by absolute name, sorted
     info: dict[str, Any] | None  # what kind of run this is; None: Fulmar did not record it
     recording: dict[str, Any]  # what became of the messages, as far as the recorder told it
+    faults: tuple[Fault, ...]  # that a ring was written for
     attachments: dict[str, bytes]
     warnings: tuple[str, ...]  # what could not be read
 
@@ -105,7 +126,11 @@ class Bag:
             ConfigError: There is no such topic.
         """
         kind = "nav_msgs/msg/Odometry"
-        known = {name: topic for name, topic in self.topics.items() if topic.type == kind and len(topic)}
+        known = {
+            name: topic
+            for name, topic in self.topics.items()
+            if topic.type == kind and len(topic) > len(topic.unreadable)
+        }
         if chosen is not None:
             if chosen not in known:
                 raise UnknownNameError(f"odometry topic in {self.path}:", chosen, known)
@@ -116,7 +141,8 @@ class Bag:
         if len(known) == 1:
             return next(iter(known.values()))
         if not known:
-            raise BagError(f"{self.path}: holds no {kind}. It has: {', '.join(self.topics) or 'nothing'}.")
+            has = f"It has: {', '.join(self.topics) or 'nothing'}."
+            raise BagError(" ".join([f"{self.path}: holds no {kind}. {has}", *self.warnings]))
         raise BagError(
             f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC."
         )
@@ -135,7 +161,7 @@ def open_bag(path: Path) -> Bag:
         BagError: There is no bag, or nothing of it can be read.
     """
     path = Path(path)
-    files = _files(path)
+    files = files_of(path)
     gathered = _Gathered()
     problems: list[str] = []
     for file in files:
@@ -145,34 +171,24 @@ def open_bag(path: Path) -> Bag:
             problems.append(str(error))
     if len(problems) == len(files):
         raise BagError(problems[0])
-    folder = path if path.is_dir() else path.parent
-    info = gathered.info or _told_beside(folder, RUN_RECORD)
+    gathered.check_types()
+    beside = json_object(told_beside(path, RUN_RECORD))
+    info = gathered.info or beside
+    if info and beside and json.dumps(info, sort_keys=True) != json.dumps(beside, sort_keys=True):
+        # A metadata record of MCAP has no checksum.
+        problems.append(f"the record '{RUN_RECORD}' and metadata.yaml differ: one of them is damaged.")
+    problems += [f"{name}: the file is missing; metadata.yaml lists it." for name in missing_files(path)]
     return Bag(
         path=path,
-        storage=ENDINGS[files[0].suffix],
+        storage=storage_of(files[0]) or "",
         files=files,
         topics=dict(sorted(gathered.topics.items())),
         info=info,
-        recording=_told_beside(folder, RECORDING) or {},
+        recording=json_object(told_beside(path, RECORDING)) or {},
+        faults=_faults(gathered.faults or told_beside(path, FAULTS)),
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )
-
-
-def _files(path: Path) -> tuple[Path, ...]:
-    """Files of a bag in the order of their numbers; a bag may be split into several."""
-    if path.is_file():
-        if path.suffix not in ENDINGS:
-            raise BagError(f"{path}: this is no bag. Give a bag folder, or the .mcap or .db3 file in it.")
-        return (path,)
-    if not path.is_dir():
-        raise BagError(f"{path}: there is no such bag. Give a bag folder, or the .mcap or .db3 file in it.")
-    for ending in ENDINGS:
-        files = sorted(path.glob(f"*{ending}"), key=place_in_bag)
-        if files:
-            return tuple(files)
-    found = ", ".join(sorted(each.name for each in path.iterdir())[:4]) or "nothing"
-    raise BagError(f"{path}: has no .mcap and no .db3 file, only {found}. Give a bag folder.")
 
 
 class _Gathered:
@@ -181,14 +197,23 @@ class _Gathered:
     def __init__(self) -> None:
         self.topics: dict[str, Topic] = {}
         self.info: dict[str, Any] | None = None
+        self.faults = ""  # JSON
         self.attachments: dict[str, bytes] = {}
         self.warnings: list[str] = []
 
     def read(self, file: Path) -> None:
-        if file.suffix == ".db3":
+        if storage_of(file) == "sqlite3":
             self._read_sqlite3(file)
         else:
             self._read_mcap(file)
+
+    def check_types(self) -> None:
+        """Find the messages that are not what their topic says."""
+        for topic in self.topics.values():
+            topic.unreadable = unreadable(topic.type, topic.data)
+            if topic.unreadable:
+                count = f"{len(topic.unreadable)} of {len(topic)} messages"
+                self.warnings.append(f"{count} of {topic.name} are no {topic.type}.")
 
     def _topic(self, name: str, kind: str) -> Topic:
         """The topic of a name; the same name with another type is told apart."""
@@ -196,6 +221,13 @@ class _Gathered:
         if topic.type == kind:
             return topic
         return self.topics.setdefault(f"{name} ({kind})", Topic(name, kind))
+
+    @staticmethod
+    def _add(topic: Topic, data: bytes, log_ns: int, sequence: int) -> None:
+        # Where bags are compressed message by message, nothing in an MCAP file says so; CDR begins with a zero.
+        topic.data.append(unpack(data) if data.startswith(ZSTD_MAGIC) else data)
+        topic.log_ns.append(log_ns)
+        topic.sequence.append(sequence)
 
     def _read_mcap(self, file: Path) -> None:
         schemas: dict[int, str] = {}
@@ -207,9 +239,7 @@ class _Gathered:
                 if topic is None:
                     lost["messages of channels that nobody announced"] += 1
                     continue
-                topic.data.append(record.data)
-                topic.log_ns.append(record.log_time)
-                topic.sequence.append(record.sequence)
+                self._add(topic, record.data, record.log_time, record.sequence)
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
@@ -219,6 +249,8 @@ class _Gathered:
                     lost[f"'{record.message_encoding}' as encoding of {record.topic}, only cdr is read"] = 1
             elif isinstance(record, Metadata) and record.name == RUN_RECORD:
                 self.info = json_object(record.metadata.get(RUN_KEY, "")) or self.info
+            elif isinstance(record, Metadata) and record.name == FAULTS:
+                self.faults = record.metadata.get(FAULTS, "")
             elif isinstance(record, Attachment):
                 self.attachments[record.name] = record.data
         self.warnings += [f"{file.name}: {count} {what}." for what, count in lost.items()]
@@ -227,31 +259,31 @@ class _Gathered:
         from rosbags.rosbag2 import Reader
 
         try:
-            with Reader(file) as reader:
+            with _plain(file, self.warnings) as plain, Reader(plain) as reader:
                 topics = {each.id: self._topic(each.topic, each.msgtype) for each in reader.connections}
                 try:
                     for connection, log_ns, data in reader.messages():
-                        topic = topics[connection.id]
-                        topic.data.append(bytes(data))
-                        topic.log_ns.append(log_ns)
-                        topic.sequence.append(0)
+                        self._add(topics[connection.id], bytes(data), log_ns, 0)
                 except Exception as error:  # noqa: BLE001 - damage raises whatever it pleases, from sqlite3 or rosbags
                     self.warnings.append(f"{file.name}: the rest is damaged ({_first_line(error)}).")
         except Exception as error:
             raise BagError(f"{file}: this sqlite3 bag cannot be read: {_first_line(error)}.") from error
 
 
+@contextlib.contextmanager
+def _plain(file: Path, damage: list[str]) -> Iterator[Path]:
+    """The file itself, or, where it is packed as a whole, what is in it."""
+    if file.suffix != PACKED:
+        yield file
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / file.stem
+        plain.write_bytes(file_bytes(file, damage))
+        yield plain
+
+
 def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [""])[0].rstrip(".") or type(error).__name__
-
-
-def _told_beside(folder: Path, entry: str) -> dict[str, Any] | None:
-    """An entry of `custom_data` in the bag's `metadata.yaml`; None where it is not there."""
-    try:
-        document = yaml.safe_load((folder / METADATA_FILE).read_text())
-        return json_object(document["rosbag2_bagfile_information"]["custom_data"][entry])
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
-        return None
 
 
 def json_object(text: str) -> dict[str, Any] | None:
@@ -261,6 +293,14 @@ def json_object(text: str) -> dict[str, Any] | None:
     except ValueError:
         return None
     return value if isinstance(value, dict) else None
+
+
+def _faults(text: str) -> tuple[Fault, ...]:
+    """None where the text is not what a ring writes."""
+    try:
+        return tuple(Fault(int(each["time_ns"]), str(each["reason"])) for each in json.loads(text or "[]"))
+    except (ValueError, TypeError, KeyError):
+        return ()
 
 
 def span_ns(topics: Iterable[Topic]) -> tuple[int, int]:

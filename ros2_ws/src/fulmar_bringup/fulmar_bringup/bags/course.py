@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +140,10 @@ def course_of(
     if observations.left_out:
         warnings.append(f"{observations.left_out} messages of {OBSERVATION.name} cannot be read.")
     seen = _odometry_of(bag, odometry, needed=not len(observations))
-    steps = _steps(observations, commands) or _even_steps(seen, settings.control_rate(the_robot))
+    steps = _steps(observations, commands)
+    if not steps:
+        seen = _timed(seen, warnings)
+        steps = _even_steps(seen, settings.control_rate(the_robot))
     if not steps:
         raise BagError(f"{bag.path}: holds neither observations nor odometry; there is nothing to run again.")
     stamp_ns = np.array([stamp for stamp, _, _, _ in steps], dtype=np.int64)
@@ -228,6 +231,14 @@ def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int
             known.add(stamp)
             steps.append((stamp, int(commands.log_ns[index]), ABSENT, index))
     return sorted(steps, key=lambda step: step[1])
+
+
+def _timed(seen: Odometries, warnings: list[str]) -> Odometries:
+    """Odometry whose stamps tell the time; where they never change, by when it was recorded."""
+    if len(seen) < 2 or np.ptp(seen.stamp_ns) > 0:
+        return seen
+    warnings.append("the stamps of the odometry do not advance: the times of recording stand in for them.")
+    return replace(seen, stamp_ns=seen.log_ns)
 
 
 def _even_steps(seen: Odometries, control_hz: float) -> list[tuple[int, int, int, int]]:

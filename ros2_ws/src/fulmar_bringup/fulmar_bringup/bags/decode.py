@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from fulmar_bringup.bags.contents import Topic
+from fulmar_bringup.bags.layout import ENCAPSULATION, LITTLE_ENDIAN, Walk
 from fulmar_ros.bag_types import type_store
 
 NS = 1_000_000_000
-ENCAPSULATION = 4  # bytes before the message in CDR; the second says the byte order
-LITTLE_ENDIAN = 1
 STAMP = slice(ENCAPSULATION, ENCAPSULATION + 8)  # of a message that begins with a header
 
 
@@ -60,7 +59,7 @@ def messages(topic: Topic) -> list[tuple[int, Any]]:
     for log_ns, data in zip(topic.log_ns, topic.data, strict=True):
         try:
             found.append((log_ns, store.deserialize_cdr(data, topic.type)))
-        except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; callers see the count
+        except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; `open_bag` counts them
             continue
     return found
 
@@ -187,7 +186,7 @@ def _alike(
     Returns:
         None where they have not all the layout of the first one.
     """
-    if not topic.data or topic.data[0][1:2] != bytes([LITTLE_ENDIAN]):
+    if not topic.data:
         return None
     first = topic.data[0]
     try:
@@ -209,51 +208,23 @@ def _alike(
     return _Decoded(texts, numbers)
 
 
-class _Walk:
-    """Goes through one message in CDR and notes where things are."""
+class _Walk(Walk):
+    """Goes through one message with a header and finds its numbers."""
 
     def __init__(self, data: bytes) -> None:
-        self._data, self._at = data, STAMP.stop
-        self.fixed: list[tuple[int, int]] = []  # parts that make the layout, begin and end
+        super().__init__(data, STAMP.stop)
 
     def joint_state(self, field: str) -> tuple[tuple[str, ...], list[int]]:
-        self._text()
-        names = tuple(self._text() for _ in range(self._count()))
-        arrays = {name: self._doubles() for name in ("position", "velocity", "effort")}
+        self.text()
+        names = tuple(self.text() for _ in range(self.count()))
+        arrays = {name: self.doubles() for name in ("position", "velocity", "effort")}
         if len(arrays[field]) != len(names):
             raise struct.error("another length")
         return names, arrays[field]
 
     def odometry(self) -> tuple[tuple[str, ...], list[int]]:
-        frames = self._text(), self._text()
-        begin = self._aligned(8)
+        frames = self.text(), self.text()
+        begin = self.aligned(8)
         pose = [begin + 8 * i for i in range(7)]
         twist = [begin + 8 * (7 + 36 + i) for i in range(6)]
         return frames, pose + twist
-
-    def _aligned(self, to: int) -> int:
-        return self._at + (ENCAPSULATION - self._at) % to
-
-    def _count(self) -> int:
-        begin = self._aligned(4)
-        (count,) = struct.unpack_from("<I", self._data, begin)
-        self.fixed.append((self._at, begin + 4))
-        self._at = begin + 4
-        return int(count)
-
-    def _text(self) -> str:
-        length = self._count()
-        text = self._data[self._at : self._at + length]
-        if len(text) < length:
-            raise struct.error("torn off")
-        self.fixed.append((self._at, self._at + length))
-        self._at += length
-        return text.rstrip(b"\0").decode()
-
-    def _doubles(self) -> list[int]:
-        count = self._count()
-        begin = self._aligned(8) if count else self._at
-        if begin + 8 * count > len(self._data):
-            raise struct.error("torn off")
-        self._at = begin + 8 * count
-        return [begin + 8 * i for i in range(count)]

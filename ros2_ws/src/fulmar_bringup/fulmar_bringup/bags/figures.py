@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "messages": sum(len(topic) for topic in bag.topics.values()),
         "topics": topics,
         "silent_topics": [name for name, topic in bag.topics.items() if not len(topic)],
+        "faults": [asdict(fault) for fault in bag.faults],
         "provenance": provenance(bag),
         "damage": list(bag.warnings),
     }
@@ -83,8 +85,9 @@ def changed_config(bag: Bag) -> list[str]:
 
 
 def _of_topic(topic: Topic, bag: Bag) -> dict[str, Any]:
-    log_ns = np.array(topic.log_ns, dtype=np.int64)
-    stamps = stamps_ns(topic)
+    read = topic.readable()
+    log_ns = np.array(read.log_ns, dtype=np.int64)
+    stamps = stamps_ns(read)
     # In lock step messages come as fast as the machine goes: only stamps tell a rate.
     by_stamp = stamps is not None and len(np.unique(stamps)) > 1
     times = np.sort(stamps) if by_stamp and stamps is not None else log_ns

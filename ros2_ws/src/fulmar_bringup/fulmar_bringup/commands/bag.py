@@ -9,6 +9,7 @@ from fulmar_bringup.commands.bag_export import export
 from fulmar_bringup.commands.bag_info import info
 from fulmar_bringup.commands.bag_play import play
 from fulmar_bringup.commands.bag_plot import plot
+from fulmar_bringup.commands.bag_recover import recover
 from fulmar_bringup.commands.bag_reference import reference
 from fulmar_bringup.commands.bag_rerun import rerun
 
@@ -30,6 +31,7 @@ bag.command()(info)
 bag.command()(rerun)
 bag.command()(diff)
 bag.command()(export)
+bag.command()(recover)
 bag.command()(reference)
 bag.command()(play)
 bag.command()(plot)

@@ -37,7 +37,7 @@ def info(bag: BagArgument, as_json: JsonOption = False) -> None:
 
 
 def _show(found: dict[str, Any]) -> None:
-    when = datetime.fromtimestamp(found["start_ns"] / 1e9).strftime("%Y-%m-%d %H:%M:%S")
+    when = _when(found["start_ns"])
     _say(
         f"{found['bag']}: {found['storage']}, {found['size_bytes'] / 1e3:.0f} kB, {found['messages']} messages, "
         f"{found['duration_s']:.2f} s" + (f" from {when}" if found["messages"] else "")
@@ -46,6 +46,8 @@ def _show(found: dict[str, Any]) -> None:
         _say(row)
     if found["silent_topics"]:
         _say(f"announced, without a message: {', '.join(found['silent_topics'])}")
+    for fault in found["faults"]:
+        _say(f"written for a fault at {_when(fault['time_ns'])}: {fault['reason']}")
     _show_origin(found["provenance"])
     for line in found["damage"]:
         _say(f"damage: {line}")
@@ -96,6 +98,10 @@ def _show_origin(origin: dict[str, Any]) -> None:
         _say(f"carries {name}, SHA-256 {sha256[:16]}")
     if origin["config_changed_since"]:
         _say(f"changed here since then: {', '.join(origin['config_changed_since'])}")
+
+
+def _when(time_ns: int) -> str:
+    return datetime.fromtimestamp(time_ns / 1e9).strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _number(value: float | None, form: str) -> str:

@@ -30,7 +30,7 @@ def write_report(records: Sequence[RunRecord], out: Path, title: str | None = No
     """
     out = Path(out)
     if out.suffix not in (".html", ".png"):
-        raise ConfigError(f"{out}: a report is a .html page or a .png picture. Give such a name.")
+        raise ConfigError(f"{out}: '{out.suffix}' cannot be drawn. Give a name that ends in .html or .png.")
     if not records:
         raise ConfigError("there is no run to report on. Give at least one bag.")
     runs = views(records)
