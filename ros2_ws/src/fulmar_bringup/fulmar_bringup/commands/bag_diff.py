@@ -31,7 +31,9 @@ def diff(
     Messages belong together by the stamps in them. Clock, status and diagnostics tell of the machine and differ always;
     name them with --topic to see how. Two lock-step runs of one seed are the same.
 
-    Exit code: 0 the same, 1 something differs, 2 a bag cannot be read.
+    Messages that cannot be read are compared byte by byte.
+
+    Exit code: 0 the same, 1 something differs or there is nothing to compare, 2 a bag cannot be read.
     """
     from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.bags.difference import differing
@@ -69,7 +71,11 @@ def _show(found: dict[str, Any]) -> None:
         if rest > 0:
             _say(f"  ... and {rest} more fields; --json has them all")
         for each in topic["texts"]:
-            _say(f"  {each['field']}: {each['differing']} texts differ")
+            _say(f"  {each['field']}: {each['differing']} messages differ in it")
+        if topic["bytes"]:
+            _say(f"  {topic['bytes']} messages differ; they cannot be read, and were compared byte by byte")
+    if not found["compared"]:
+        _say("the bags have no messages to compare")
     _say("same" if found["same"] else "different")
 
 

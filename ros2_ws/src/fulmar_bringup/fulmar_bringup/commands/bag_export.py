@@ -48,19 +48,23 @@ def export(
         console.print(f"warning: {warning}", markup=False, soft_wrap=True)
     beside = bags[0] if bags[0].is_dir() else bags[0].parent
     if to == "csv":
-        files = write_csv(opened[0], out or beside / "csv")
+        files, left_out = write_csv(opened[0], out or beside / "csv")
     elif to == "npz":
         path = out or beside / f"{beside.resolve().name}.npz"
-        files = [write_npz(opened[0], path.with_suffix(".npz"))]
+        file, left_out = write_npz(opened[0], path.with_suffix(".npz"))
+        files = [file]
     else:
         from fulmar_bringup.bags.course import course_of
         from fulmar_bringup.bags.lerobot import write_lerobot
 
         courses = [course_of(bag) for bag in opened]
         titles = [course.task.title for course in courses]
-        files = [write_lerobot(courses, titles, out or beside / "lerobot")]
+        files, left_out = [write_lerobot(courses, titles, out or beside / "lerobot")], []
+    for line in left_out:
+        console.print(f"warning: left out: {line}", markup=False, soft_wrap=True)
     if as_json:
-        print_json({"bags": [str(bag) for bag in bags], "to": to, "files": [str(file) for file in files]})
+        names = [str(file) for file in files]
+        print_json({"bags": [str(bag) for bag in bags], "to": to, "files": names, "left_out": left_out})
         return
     for file in files:
         output.print(str(file), markup=False, soft_wrap=True)
