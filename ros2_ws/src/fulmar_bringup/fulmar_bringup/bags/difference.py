@@ -44,8 +44,8 @@ def differing(
         only: Topics, relative or absolute; by default all but those that tell of the machine.
 
     Returns:
-        Ready for JSON, with `same`, which takes that something was compared. Topics with messages that cannot be read are
-        compared byte by byte, in their order.
+        Ready for JSON, with `same`, which takes that something was compared. Topics with messages that cannot be read
+        are compared byte by byte, in their order.
 
     Raises:
         ConfigError: A topic that neither bag has.

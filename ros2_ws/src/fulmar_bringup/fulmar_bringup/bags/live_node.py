@@ -21,11 +21,13 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bringup.bags.contents import Bag, json_object
-from fulmar_bringup.bags.course import ABSENT, Course, Told
+from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.rerun import Answers
+from fulmar_bringup.bags.told import ABSENT, Told
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec
 from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.system import Guards
 from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.topics import (
     ACTION,
@@ -74,7 +76,7 @@ def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -
         Its answers and the SHA-256 that it reports.
 
     Raises:
-        BagError: The bag lacks odometry that was answered.
+        BagError: The bag lacks odometry that was answered, or its run cannot be led from outside.
         RunFailed: The node refuses to start, ends, or does not answer.
     """
     missing = int(np.sum(course.sample == ABSENT))
@@ -82,6 +84,13 @@ def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -
         raise BagError(
             f"{bag.path}: lacks the odometry of {missing} steps, which a node must have. Use --through direct."
         )
+    if course.presses or course.settings.estop:
+        raise BagError(
+            f"{bag.path}: its e-stop goes by the clock on the wall, not by steps. Use --through direct."
+        )
+    if course.changes:
+        raise BagError(f"{bag.path}: its policy was changed on the way. Use --through direct.")
+    settings = course.settings
     plan = RunPlan(
         robot=course.robot.name,
         task=course.task.name,
@@ -90,7 +99,10 @@ def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -
         control_hz=course.settings.control_rate(course.robot),
         policy=os.path.abspath(policy) if policy else "",
         lockstep=True,
-        goals="streamed" if course.settings.goals_streamed else "",
+        goals="streamed" if settings.goals_streamed else "",
+        guards=Guards(
+            fallback=settings.fallback or None, max_run_time_s=settings.max_run_time_s, area=settings.area
+        ),
     )
     with own_domain() as environment:
         group = ProcessGroup(environment)

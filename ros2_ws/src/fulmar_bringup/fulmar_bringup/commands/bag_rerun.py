@@ -16,7 +16,6 @@ from fulmar_core.exit_codes import DONE, FAILED
 if TYPE_CHECKING:
     from fulmar_bringup.bags.contents import Bag
     from fulmar_bringup.bags.course import Course
-    from fulmar_bringup.bags.rerun import Answers
 
 WAYS = ("direct", "node")
 SHOWN = 12  # lines of fields that differ
@@ -78,6 +77,7 @@ def rerun(
     Try: fulmar bag rerun runs/demo_x/policy --controller policy --policy runs/bundles/mine
     """
     from fulmar_bringup.bags.calibration import calibrated_as
+    from fulmar_bringup.bags.cast import answers_of
     from fulmar_bringup.bags.comparison import as_json as lines
     from fulmar_bringup.bags.comparison import first_difference, read_tolerances
     from fulmar_bringup.bags.contents import open_bag
@@ -111,7 +111,15 @@ def rerun(
             course = without_repeats(course)
             answers, sha256 = rerun_through_node(opened, course, name, folder)
         else:
-            answers, sha256 = _answers(course, name, folder, "odometry" if foreign else source)
+            follow = policy is None and name == (opened.info or {}).get("controller")
+            if course.changes and not follow:
+                console.print(
+                    "warning: the record changed its policy on the way; here one goes through all of it",
+                    markup=False,
+                )
+            answers, sha256 = answers_of(
+                course, name, folder, "odometry" if foreign else source, follow=follow
+            )
     fields = judge_answers(course, answers, tolerances)
     first = first_difference(fields)
     recorded = controller_of(opened)
@@ -164,15 +172,6 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
             f"no policy is shipped for '{course.robot.name}' and '{course.task.name}'. Give one: --policy DIR."
         )
     return name, str(folder)
-
-
-def _answers(course: Course, name: str, folder: str, source: str) -> tuple[Answers, str | None]:
-    from fulmar_bringup.bags.rerun import rerun as run_again
-    from fulmar_bringup.system import CONTROLLERS
-
-    hz = course.settings.control_rate(course.robot)
-    loaded = CONTROLLERS[name].load(course.robot, course.task, hz, folder)
-    return run_again(course, loaded, source=source), loaded.metadata().get("sha256")
 
 
 def _show(result: dict[str, Any], sums: list[dict[str, Any]]) -> None:
