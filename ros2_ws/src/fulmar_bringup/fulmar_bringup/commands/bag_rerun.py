@@ -109,7 +109,7 @@ def rerun(
             from fulmar_bringup.bags.live_node import rerun_through_node, without_repeats
 
             course = without_repeats(course)
-            answers, sha256 = rerun_through_node(opened, course, name, folder)
+            answers, sha256 = rerun_through_node(opened, course, name, folder, odometry)
         else:
             follow = policy is None and name == (opened.info or {}).get("controller")
             if course.changes and not follow:
