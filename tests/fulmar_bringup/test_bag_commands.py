@@ -248,7 +248,7 @@ def test_a_bag_that_others_recorded_loads_in_info_plot_and_rerun(tmp_path, stora
     done = answer("rerun", bag, "--controller", "policy", *asked)
     assert not done["compared"]
     assert done["asked"] == done["steps"] > 30
-    assert ask("rerun", bag, "--controller", "policy", *asked).exit_code == 0
+    assert ask("rerun", bag, "--controller", "policy", *asked).exit_code == 1
 
 
 def test_a_foreign_bag_without_a_goal_or_a_robot_says_what_to_give(tmp_path):

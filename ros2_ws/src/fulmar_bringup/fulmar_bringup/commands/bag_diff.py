@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from fulmar_bringup.commands.arguments import BagArgument, JsonOption
-from fulmar_bringup.console import console, output, print_json
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_bringup.commands.damage import finish, open_and_warn
+from fulmar_bringup.console import output, print_json
 
 SHOWN = 6  # fields of a topic
 
@@ -33,21 +33,18 @@ def diff(
 
     Messages that cannot be read are compared byte by byte.
 
-    Exit code: 0 the same, 1 something differs or there is nothing to compare, 2 a bag cannot be read.
+    Exit code: 0 the same, 1 something differs or there is nothing to compare or part of a bag could not be read, 2 a
+    bag cannot be read.
     """
-    from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.bags.difference import differing
 
-    bags = [open_bag(bag), open_bag(other)]
-    for opened in bags:
-        for warning in opened.warnings:
-            console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    bags = [open_and_warn(bag), open_and_warn(other)]
     found = differing(*bags, tolerance=tolerance, only=topic)
     if as_json:
         print_json(found)
     else:
         _show(found)
-    raise typer.Exit(DONE if found["same"] else FAILED)
+    raise finish(*bags, good=found["same"])
 
 
 def _show(found: dict[str, Any]) -> None:
