@@ -113,3 +113,13 @@ def test_another_controller_behind_the_node_is_found_out(ros_domain: RosDomain, 
     done = fulmar("bag", "rerun", str(POLICY), *asked, env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 1
     assert json_of(done.stdout)["first_difference"]["field"] == "action"
+
+
+def test_a_stamp_that_comes_twice_does_not_change_the_pace(tmp_path: Path):
+    bag = open_bag(POLICY)
+    odometry = bag.of(ODOMETRY)
+    odometry.data.insert(11, odometry.data[10])
+    odometry.log_ns.insert(11, odometry.log_ns[10] + 1)
+    odometry.sequence.insert(11, 0)
+    plan = schedule(bag, topics=["odom"])
+    assert (plan.end_ns - plan.begin_ns) / 1e9 == pytest.approx(19.8)
