@@ -10,7 +10,7 @@ import typer
 from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.commands.damage import finish, open_and_warn, warn
 from fulmar_bringup.console import output, print_json
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.errors import BagError, ConfigError, UnknownNameError
 
 FORMATS = ("csv", "npz", "lerobot")
 
@@ -55,9 +55,16 @@ def export(
         from fulmar_bringup.bags.course import course_of
         from fulmar_bringup.bags.lerobot import write_lerobot
 
+        for bag in opened:
+            if bag.info is None:
+                raise BagError(
+                    f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
+                )
         courses = [course_of(bag) for bag in opened]
         titles = [course.task.title for course in courses]
-        files, left_out = [write_lerobot(courses, titles, out or beside / "lerobot")], []
+        folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
+        files, left_out = [folder], []
+        warn(notes)
     warn(f"left out: {line}" for line in left_out)
     if as_json:
         names = [str(file) for file in files]
