@@ -19,6 +19,7 @@ from fulmar_bringup.bags.decode import (
     twist_vectors,
 )
 from fulmar_bringup.bags.guarded import begins_with_its_run, changes_of, limits_of, presses_of
+from fulmar_bringup.bags.plain_twist import answers_within, plain_commands
 from fulmar_bringup.bags.told import ABSENT, Told
 from fulmar_bringup.planning import PoseTuple
 from fulmar_core.errors import BagError, ConfigError
@@ -141,16 +142,19 @@ def course_of(
     if not steps:
         raise BagError(f"{bag.path}: holds neither observations nor odometry; there is nothing to run again.")
     stamp_ns = np.array([stamp for stamp, _, _, _ in steps], dtype=np.int64)
-    log_ns = np.array([log for _, log, _, _ in steps], dtype=np.int64)
+    log_ns = np.maximum.accumulate(np.array([log for _, log, _, _ in steps], dtype=np.int64))
     shown = np.array([index for _, _, index, _ in steps])
     answers = np.array([index for _, _, _, index in steps])
+    plain = plain_commands(bag) if wire is VELOCITY_COMMAND and not len(commands) else None
+    if plain is not None:
+        commands, answers = plain, answers_within(log_ns, plain.log_ns)
     return Course(
         robot=the_robot,
         task=the_task,
         settings=settings,
         own=bag.info is not None,
         stamp_ns=stamp_ns,
-        log_ns=np.maximum.accumulate(log_ns),
+        log_ns=log_ns,
         observations=_rows(observations.values, shown),
         observation_names=observations.names,
         actions=_rows(actions.values, _matching(stamp_ns, shown != ABSENT, actions.stamp_ns)),
