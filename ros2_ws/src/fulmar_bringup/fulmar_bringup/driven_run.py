@@ -30,8 +30,7 @@ def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, .
     """
     record = read_run(path)
     robot = load_robot(str(record.info.get("robot", "")))
-    # What was applied knows of limits and watchdog; a bag without it has at least what was asked for.
-    actuation = record.applied if len(record.applied) else record.commanded
+    actuation = record.actuation
     width = len(robot.actuators.names)
     if len(actuation) and actuation.effort.shape[1] != width:
         raise ConfigError(
