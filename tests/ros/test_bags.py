@@ -108,6 +108,14 @@ def test_the_deployed_node_gives_the_recorded_answers(bag: Path, ros_domain: Ros
     assert found["sha256"] == found["recorded_sha256"]
 
 
+def test_the_deployed_node_is_given_the_guards_of_the_run(ros_domain: RosDomain, tmp_path: Path):
+    bag = BAGS / "floating_platform_go_to_pose_lqr_guarded"  # may act for 15 of its 20 s
+    done = fulmar("bag", "rerun", str(bag), "--through", "node", "--json", env=ros_domain.env, cwd=tmp_path)
+    found = json_of(done.stdout)
+    assert done.returncode == 0, found["first_difference"]
+    assert found["asked"] == 76
+
+
 def test_another_controller_behind_the_node_is_found_out(ros_domain: RosDomain, tmp_path: Path):
     asked = ("--through", "node", "--controller", "lqr", "--json")
     done = fulmar("bag", "rerun", str(POLICY), *asked, env=ros_domain.env, cwd=tmp_path)
