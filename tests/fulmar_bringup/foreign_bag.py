@@ -11,6 +11,7 @@ from rosbags.rosbag2.enums import CompressionFormat, CompressionMode, StoragePlu
 from fulmar_ros.bag_types import type_store
 
 NS = 1_000_000_000
+TWIST = "geometry_msgs/msg/Twist"
 ODOMETRY = "nav_msgs/msg/Odometry"
 
 
@@ -22,8 +23,12 @@ def write_foreign(
     topic: str = "/base/odometry",
     compression: CompressionMode = CompressionMode.NONE,
     stamped: bool = True,
+    commands: bool = False,
 ) -> Path:
-    """A circle of half a metre at 0.5 m/s and 50 Hz, in frames `map` and `base_footprint`, with a text beside it."""
+    """A circle of half a metre at 0.5 m/s and 50 Hz, in frames `map` and `base_footprint`, with a text beside it.
+
+    With commands, a Twist of a tenth of its number and 1 rad/s comes 5 ms after each odometry.
+    """
     store = type_store()
     new = store.types
     writer = Writer(folder, version=9, storage_plugin=storage)
@@ -31,6 +36,7 @@ def write_foreign(
     with writer:
         odometry = writer.add_connection(topic, ODOMETRY, typestore=store)
         words = writer.add_connection("/words", "std_msgs/msg/String", typestore=store)
+        velocity = writer.add_connection("/cmd_vel", TWIST, typestore=store) if commands else None
         for i in range(count):
             time_ns, angle = 5 * NS + i * 20_000_000, 0.02 * i
             message = new[ODOMETRY](
@@ -60,6 +66,13 @@ def write_foreign(
             )
             log_ns = 1_700_000_000 * NS + time_ns + (i % 5) * 100_000
             writer.write(odometry, log_ns, store.serialize_cdr(message, ODOMETRY))
+            if commands:
+                zero = dict.fromkeys("xyz", 0.0)
+                twist = new["geometry_msgs/msg/Twist"](
+                    linear=new["geometry_msgs/msg/Vector3"](**{**zero, "x": 0.1 * i}),
+                    angular=new["geometry_msgs/msg/Vector3"](**{**zero, "z": 1.0}),
+                )
+                writer.write(velocity, log_ns + 5_000_000, store.serialize_cdr(twist, TWIST))
             if i % 50 == 0:
                 text = new["std_msgs/msg/String"](data=f"word {i}")
                 writer.write(words, log_ns, store.serialize_cdr(text, "std_msgs/msg/String"))

@@ -18,10 +18,14 @@ from hypothesis import strategies as st
 from rosbags.rosbag2.enums import CompressionMode, StoragePlugin
 from typer.testing import CliRunner
 
+from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.bags.contents import open_bag
 from fulmar_bringup.bags.decode import joint_vectors, messages, odometries, stamp_of, stamps_ns
 from fulmar_bringup.bags.figures import describe
+from fulmar_bringup.bags.pictures import _drawings
 from fulmar_bringup.cli import app
+from fulmar_bringup.report.actuator_picture import open_spans
+from fulmar_bringup.run_judgement import judge
 from fulmar_core.errors import BagError, FulmarError
 from fulmar_core.paths import config_path
 from fulmar_core.topics import ACTION, ODOMETRY
@@ -293,7 +297,7 @@ def test_a_bag_that_others_recorded_loads_in_info_plot_and_rerun(tmp_path, stora
     done = answer("rerun", bag, "--controller", "policy", *asked)
     assert not done["compared"]
     assert done["asked"] == done["steps"] > 30
-    assert ask("rerun", bag, "--controller", "policy", *asked).exit_code == 0
+    assert ask("rerun", bag, "--controller", "policy", *asked).exit_code == 1
 
 
 @pytest.mark.parametrize(
@@ -509,3 +513,19 @@ def test_a_picture_of_another_kind_is_refused_as_what_it_is(tmp_path):
 def test_a_run_is_plotted_with_its_goal(tmp_path):
     (file,) = answer("plot", POLICY, "--out", tmp_path / "run.html")["files"]
     assert "How far from the goal" in Path(file).read_text()
+
+
+@pytest.mark.parametrize("name", ["floating_platform_go_to_pose_policy", "turtlebot2_go_to_position_policy"])
+def test_a_bag_without_what_was_applied_is_plotted_with_what_was_commanded(name):
+    record = read_run(BAGS / name)
+    assert not len(record.applied)
+    np.testing.assert_array_equal(record.actuation.effort, record.commanded.effort)
+    assert judge(record).run.shares.any()
+    assert any(open_spans(record, row) for row in range(len(record.actuation.names)))
+
+
+def test_panels_of_commands_are_told_apart_by_their_topics(tmp_path):
+    bag = open_bag(POLICY)
+    drawings = _drawings(bag, odometries(bag.of(ODOMETRY)))
+    titles = [drawing.title for drawing in drawings if "actuators" in drawing.title]
+    assert len(titles) == len(set(titles)) > 1

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 import pytest
+from rosbags.rosbag2.enums import StoragePlugin
 from typer.testing import CliRunner
 
+from fulmar_bringup.bags import live_node
 from fulmar_bringup.bags.calibration import calibrated_as
 from fulmar_bringup.bags.comparison import compare, first_difference, read_tolerances
 from fulmar_bringup.bags.contents import open_bag
@@ -24,8 +26,10 @@ from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibr
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.policy_bundle import NETWORK, Golden, read_golden, read_passport, write_bundle
 from fulmar_core.robot import load_robot
+from fulmar_core.topics import ODOMETRY
 from fulmar_ros.bag_writer import BagWriter
 from policy_server.shipped import shipped_policy
+from tests.fulmar_bringup.foreign_bag import write_foreign
 
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"
 POLICY, LQR = BAGS / "floating_platform_go_to_pose_policy", BAGS / "floating_platform_go_to_pose_lqr"
@@ -177,3 +181,26 @@ def test_a_controller_forgets_at_a_pause_as_in_the_node():
 def test_a_mistake_is_told(option):
     done = CliRunner().invoke(app, ["bag", "rerun", str(POLICY), *option])
     assert isinstance(done.exception, ConfigError)
+
+
+def test_the_node_is_not_given_bags_of_others_nor_a_goal_of_today(tmp_path):
+    foreign = write_foreign(tmp_path / "bag", StoragePlugin.MCAP, count=20)
+    asked = ("--controller", "policy", "--robot", "turtlebot2", "--task", "go_to_position", "--goal", "0,0,0")
+    done = CliRunner().invoke(app, ["bag", "rerun", str(foreign), *asked, "--through", "node"])
+    assert isinstance(done.exception, BagError)
+    assert "others recorded it" in str(done.exception)
+    done = CliRunner().invoke(app, ["bag", "rerun", str(POLICY), "--goal", "1,1,0", "--through", "node"])
+    assert isinstance(done.exception, BagError)
+    assert "takes no --goal" in str(done.exception)
+
+
+def test_the_node_is_fed_the_odometry_that_was_chosen(monkeypatch):
+    bag = open_bag(POLICY)
+    mine = bag.of(ODOMETRY)
+    other = replace(mine, name="/other/odom", data=[data[::-1] for data in mine.data])
+    bag = replace(bag, topics={**bag.topics, "/other/odom": other})
+    monkeypatch.setattr(live_node.ProcessGroup, "start", lambda group, spec: None)
+    monkeypatch.setattr(live_node, "_exchange", lambda raw, course, group: (raw["odometry"], None))
+    course = course_of(open_bag(POLICY))
+    fed, _ = live_node.rerun_through_node(bag, course, "policy", "", "/other/odom")
+    assert fed == other.data

@@ -108,8 +108,26 @@ def test_the_deployed_node_gives_the_recorded_answers(bag: Path, ros_domain: Ros
     assert found["sha256"] == found["recorded_sha256"]
 
 
+def test_the_deployed_node_is_given_the_guards_of_the_run(ros_domain: RosDomain, tmp_path: Path):
+    bag = BAGS / "floating_platform_go_to_pose_lqr_guarded"  # may act for 15 of its 20 s
+    done = fulmar("bag", "rerun", str(bag), "--through", "node", "--json", env=ros_domain.env, cwd=tmp_path)
+    found = json_of(done.stdout)
+    assert done.returncode == 0, found["first_difference"]
+    assert found["asked"] == 76
+
+
 def test_another_controller_behind_the_node_is_found_out(ros_domain: RosDomain, tmp_path: Path):
     asked = ("--through", "node", "--controller", "lqr", "--json")
     done = fulmar("bag", "rerun", str(POLICY), *asked, env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 1
     assert json_of(done.stdout)["first_difference"]["field"] == "action"
+
+
+def test_a_stamp_that_comes_twice_does_not_change_the_pace(tmp_path: Path):
+    bag = open_bag(POLICY)
+    odometry = bag.of(ODOMETRY)
+    odometry.data.insert(11, odometry.data[10])
+    odometry.log_ns.insert(11, odometry.log_ns[10] + 1)
+    odometry.sequence.insert(11, 0)
+    plan = schedule(bag, topics=["odom"])
+    assert (plan.end_ns - plan.begin_ns) / 1e9 == pytest.approx(19.8)

@@ -13,7 +13,7 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rotation import yaw_of
 
 
-def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive]:
+def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, ...]]:
     """Read the measured poses and what the actuators did.
 
     Args:
@@ -21,7 +21,8 @@ def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive]:
         load: Number of the ballast that was aboard; 0 for none.
 
     Returns:
-        The robot and its run. The simulator's own truth is not looked at, even where the bag has it.
+        The robot, its run, and what of the bag could not be read. The simulator's own truth is not looked at, even
+        where the bag has it.
 
     Raises:
         BagError: There is no bag, or it cannot be read.
@@ -29,15 +30,14 @@ def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive]:
     """
     record = read_run(path)
     robot = load_robot(str(record.info.get("robot", "")))
-    # What was applied knows of limits and watchdog; a bag without it has at least what was asked for.
-    actuation = record.applied if len(record.applied) else record.commanded
+    actuation = record.actuation
     width = len(robot.actuators.names)
     if len(actuation) and actuation.effort.shape[1] != width:
         raise ConfigError(
             f"{path}: commands have {actuation.effort.shape[1]} values, '{robot.name}' takes {width}."
         )
     odometry = record.odom
-    return robot, drive_of(
+    drive = drive_of(
         str(path),
         odometry.stamp_s,
         odometry.position[:, :2],
@@ -46,3 +46,4 @@ def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive]:
         actuation.effort,
         load=load,
     )
+    return robot, drive, record.warnings

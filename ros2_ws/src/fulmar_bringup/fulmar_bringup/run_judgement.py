@@ -115,7 +115,7 @@ def judge(record: RunRecord) -> Judgement | None:
     goal = _goals_at(task, goals, newest, record.obstacles, states[samples], states[0], block, time_s[0])
     # Steps one after another have the shape of episodes side by side.
     log = TrajectoryLog(robot, task, float(time_s[0]))
-    log.add(states[samples], goal, _applied(record.applied, robot, motion.stamp_s[0] + time_s - time_s[0]))
+    log.add(states[samples], goal, _applied(record.actuation, robot, motion.stamp_s[0] + time_s - time_s[0]))
     columns = log.trajectories()
     run = Trajectories(
         **{name: np.swapaxes(getattr(columns, name), 0, 1) for name in COLUMNS}, control_dt=float(time_s[0])

@@ -103,6 +103,11 @@ class RunRecord:
     warnings: tuple[str, ...]  # what could not be read
 
     @property
+    def actuation(self) -> Actuation:
+        """What was applied; where the bag does not tell, what was commanded."""
+        return self.applied if len(self.applied) else self.commanded
+
+    @property
     def motion(self) -> Motion:
         """The truth where there is one, else the odometry.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,9 @@ from fulmar_bringup.bags.decode import (
     stamp_of,
     twist_vectors,
 )
+from fulmar_bringup.bags.guarded import begins_with_its_run, changes_of, limits_of, presses_of
+from fulmar_bringup.bags.plain_twist import answers_within, plain_commands
+from fulmar_bringup.bags.told import ABSENT, Told
 from fulmar_bringup.planning import PoseTuple
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.goal import Goal, goal_at
@@ -36,18 +38,7 @@ from fulmar_core.topics import (
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.message_reader import goal_of, obstacles_of
 
-ABSENT = -1
 NS = 1_000_000_000
-
-
-@dataclass(frozen=True)
-class Told:
-    """Something that the controller was told."""
-
-    log_ns: int  # [ns]
-    stamp_ns: int  # [ns]
-    what: Any  # a Goal, discs of shape (m, 3), or a place of shape (2,)
-    index: int = ABSENT  # of the message in its topic
 
 
 @dataclass(frozen=True)
@@ -70,6 +61,8 @@ class Course:
     goals: tuple[Told, ...]
     obstacles: tuple[Told, ...]
     blocks: tuple[Told, ...]
+    presses: tuple[Told, ...]  # of the e-stop: true or false
+    changes: tuple[Told, ...]  # folder and SHA-256 of policies that took over
     warnings: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -122,6 +115,11 @@ def course_of(
     info = bag.info or {}
     the_robot = load_robot(_name(bag, "robot", robot))
     the_task = load_task(_name(bag, "task", task))
+    warnings: list[str] = list(bag.warnings)
+    limits = limits_of(info)
+    if limits["max_run_time_s"] and not begins_with_its_run(info):
+        limits["max_run_time_s"] = 0.0
+        warnings.append("the bag begins within its run: whether max_run_time was over is not judged.")
     settings = ControllerSettings(
         robot=the_robot.name,
         task=the_task.name,
@@ -129,8 +127,8 @@ def course_of(
         lockstep=bool(info.get("lockstep")),
         rate=float(info.get("rate") or 1.0),
         goals_streamed=bool(info.get("goals")),
+        **limits,
     )
-    warnings: list[str] = list(bag.warnings)
     wire = command_wire(the_robot)
     names = the_robot.actuators.names
     read = twist_vectors if wire is VELOCITY_COMMAND else (lambda topic: joint_vectors(topic, "effort"))
@@ -147,16 +145,19 @@ def course_of(
     if not steps:
         raise BagError(f"{bag.path}: holds neither observations nor odometry; there is nothing to run again.")
     stamp_ns = np.array([stamp for stamp, _, _, _ in steps], dtype=np.int64)
-    log_ns = np.array([log for _, log, _, _ in steps], dtype=np.int64)
+    log_ns = np.maximum.accumulate(np.array([log for _, log, _, _ in steps], dtype=np.int64))
     shown = np.array([index for _, _, index, _ in steps])
     answers = np.array([index for _, _, _, index in steps])
+    plain = plain_commands(bag) if wire is VELOCITY_COMMAND and not len(commands) else None
+    if plain is not None:
+        commands, answers = plain, answers_within(log_ns, plain.log_ns)
     return Course(
         robot=the_robot,
         task=the_task,
         settings=settings,
         own=bag.info is not None,
         stamp_ns=stamp_ns,
-        log_ns=np.maximum.accumulate(log_ns),
+        log_ns=log_ns,
         observations=_rows(observations.values, shown),
         observation_names=observations.names,
         actions=_rows(actions.values, _matching(stamp_ns, shown != ABSENT, actions.stamp_ns)),
@@ -170,6 +171,8 @@ def course_of(
             Told(log, stamp_of(m), np.array([m.pose.position.x, m.pose.position.y]), index)
             for index, (log, m) in enumerate(messages(bag.of(BLOCK)))
         ),
+        presses=presses_of(bag),
+        changes=changes_of(bag),
         warnings=tuple(warnings),
     )
 

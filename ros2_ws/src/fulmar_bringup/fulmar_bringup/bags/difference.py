@@ -44,7 +44,8 @@ def differing(
         only: Topics, relative or absolute; by default all but those that tell of the machine.
 
     Returns:
-        Ready for JSON, with `same`.
+        Ready for JSON, with `same`, which takes that something was compared. Topics with messages that cannot be read
+        are compared byte by byte, in their order.
 
     Raises:
         ConfigError: A topic that neither bag has.
@@ -60,12 +61,14 @@ def differing(
         if name not in known:
             raise UnknownNameError("topic", name, known)
     topics = [_of_topic(name, one.get(name), other.get(name), tolerance) for name in wanted]
+    compared = sum(min(topic["counts"]) for topic in topics)
     before, after = provenance(first), provenance(second)
     return {
         "bags": [str(first.path), str(second.path)],
         "provenance": {key: [before[key], after[key]] for key in ORIGIN if before[key] != after[key]},
         "topics": topics,
-        "same": all(topic["same"] for topic in topics),
+        "compared": compared,
+        "same": compared > 0 and all(topic["same"] for topic in topics),
     }
 
 
@@ -93,23 +96,32 @@ def _of_topic(name: str, first: Topic | None, second: Topic | None, tolerance: f
         "only_second": 0,
         "fields": [],
         "texts": [],
+        "bytes": 0,
     }
     if first is None or second is None or first.type != second.type:
         types = [topic.type if topic else None for topic in (first, second)]
         return {**result, "types": types, "same": False}
     _, stamps_1, rows_1 = rows(first)
     _, stamps_2, rows_2 = rows(second)
+    if len(rows_1) < len(first) or len(rows_2) < len(second):
+        return {**result, **_bytes_of(first, second)}
     pairs, alone_1, alone_2 = _pairs(stamps_1, stamps_2)
     left, right = [rows_1[i] for i, _ in pairs], [rows_2[j] for _, j in pairs]
     stamps = np.array([stamps_1[i] for i, _ in pairs], dtype=np.int64)
     paths = [path for path in columns(left + right) if not path.startswith("header.stamp")]
-    numbers = [path for path in paths if _all(left + right, path, lambda v: not isinstance(v, str))]
+    numbers = [
+        path for path in paths if _all(left + right, path, lambda v: not isinstance(v, str | np.ndarray))
+    ]
     fields = _numbers(numbers, left, right, stamps, tolerance)
     texts = [
         {"field": path, "differing": count}
         for path in paths
         if path not in numbers
-        and (count := sum(a.get(path) != b.get(path) for a, b in zip(left, right, strict=True)))
+        and (
+            count := sum(
+                not _alike(a.get(path), b.get(path), tolerance) for a, b in zip(left, right, strict=True)
+            )
+        )
     ]
     return {
         **result,
@@ -119,6 +131,31 @@ def _of_topic(name: str, first: Topic | None, second: Topic | None, tolerance: f
         "texts": texts,
         "same": not (alone_1 or alone_2 or texts) and all(field.same for field in fields),
     }
+
+
+def _bytes_of(first: Topic, second: Topic) -> dict[str, Any]:
+    """What differs between messages that nobody here can read."""
+    alone = len(first) - len(second)
+    differing = sum(a != b for a, b in zip(first.data, second.data, strict=False))
+    return {
+        "only_first": max(alone, 0),
+        "only_second": max(-alone, 0),
+        "bytes": differing,
+        "same": not (alone or differing),
+    }
+
+
+def _alike(one: Any, other: Any, tolerance: float) -> bool:
+    """Whether two texts or two arrays are the same; numbers to the bit where the tolerance is 0."""
+    if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        return type(one) is type(other) and bool(one == other)
+    if one.shape != other.shape or one.dtype.kind == "U":
+        return np.array_equal(one, other)
+    if tolerance == 0.0:
+        return one.tobytes() == other.tobytes()
+    return bool(
+        np.isclose(one.astype(float), other.astype(float), rtol=0.0, atol=tolerance, equal_nan=True).all()
+    )
 
 
 def _all(found: list[Row], path: str, holds: Callable[[Any], bool]) -> bool:

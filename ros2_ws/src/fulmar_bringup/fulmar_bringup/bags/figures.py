@@ -64,8 +64,17 @@ def provenance(bag: Bag) -> dict[str, Any]:
 
 def controller_of(bag: Bag) -> dict[str, Any]:
     """What the controller said of itself last; empty where it said nothing."""
-    texts = (json_object(message.data) for _, message in reversed(messages(bag.of(METADATA))))
-    return next((text for text in texts if text), {})
+    return (controllers_of(bag) or [{}])[-1]
+
+
+def controllers_of(bag: Bag) -> list[dict[str, Any]]:
+    """What each controller said of itself that had its turn, in their order."""
+    texts = (json_object(message.data) for _, message in messages(bag.of(METADATA)))
+    found: list[dict[str, Any]] = []
+    for text in texts:
+        if text and found[-1:] != [text]:
+            found.append(text)
+    return found
 
 
 def changed_config(bag: Bag) -> list[str]:

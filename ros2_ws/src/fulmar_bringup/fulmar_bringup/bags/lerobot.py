@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from fulmar_bringup.bags.course import Course
+from fulmar_bringup.bags.figures import GAP, NS
 from fulmar_core.errors import BagError, ConfigError
 
 VERSION = "v2.1"
@@ -24,7 +25,7 @@ DATA_PATH = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 INDICES = ("frame_index", "episode_index", "index", "task_index")
 
 
-def write_lerobot(courses: Sequence[Course], titles: Sequence[str], folder: Path) -> Path:
+def write_lerobot(courses: Sequence[Course], titles: Sequence[str], folder: Path) -> tuple[Path, list[str]]:
     """Write a dataset.
 
     Args:
@@ -33,7 +34,7 @@ def write_lerobot(courses: Sequence[Course], titles: Sequence[str], folder: Path
         folder: Absent or empty; is made.
 
     Returns:
-        The folder.
+        The folder, and in words which bags gave several episodes: one with a hole gives one for each part.
 
     Raises:
         BagError: A bag holds no observations or actions, or is of another kind than the first.
@@ -42,14 +43,15 @@ def write_lerobot(courses: Sequence[Course], titles: Sequence[str], folder: Path
     """
     if folder.exists() and any(folder.iterdir()):
         raise ConfigError(f"{folder} is not empty, and datasets are never mixed. Name a new folder.")
-    frames = [_frames(course) for course in courses]
-    _check_alike(courses, frames)
+    parts = [_frames(course) for course in courses]
+    _check_alike(courses)
     fps = courses[0].settings.control_rate(courses[0].robot)
     tasks = list(dict.fromkeys(titles))
     meta = folder / "meta"
     meta.mkdir(parents=True, exist_ok=True)
     begin, episodes, stats = 0, [], []
-    for number, ((state, action), title) in enumerate(zip(frames, titles, strict=True)):
+    frames = [(part, title) for mine, title in zip(parts, titles, strict=True) for part in mine]
+    for number, ((state, action), title) in enumerate(frames):
         columns = _columns(state, action, fps, number, begin, tasks.index(title))
         path = folder / DATA_PATH.format(episode_chunk=number // CHUNK, episode_index=number)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -59,24 +61,31 @@ def write_lerobot(courses: Sequence[Course], titles: Sequence[str], folder: Path
             {"episode_index": number, "stats": {key: _stats(value) for key, value in columns.items()}}
         )
         begin += len(state)
-    info = _info(courses[0], fps, len(courses), begin, len(tasks), frames[0])
+    info = _info(courses[0], fps, len(frames), begin, len(tasks), frames[0][0])
     (meta / "info.json").write_text(json.dumps(info, indent=4) + "\n")
     _write_lines(meta / "tasks.jsonl", [{"task_index": i, "task": task} for i, task in enumerate(tasks)])
     _write_lines(meta / "episodes.jsonl", episodes)
     _write_lines(meta / "episodes_stats.jsonl", stats)
-    return folder
+    split = [
+        f"bag {number}: steps are missing; its {len(mine)} parts are episodes of their own."
+        for number, mine in enumerate(parts, start=1)
+        if len(mine) > 1
+    ]
+    return folder, split
 
 
-def _frames(course: Course) -> tuple[np.ndarray, np.ndarray]:
-    """Observations (n, k) and actions (n, m) of the steps that have both."""
+def _frames(course: Course) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Observations (n, k) and actions (n, m) of the steps that have both, apart where time does not go on evenly."""
     answers = course.actions if np.isfinite(course.actions).any() else course.commands
     both = np.isfinite(course.observations).all(axis=1) & np.isfinite(answers).all(axis=1)
     if not course.observation_names or not both.any():
         raise BagError("the bag holds no observations with actions, which are the frames of such a dataset.")
-    return course.observations[both], answers[both]
+    passed = np.diff(course.stamp_ns[both]) * course.settings.control_rate(course.robot) / NS
+    ends = np.flatnonzero((passed <= 0.0) | (passed > GAP)) + 1
+    return list(zip(np.split(course.observations[both], ends), np.split(answers[both], ends), strict=True))
 
 
-def _check_alike(courses: Sequence[Course], frames: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+def _check_alike(courses: Sequence[Course]) -> None:
     def kind(course: Course) -> tuple[Any, ...]:
         return course.robot.name, course.observation_names, course.settings.control_rate(course.robot)
 

@@ -21,11 +21,13 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bringup.bags.contents import Bag, json_object
-from fulmar_bringup.bags.course import ABSENT, Course, Told
+from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.rerun import Answers
+from fulmar_bringup.bags.told import ABSENT, Told
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan, controller_spec
 from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.system import Guards
 from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.topics import (
     ACTION,
@@ -58,7 +60,9 @@ def without_repeats(course: Course) -> Course:
     return replace(course, **{name: getattr(course, name)[kept] for name in rows})
 
 
-def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -> tuple[Answers, str | None]:
+def rerun_through_node(
+    bag: Bag, course: Course, controller: str, policy: str, odometry: str | None = None
+) -> tuple[Answers, str | None]:
     """Feed a recorded run to a controller node of its own, in a ROS domain of its own.
 
     Unlike `rerun`, the node goes on from its own answers: terms that hold the previous command may differ after the
@@ -69,12 +73,13 @@ def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -
         course: Of that bag, from `without_repeats`.
         controller: Name of the controller.
         policy: Folder of a bundle; empty where there is none.
+        odometry: Topic that the course is made of, where it is not the robot's.
 
     Returns:
         Its answers and the SHA-256 that it reports.
 
     Raises:
-        BagError: The bag lacks odometry that was answered.
+        BagError: The bag lacks odometry that was answered, or its run cannot be led from outside.
         RunFailed: The node refuses to start, ends, or does not answer.
     """
     missing = int(np.sum(course.sample == ABSENT))
@@ -82,6 +87,19 @@ def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -
         raise BagError(
             f"{bag.path}: lacks the odometry of {missing} steps, which a node must have. Use --through direct."
         )
+    if not course.own:
+        raise BagError(
+            f"{bag.path}: others recorded it, and a node takes odometry in its own frames only. Use --through direct."
+        )
+    if any(goal.index == ABSENT for goal in course.goals):
+        raise BagError("a node is told the recorded goals, and takes no --goal. Use --through direct.")
+    if course.presses or course.settings.estop:
+        raise BagError(
+            f"{bag.path}: its e-stop goes by the clock on the wall, not by steps. Use --through direct."
+        )
+    if course.changes:
+        raise BagError(f"{bag.path}: its policy was changed on the way. Use --through direct.")
+    settings = course.settings
     plan = RunPlan(
         robot=course.robot.name,
         task=course.task.name,
@@ -90,13 +108,16 @@ def rerun_through_node(bag: Bag, course: Course, controller: str, policy: str) -
         control_hz=course.settings.control_rate(course.robot),
         policy=os.path.abspath(policy) if policy else "",
         lockstep=True,
-        goals="streamed" if course.settings.goals_streamed else "",
+        goals="streamed" if settings.goals_streamed else "",
+        guards=Guards(
+            fallback=settings.fallback or None, max_run_time_s=settings.max_run_time_s, area=settings.area
+        ),
     )
     with own_domain() as environment:
         group = ProcessGroup(environment)
         try:
             group.start(controller_spec(plan, subscribers=1))
-            return _exchange(bag, course, group)
+            return _exchange(_raw_messages(bag, course, odometry), course, group)
         finally:
             group.stop_all()
 
@@ -115,7 +136,7 @@ class _Heard:
     error: Exception | None = None
 
 
-def _exchange(bag: Bag, course: Course, group: ProcessGroup) -> tuple[Answers, str | None]:
+def _exchange(raw: dict[str, list[bytes]], course: Course, group: ProcessGroup) -> tuple[Answers, str | None]:
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node("plant", namespace=f"/{course.robot.name}")
@@ -126,7 +147,7 @@ def _exchange(bag: Bag, course: Course, group: ProcessGroup) -> tuple[Answers, s
             heard.error = error
 
         with spinning(node, fail):
-            return _feed(bag, course, group, wires, heard)
+            return _feed(raw, course, group, wires, heard)
     finally:
         rclpy.try_shutdown()
 
@@ -190,7 +211,7 @@ class _Wires:
 
 
 def _feed(
-    bag: Bag, course: Course, group: ProcessGroup, wires: _Wires, heard: _Heard
+    raw: dict[str, list[bytes]], course: Course, group: ProcessGroup, wires: _Wires, heard: _Heard
 ) -> tuple[Answers, str | None]:
     def wait(condition: Callable[[], bool], limit_s: float, what: str) -> None:
         until = time.monotonic() + limit_s
@@ -206,7 +227,6 @@ def _feed(
 
     wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
     time.sleep(SETTLE_S)
-    raw = _raw_messages(bag, course)
     told = {name: course.before(getattr(course, name)) for name in ("goals", "obstacles", "blocks")}
     count, width = len(course), len(course.robot.actuators.names)
     actions, commands = np.full((count, width), np.nan), np.full((count, width), np.nan)
@@ -251,9 +271,9 @@ def _answered(heard: _Heard, stamp: int) -> bool:
         return stamp in heard.commands
 
 
-def _raw_messages(bag: Bag, course: Course) -> dict[str, list[bytes]]:
+def _raw_messages(bag: Bag, course: Course, odometry: str | None) -> dict[str, list[bytes]]:
     return {
-        "odometry": bag.odometry().data,
+        "odometry": bag.odometry(odometry).data,
         "goals": bag.of(GOAL_WIRES[course.task.goal_topic]).data,
         "obstacles": bag.of(OBSTACLES).data,
         "blocks": bag.of(BLOCK).data,

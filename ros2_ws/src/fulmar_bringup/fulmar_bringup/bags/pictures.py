@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from fulmar_bringup.bags.contents import Bag
 from fulmar_bringup.bags.decode import Odometries, Vectors, joint_vectors, odometries, twist_vectors
+from fulmar_bringup.bags.plain_twist import TYPE, plain_vectors
 from fulmar_bringup.report.page import STYLE
 from fulmar_bringup.report.style import CONTROLLER_COLOURS, as_png, as_svg, house_style, legend, quiet_grid
 from fulmar_core.errors import ConfigError
@@ -25,6 +26,7 @@ COLOUR = CONTROLLER_COLOURS["policy"]
 COMMANDS = {
     "sensor_msgs/msg/JointState": lambda topic: joint_vectors(topic, "effort"),
     "geometry_msgs/msg/TwistStamped": twist_vectors,
+    TYPE: plain_vectors,
 }
 MOST_ACTUATORS = 16
 
@@ -98,7 +100,7 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
         if topic.type in COMMANDS and len(topic):
             vectors = COMMANDS[topic.type](topic)
             if len(vectors) and 0 < len(vectors.names) <= MOST_ACTUATORS:
-                found.append(_actuators(topic.name, vectors, int(seen.stamp_ns[0]) if len(seen) else 0))
+                found.append(_actuators(topic.name, vectors, _seconds(vectors, seen, topic.type == TYPE)))
     found.append(
         Drawing(
             "How late the odometry came", "Recorded minus stamped, beyond the quickest message.", 2.0, delay
@@ -107,11 +109,20 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
     return found
 
 
-def _actuators(name: str, vectors: Vectors, begin_ns: int) -> Drawing:
+def _seconds(vectors: Vectors, seen: Odometries, unstamped: bool) -> np.ndarray:
+    """Times of vectors since the first odometry; of those without stamps, by when both were recorded [s]."""
+    if not len(seen):
+        return (vectors.stamp_ns - vectors.stamp_ns[0]) / 1e9
+    if not unstamped:
+        return (vectors.stamp_ns - seen.stamp_ns[0]) / 1e9
+    logs, stamps = (times - times[0] for times in (seen.log_ns, seen.stamp_ns))
+    return np.interp(vectors.log_ns - seen.log_ns[0], logs, stamps) / 1e9
+
+
+def _actuators(name: str, vectors: Vectors, time_s: np.ndarray) -> Drawing:
     largest = float(np.abs(vectors.values).max()) or 1.0
 
     def draw(axes: Axes) -> None:
-        time_s = (vectors.stamp_ns - begin_ns) / 1e9
         for row, label in enumerate(vectors.names):
             level = len(vectors.names) - 1 - row
             axes.step(
@@ -123,8 +134,8 @@ def _actuators(name: str, vectors: Vectors, begin_ns: int) -> Drawing:
         axes.set_yticks([])
         axes.set_xlabel("time [s]")
 
-    caption = f"{name}; the full height of a row is {largest:.3g}."
-    return Drawing("What the actuators did", caption, 0.8 + 0.28 * len(vectors.names), draw)
+    caption = f"The full height of a row is {largest:.3g}."
+    return Drawing(f"What the actuators did: {name}", caption, 0.8 + 0.28 * len(vectors.names), draw)
 
 
 def _sheet(drawings: Sequence[Drawing], title: str) -> Figure:

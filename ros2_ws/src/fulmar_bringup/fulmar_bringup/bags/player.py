@@ -113,9 +113,13 @@ def _timeline(bag: Bag) -> Any:
     """From time of recording to the time of the run [ns]."""
     topic = bag.of(ODOMETRY)
     stamps = stamps_ns(topic) if len(topic) > 1 else None
-    if stamps is None or not (np.diff(stamps) > 0).all():
+    if stamps is None or (np.diff(stamps) < 0).any():
         return int
-    logs = list(topic.log_ns)
+    new = np.concatenate(([True], np.diff(stamps) > 0))  # the same measurement told again tells no time
+    stamps = stamps[new]
+    if len(stamps) < 2:
+        return int
+    logs = [log for log, kept in zip(topic.log_ns, new, strict=True) if kept]
 
     def run_time(log_ns: int) -> int:
         """Whole numbers throughout: nanoseconds since the epoch are too many for a float.

@@ -6,22 +6,28 @@ record, not from the new answer. So one different command does not make everythi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_bringup.bags.course import ABSENT, Course
+from fulmar_bringup.bags.course import Course
+from fulmar_bringup.bags.guarded import RecordedEstop
+from fulmar_bringup.bags.told import ABSENT
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import BagError, RunFailed
+from fulmar_core.errors import BagError, FulmarError, RunFailed
 from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
 from fulmar_core.rotation import rotate
 from fulmar_core.safety.arbiter import Flags, arbitrate
+from fulmar_core.safety.area import outside
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.safety.succession import Succession
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.mission import Mission
+from fulmar_ros.standby import Standby, ready
 
 FROM = ("observations", "odometry")
 LONGEST_NS = 1 << 60  # of an input timeout that never passes: a record has no steady clock
@@ -39,26 +45,36 @@ class Answers:
     reasons: tuple[str, ...]  # why it was not asked, by step; empty where it was
 
 
-def rerun(course: Course, controller: Controller, *, source: str = "observations") -> Answers:
-    """Let a controller answer a recorded run.
+def rerun(
+    course: Course,
+    controller: Controller,
+    *,
+    source: str = "observations",
+    fallback: Controller | None = None,
+    load: Callable[[str], Controller] | None = None,
+) -> Answers:
+    """Let a controller answer a recorded run, under the guards that the run had.
 
     Args:
         course: The run.
         controller: Made anew; warmed up or not.
         source: `observations` shows what was recorded; `odometry` makes observations anew, with the node's gates.
+        fallback: Takes over where the node would have let it; warmed up here.
+        load: Loads the bundle of a folder, to follow the recorded changes of policy; None follows none.
 
     Returns:
         Its answers.
 
     Raises:
-        BagError: The bag lacks what the source needs, or its observations are another controller's.
-        RunFailed: The controller raises; with the step.
+        BagError: The bag lacks what the source or a guard needs, its observations are another controller's, or a
+            policy that took over is another one by now.
+        RunFailed: The controller raises and nobody takes over; with the step.
     """
     if source == "observations":
         _check_observations(course, controller)
     elif not len(course.odometry):
         raise BagError("the bag holds no odometry to make observations from. Use --from observations.")
-    return _Rerun(course, controller, source).run()
+    return _Rerun(course, controller, source, fallback, load).run()
 
 
 def _check_observations(course: Course, controller: Controller) -> None:
@@ -82,21 +98,37 @@ def _check_observations(course: Course, controller: Controller) -> None:
 class _Rerun:
     """One pass; mirrors `ControllerNode` step by step."""
 
-    def __init__(self, course: Course, controller: Controller, source: str) -> None:
-        self._course, self._controller, self._source = course, controller, source
+    def __init__(
+        self,
+        course: Course,
+        controller: Controller,
+        source: str,
+        fallback: Controller | None,
+        load: Callable[[str], Controller] | None,
+    ) -> None:
+        self._course, self._source, self._load = course, source, load
         robot = course.robot
         self._robot, self._safe = robot, robot.actuators.safe_command
         self._pause_ns = course.settings.pause_ns(robot)
-        self._control_s = round(1e9 / course.settings.control_rate(robot)) / 1e9
-        self._informer = Informer(robot, controller)
+        self._control_ns = round(1e9 / course.settings.control_rate(robot))
+        self._succession = Succession(
+            Standby(controller, Informer(robot, controller), "", ""),
+            ready(fallback, robot) if fallback else None,
+        )
         self._mission = Mission(robot, course.task, streamed=course.settings.goals_streamed)
         self._gate = InputGate(robot.limits, frozen_after=0)
         self._answered_ns, self._answer, self._seen_ns = -1, self._safe, 0
         self._states = _States(course)
         # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
         self._gated = source == "odometry" and (course.settings.lockstep or not course.own)
+        self._estop = RecordedEstop(course.presses, required=self._gated and course.settings.estop)
         self._fed = 0
-        self._problem = ""
+        self._problem, self._outside, self._fault = "", "", ""
+        self._acted = 0  # control steps
+
+    @property
+    def _controller(self) -> Controller:
+        return self._succession.current.controller
 
     def run(self) -> Answers:
         course, count = self._course, len(self._course)
@@ -107,6 +139,7 @@ class _Rerun:
         acted, reasons = np.zeros(count, dtype=bool), [""] * count
         goals = course.before(course.goals)
         obstacles, blocks = course.before(course.obstacles), course.before(course.blocks)
+        changes = course.before(course.changes) if self._load else {}
         self._controller.reset()
         for step in range(count):
             stamp = int(course.stamp_ns[step])
@@ -115,19 +148,30 @@ class _Rerun:
             for told in blocks.get(step, ()):
                 self._mission.see_block(told.what, told.stamp_ns)
             for told in goals.get(step, ()):
+                if self._estop.holds(told.log_ns):
+                    continue  # as the node refuses it
                 if self._mission.give(told.what, told.stamp_ns):
                     self._controller.reset()
                 if course.settings.lockstep:
                     self._gate.forget()
+            for told in changes.get(step, ()):
+                self._succession.propose(self._successor(*told.what))
+            if self._succession.turn():
+                self._seen_ns = 0
             reasons[step] = self._reason(step)
             acted[step] = not reasons[step]
             if acted[step]:
                 self._begin_anew_after_a_pause(stamp)
                 shown[step] = self._shown(step)
-            self._inform(step)
+            try:
+                self._inform(step)
+                if acted[step]:
+                    actions[step] = self._act(shown[step])
+            except Exception as error:  # noqa: BLE001 - whatever a controller raises, as in the node
+                reasons[step] = self._give_up(step, error)
+                acted[step], shown[step] = False, np.nan
             if acted[step]:
-                actions[step] = self._act(step, shown[step])
-                commands[step] = self._limited(actions[step])
+                commands[step] = self._judged(actions[step])
             recorded = course.commands[step]
             self._answered_ns = stamp
             self._answer = commands[step] if np.isnan(recorded).any() else recorded
@@ -140,13 +184,18 @@ class _Rerun:
         course = self._course
         if self._source == "odometry":
             self._feed_gate(step)
+        log_ns, recorded = int(course.log_ns[step]), bool(course.acted[step])
+        stopped = self._estop.reason(log_ns, acted=recorded)
+        if self._estop.holds(log_ns) and (self._gated or not recorded):
+            self._mission.drop()
         if not self._gated:
             lacks = self._source == "odometry" and course.sample[step] == ABSENT
-            return "not asked in the record" if not course.acted[step] or lacks else ""
+            return "not asked in the record" if not recorded or lacks else ""
         state = self._states[int(course.sample[step])] if course.sample[step] != ABSENT else None
         flags = Flags(
             configured=True,
             activated=True,
+            latched_fault=self._fault,
             has_goal=self._mission.complete,
             lacking=self._mission.lacking,
             last_input_ns=0 if state is not None else None,
@@ -154,6 +203,10 @@ class _Rerun:
             input_timeout_ns=LONGEST_NS,
             goal_distance=self._mission.distance(state) if state is not None else 0.0,
             geofence=self._robot.limits.geofence,
+            estop=stopped,
+            outside=self._outside,
+            active_s=self._acted * self._control_ns / 1e9,
+            max_run_time_s=course.settings.max_run_time_s,
         )
         return arbitrate(flags, 0).reason
 
@@ -173,6 +226,9 @@ class _Rerun:
             self._problem = problem
             if not problem or not self._gated:
                 self._mission.turn_to(stamp)
+            if not problem:
+                x, y = (float(value) for value in self._states[index].position_in_world[:2])
+                self._outside = outside(x, y, course.settings.area)
 
     def _begin_anew_after_a_pause(self, stamp: int) -> None:
         if stamp - self._answered_ns > self._pause_ns:
@@ -193,30 +249,54 @@ class _Rerun:
 
     def _inform(self, step: int) -> None:
         """Tell the controller how its actuators do, if it wants to know."""
-        sample = int(self._course.sample[step])
-        if not self._informer.listens or sample == ABSENT:
+        sample, informer = int(self._course.sample[step]), self._succession.current.informer
+        if not informer.listens or sample == ABSENT:
             return
         stamp = int(self._course.stamp_ns[step])
         passed_ns = stamp - self._seen_ns
         if passed_ns == 0:
             return
         if not 0 < passed_ns <= self._pause_ns:
-            self._informer.reset()
+            informer.reset()
         self._seen_ns = stamp
-        self._informer.see(planar_of(self._states[sample]), self._answer, passed_ns / 1e9)
+        informer.see(planar_of(self._states[sample]), self._answer, passed_ns / 1e9)
 
-    def _act(self, step: int, observation: np.ndarray) -> np.ndarray:
-        try:
-            return np.asarray(self._controller.act(observation), dtype=float)
-        except Exception as error:
-            raise RunFailed(
-                f"'{self._controller.name}' raised {type(error).__name__} at step {step}: {error}"
-            ) from error
+    def _act(self, observation: np.ndarray) -> np.ndarray:
+        action = np.asarray(self._controller.act(observation), dtype=float)
+        self._acted += 1
+        return action
 
-    def _limited(self, action: np.ndarray) -> np.ndarray:
-        if command_problem(action, len(self._robot.actuators.names)):
+    def _judged(self, action: np.ndarray) -> np.ndarray:
+        """The command of an action; several in a row that are refused let the fallback take over, or are a fault."""
+        problem = command_problem(action, len(self._robot.actuators.names))
+        before = self._succession.current
+        self._fault = self._succession.judge(problem) or self._fault
+        if self._succession.current is not before:
+            self._seen_ns = 0
+        if problem:
             return self._safe
-        return slewed(self._robot.actuators.limited(action), self._answer, self._robot, self._control_s)
+        limited = self._robot.actuators.limited(action)
+        return slewed(limited, self._answer, self._robot, self._control_ns / 1e9)
+
+    def _give_up(self, step: int, error: Exception) -> str:
+        """Let the fallback take over from a controller that raised, and say why the step has no answer."""
+        reason = f"'{self._controller.name}' raised {type(error).__name__} at step {step}: {error}"
+        if not self._succession.fall_back(reason):
+            raise RunFailed(reason) from error
+        self._seen_ns = 0
+        return reason
+
+    def _successor(self, folder: str, sha256: str) -> Standby:
+        """The policy that took over in the record."""
+        assert self._load is not None
+        where = f"the run went on with the policy of {folder}"
+        try:
+            found = ready(self._load(folder), self._robot)
+        except FulmarError as error:
+            raise BagError(f"{where}, which cannot be loaded: {error}") from error
+        if found.sha256 != sha256:
+            raise BagError(f"{where}, which is another one by now. Ask one policy: --policy DIR.")
+        return found
 
 
 class _States:

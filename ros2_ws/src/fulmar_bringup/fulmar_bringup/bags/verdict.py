@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.rerun import Answers
 
 FIELDS = ("decision", "observation", "action", "command")
+NUMBER = re.compile(r"-?[0-9]+([.][0-9]+)?")
 
 
 def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
@@ -58,6 +60,25 @@ def _lost(course: Course) -> np.ndarray:
         course.commands != course.robot.actuators.safe_command
     ).any(axis=1)
     return ~course.acted & driven
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Steps at which the controller was not asked, for one reason."""
+
+    reason: str  # as it was first given; numbers in it change from step to step
+    steps: int
+    first_step: int
+
+
+def pauses(answers: Answers) -> list[Pause]:
+    """Why the controller was not asked, the most frequent reason first."""
+    steps: dict[str, list[int]] = {}
+    for step, reason in enumerate(answers.reasons):
+        if reason:
+            steps.setdefault(NUMBER.sub("#", reason), []).append(step)
+    found = [Pause(answers.reasons[each[0]], len(each), each[0]) for each in steps.values()]
+    return sorted(found, key=lambda pause: -pause.steps)
 
 
 @dataclass(frozen=True)

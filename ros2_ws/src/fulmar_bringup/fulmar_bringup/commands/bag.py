@@ -17,8 +17,8 @@ EPILOG = """\b
 Any rosbag2 folder with MCAP or sqlite3 will do, or one file of it; nothing here needs ROS but `play` and
 `rerun --through node`. Of a damaged bag, everything that can be read is read, and the rest is named.
 
-Exit codes: 0 done and the same. 1 something differs, or part of the bag could not be read.
-2 there is no bag, nothing of it can be read, or the command was wrong.
+Exit codes of all: 0 done and the same. 1 something differs, there was nothing to compare, or part of a bag could not
+be read; what could be was done all the same. 2 there is no bag, nothing of it can be read, or the command was wrong.
 """
 
 bag = typer.Typer(

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from fulmar_bringup.commands.arguments import BagArgument, JsonOption
-from fulmar_bringup.console import console, output, print_json
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_bringup.commands.damage import finish, open_and_warn
+from fulmar_bringup.console import output, print_json
 
 SHOWN = 6  # fields of a topic
 
@@ -31,21 +31,20 @@ def diff(
     Messages belong together by the stamps in them. Clock, status and diagnostics tell of the machine and differ always;
     name them with --topic to see how. Two lock-step runs of one seed are the same.
 
-    Exit code: 0 the same, 1 something differs, 2 a bag cannot be read.
+    Messages that cannot be read are compared byte by byte.
+
+    Exit code: 0 the same, 1 something differs or there is nothing to compare or part of a bag could not be read, 2 a
+    bag cannot be read.
     """
-    from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.bags.difference import differing
 
-    bags = [open_bag(bag), open_bag(other)]
-    for opened in bags:
-        for warning in opened.warnings:
-            console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    bags = [open_and_warn(bag), open_and_warn(other)]
     found = differing(*bags, tolerance=tolerance, only=topic)
     if as_json:
         print_json(found)
     else:
         _show(found)
-    raise typer.Exit(DONE if found["same"] else FAILED)
+    raise finish(*bags, good=found["same"])
 
 
 def _show(found: dict[str, Any]) -> None:
@@ -69,7 +68,11 @@ def _show(found: dict[str, Any]) -> None:
         if rest > 0:
             _say(f"  ... and {rest} more fields; --json has them all")
         for each in topic["texts"]:
-            _say(f"  {each['field']}: {each['differing']} texts differ")
+            _say(f"  {each['field']}: {each['differing']} messages differ in it")
+        if topic["bytes"]:
+            _say(f"  {topic['bytes']} messages differ; they cannot be read, and were compared byte by byte")
+    if not found["compared"]:
+        _say("the bags have no messages to compare")
     _say("same" if found["same"] else "different")
 
 

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from fulmar_bringup.commands.arguments import JsonOption
-from fulmar_bringup.console import console, output, print_json
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_bringup.commands.damage import finish, open_and_warn, warn
+from fulmar_bringup.console import output, print_json
+from fulmar_core.errors import BagError, ConfigError, UnknownNameError
 
 FORMATS = ("csv", "npz", "lerobot")
 
@@ -36,31 +37,39 @@ def export(
     lines, and a parquet file for each episode, with `observation.state` and `action` as the controller saw and said
     them. It needs the extra 'datasets'.
     """
-    from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.bags.tables import write_csv, write_npz
 
     if to not in FORMATS:
         raise UnknownNameError("--to", to, FORMATS)
     if len(bags) > 1 and to != "lerobot":
         raise ConfigError(f"--to {to} takes one bag, {len(bags)} were given. Export them one by one.")
-    opened = [open_bag(bag) for bag in bags]
-    for warning in (warning for bag in opened for warning in bag.warnings):
-        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    opened = [open_and_warn(bag) for bag in bags]
     beside = bags[0] if bags[0].is_dir() else bags[0].parent
     if to == "csv":
-        files = write_csv(opened[0], out or beside / "csv")
+        files, left_out = write_csv(opened[0], out or beside / "csv")
     elif to == "npz":
         path = out or beside / f"{beside.resolve().name}.npz"
-        files = [write_npz(opened[0], path.with_suffix(".npz"))]
+        file, left_out = write_npz(opened[0], path.with_suffix(".npz"))
+        files = [file]
     else:
         from fulmar_bringup.bags.course import course_of
         from fulmar_bringup.bags.lerobot import write_lerobot
 
+        for bag in opened:
+            if bag.info is None:
+                raise BagError(
+                    f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
+                )
         courses = [course_of(bag) for bag in opened]
         titles = [course.task.title for course in courses]
-        files = [write_lerobot(courses, titles, out or beside / "lerobot")]
+        folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
+        files, left_out = [folder], []
+        warn(notes)
+    warn(f"left out: {line}" for line in left_out)
     if as_json:
-        print_json({"bags": [str(bag) for bag in bags], "to": to, "files": [str(file) for file in files]})
-        return
-    for file in files:
-        output.print(str(file), markup=False, soft_wrap=True)
+        names = [str(file) for file in files]
+        print_json({"bags": [str(bag) for bag in bags], "to": to, "files": names, "left_out": left_out})
+    else:
+        for file in files:
+            output.print(str(file), markup=False, soft_wrap=True)
+    raise finish(*opened)

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from fulmar_bringup.commands.arguments import BagArgument, JsonOption
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.commands.damage import finish, open_and_warn, warn
+from fulmar_bringup.console import output, print_json
 
 
 def play(
@@ -38,14 +39,11 @@ def play(
 
     Try, with a controller listening: fulmar bag play runs/demo_x/lqr --topic odom --topic goal_pose --clock
     """
-    from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.extras import require
     from fulmar_bringup.processes import child_environment
 
     require("rclpy")
-    opened = open_bag(bag)
-    for warning in opened.warnings:
-        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    opened = open_and_warn(bag)
     key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
     os.environ.setdefault(key, child_environment()[key])
     from fulmar_bringup.bags.player import play as publish
@@ -53,10 +51,7 @@ def play(
 
     plan = schedule(opened, topics=topic, start_s=start)
     done = publish(plan, opened, rate=rate, loop=loop, clock=clock, wait_s=wait)
-    for name in done.left_out:
-        console.print(
-            f"warning: {name} was left out: its type is not installed", markup=False, soft_wrap=True
-        )
+    warn(f"{name} was left out: its type is not installed" for name in done.left_out)
     duration_s = (plan.end_ns - plan.begin_ns) / 1e9
     if as_json:
         print_json({"bag": str(bag), "duration_s": duration_s, "rate": rate, **vars(done)})
@@ -67,3 +62,4 @@ def play(
             markup=False,
             soft_wrap=True,
         )
+    raise finish(opened)

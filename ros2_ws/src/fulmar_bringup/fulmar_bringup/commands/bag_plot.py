@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from fulmar_bringup.commands.arguments import BagArgument, JsonOption
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.commands.damage import finish, open_and_warn
+from fulmar_bringup.console import output, print_json
 from fulmar_bringup.extras import require
 
 
@@ -32,12 +33,9 @@ def plot(
     without: its path, its speed, its actuators, and how late its messages came.
     """
     require("matplotlib")
-    from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.bags.pictures import write_pictures
 
-    opened = open_bag(bag)
-    for warning in opened.warnings:
-        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    opened = open_and_warn(bag)
     beside = bag if bag.is_dir() else bag.parent
     files = out or [beside / "plot.html", beside / "plot.png"]
     if _has_a_task(bag) and odometry is None:
@@ -50,9 +48,10 @@ def plot(
         written = [write_pictures(opened, file, odometry) for file in files]
     if as_json:
         print_json({"bag": str(bag), "files": [str(file) for file in written]})
-        return
-    for file in written:
-        output.print(str(file), markup=False, soft_wrap=True)
+    else:
+        for file in written:
+            output.print(str(file), markup=False, soft_wrap=True)
+    raise finish(opened)
 
 
 def _has_a_task(bag: Path) -> bool:

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fulmar_bringup.commands.arguments import BagArgument, JsonOption, PolicyOption, read_pose
+from fulmar_bringup.commands.damage import finish, warn
 from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.exit_codes import DONE, FAILED
 
 if TYPE_CHECKING:
     from fulmar_bringup.bags.contents import Bag
     from fulmar_bringup.bags.course import Course
-    from fulmar_bringup.bags.rerun import Answers
 
 WAYS = ("direct", "node")
 SHOWN = 12  # lines of fields that differ
@@ -64,35 +63,43 @@ def rerun(
     odometry: Annotated[
         str | None, typer.Option(metavar="TOPIC", help="Which odometry, where a bag has several.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the answers, step by step: .csv or .npz.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show a recorded run to a controller, and compare its answers with the recorded ones, field by field.
 
     Each step is shown as it was recorded, whatever the controller answered before; at goals, pauses and jumps of time
     it forgets, as in the node. Bags of others are fed from odometry and need --robot, --task and mostly --goal; without
-    recorded actions there is nothing to compare.
+    recorded actions there is nothing to compare, and --out has the answers.
 
-    Exit code: 0 all fields are the same within the tolerance, 1 one differs or nothing could be compared, 2 the bag
-    cannot be read.
+    Exit code: 0 all fields are the same within the tolerance, 1 one differs, nothing could be compared or part of the
+    bag could not be read, 2 the bag cannot be read.
 
     Try: fulmar bag rerun runs/demo_x/policy --controller policy --policy runs/bundles/mine
     """
+    from fulmar_bringup.bags.answers_file import check_answers_file, write_answers
     from fulmar_bringup.bags.calibration import calibrated_as
+    from fulmar_bringup.bags.cast import answers_of
     from fulmar_bringup.bags.comparison import as_json as lines
     from fulmar_bringup.bags.comparison import first_difference, read_tolerances
     from fulmar_bringup.bags.contents import open_bag
     from fulmar_bringup.bags.course import course_of
-    from fulmar_bringup.bags.figures import controller_of
+    from fulmar_bringup.bags.figures import controllers_of
     from fulmar_bringup.bags.rerun import FROM
-    from fulmar_bringup.bags.verdict import FIELDS, judge_answers, sums
+    from fulmar_bringup.bags.verdict import FIELDS, judge_answers, pauses, sums
 
     began = time.monotonic()
     for what, given, known in (("--from", source, FROM), ("--through", through, WAYS)):
         if given not in known:
             raise UnknownNameError(what, given, known)
+    if out is not None:
+        check_answers_file(out)
     tolerances = read_tolerances(tolerance or [], FIELDS)
     opened = open_bag(bag)
     foreign = opened.info is None
+    _check_effect(source, through, foreign=foreign, options={"--goal": goal, "--odometry": odometry})
     with calibrated_as(opened):
         course = course_of(
             opened,
@@ -102,19 +109,28 @@ def rerun(
             control_hz=control_hz,
             odometry=odometry,
         )
-        for warning in course.warnings:
-            console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+        warn(course.warnings)
         name, folder = _chosen(opened, course, controller, policy)
         if through == "node":
             from fulmar_bringup.bags.live_node import rerun_through_node, without_repeats
 
             course = without_repeats(course)
-            answers, sha256 = rerun_through_node(opened, course, name, folder)
+            answers, sha256 = rerun_through_node(opened, course, name, folder, odometry)
         else:
-            answers, sha256 = _answers(course, name, folder, "odometry" if foreign else source)
+            follow = policy is None and name == (opened.info or {}).get("controller")
+            if course.changes and not follow:
+                console.print(
+                    "warning: the record changed its policy on the way; here one goes through all of it",
+                    markup=False,
+                )
+            answers, sha256 = answers_of(
+                course, name, folder, "odometry" if foreign else source, follow=follow
+            )
     fields = judge_answers(course, answers, tolerances)
     first = first_difference(fields)
-    recorded = controller_of(opened)
+    recorded = [each.get("sha256") for each in controllers_of(opened)]
+    if out is not None:
+        write_answers(course, answers, out)
     result: dict[str, Any] = {
         "bag": str(bag),
         "robot": course.robot.name,
@@ -122,11 +138,14 @@ def rerun(
         "controller": name,
         "policy": folder or None,
         "sha256": sha256,
-        "recorded_sha256": recorded.get("sha256"),
+        "recorded_sha256": recorded[0] if recorded else None,
+        "recorded_sha256s": recorded,
         "from": "odometry" if foreign else source,
         "through": through,
         "steps": len(course),
         "asked": int(answers.acted.sum()),
+        "not_asked": [vars(each) for each in pauses(answers)],
+        "answers": None if out is None else str(out),
         "compared": bool(fields) and course.answered,
         "same": bool(fields) and course.answered and first is None,
         "first_difference": None if first is None else lines([first])[0],
@@ -138,7 +157,18 @@ def rerun(
         print_json(result)
     else:
         _show(result, [vars(each) for each in sums(fields)])
-    raise typer.Exit(DONE if result["same"] or (foreign and not result["compared"]) else FAILED)
+    raise finish(opened, good=result["same"])
+
+
+def _check_effect(source: str, through: str, *, foreign: bool, options: dict[str, str | None]) -> None:
+    """Refuse options that would change nothing.
+
+    Raises:
+        ConfigError: On the first one.
+    """
+    given = [name for name, value in options.items() if value is not None]
+    if given and source == "observations" and through == "direct" and not foreign:
+        raise ConfigError(f"{given[0]} changes nothing where observations are fed. Add --from odometry.")
 
 
 def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | None) -> tuple[str, str]:
@@ -158,21 +188,20 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
                 f"--policy is for --controller policy, not for '{name}'. Leave one of them out."
             )
         return name, ""
-    folder = policy or policy_folder(bag) or shipped_policy(course.robot.name, course.task.name)
+    recorded = policy_folder(bag)
+    folder = policy or recorded or shipped_policy(course.robot.name, course.task.name)
+    named = (bag.info or {}).get("policy")
+    if named and folder is not None and not policy and not recorded:
+        warn(
+            [
+                f"the bundle that drove, {named}, is gone; {folder} is asked instead. Give another one: --policy DIR."
+            ]
+        )
     if folder is None:
         raise ConfigError(
             f"no policy is shipped for '{course.robot.name}' and '{course.task.name}'. Give one: --policy DIR."
         )
     return name, str(folder)
-
-
-def _answers(course: Course, name: str, folder: str, source: str) -> tuple[Answers, str | None]:
-    from fulmar_bringup.bags.rerun import rerun as run_again
-    from fulmar_bringup.system import CONTROLLERS
-
-    hz = course.settings.control_rate(course.robot)
-    loaded = CONTROLLERS[name].load(course.robot, course.task, hz, folder)
-    return run_again(course, loaded, source=source), loaded.metadata().get("sha256")
 
 
 def _show(result: dict[str, Any], sums: list[dict[str, Any]]) -> None:
@@ -183,6 +212,13 @@ def _show(result: dict[str, Any], sums: list[dict[str, Any]]) -> None:
     if result["sha256"] and result["recorded_sha256"]:
         same = result["sha256"] == result["recorded_sha256"]
         _say("the same controller as recorded" if same else "another controller than recorded")
+    turns = len(result["recorded_sha256s"])
+    if turns > 1:
+        _say(f"{turns} controllers had their turn in the record; compared with the first of them")
+    for each in result["not_asked"][:SHOWN]:
+        _say(f"  not asked at {each['steps']} steps, from step {each['first_step']}: {each['reason']}")
+    if result["answers"]:
+        _say(f"its answers are in {result['answers']}")
     if not result["compared"]:
         _say("nothing was recorded that its answers could be compared with")
         return

@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from fulmar_bringup.commands.arguments import JsonOption
+from fulmar_bringup.commands.damage import warn
 from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import ConfigError
 
@@ -61,28 +62,36 @@ def identify(
         known_values.append(Known(name, value, max(error / SIGMAS, 1e-6 * value)))
     loads, ballasts = _loads(bags, ballast or [])
     runs = [driven_run(bag, load=load) for bag, load in zip(bags, loads, strict=True)]
-    names = sorted({robot.name for robot, _ in runs})
+    warn(f"{bag}: {line}" for bag, (_, _, lines) in zip(bags, runs, strict=True) for line in lines)
+    names = sorted({robot.name for robot, _, _ in runs})
     if len(names) > 1:
         raise ConfigError(f"the bags are of {', '.join(names)}. Identify one robot at a time.")
     robot = runs[0][0]
     weights = {load: Weight(value, error) for load, (value, error) in ballasts.items()}
-    found = estimate(robot, [drive for _, drive in runs], known=known_values, ballasts=weights)
+    found = estimate(robot, [drive for _, drive, _ in runs], known=known_values, ballasts=weights)
     calibration = calibration_of(robot, found, [str(bag) for bag in bags])
     if out is not None:
         save_calibration(calibration, out)
     document: dict[str, Any] = {
         "robot": robot.name,
         "bags": [str(bag) for bag in bags],
-        "driven_s": round(sum(drive.duration_s for _, drive in runs), 3),
+        "driven_s": round(sum(drive.duration_s for _, drive, _ in runs), 3),
         "scale": found.scale,
         "estimates": {
             name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit}
             for name, e in found.fit.estimates.items()
         },
+        "untold": list(found.untold),
         "residuals": dict(zip(("x_m", "y_m", "heading_rad"), found.fit.noise, strict=True)),
         "windows": found.fit.windows,
         "calibration": None if out is None else str(out),
     }
+    if found.untold:
+        warn(
+            [
+                f"the runs tell nothing of {', '.join(found.untold)}: left out of the calibration. Drive more briskly."
+            ]
+        )
     if not found.trusted:
         console.print(f"note: {found.scale}.", markup=False, soft_wrap=True)
     if as_json:

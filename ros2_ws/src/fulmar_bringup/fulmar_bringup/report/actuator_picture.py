@@ -20,9 +20,9 @@ def open_spans(record: RunRecord, actuator: int) -> list[Span]:
 
     Args:
         record: The run.
-        actuator: Column of `record.applied.effort`.
+        actuator: Column of `record.actuation.effort`.
     """
-    return _spans(record, record.applied.effort[:, actuator] != 0.0)
+    return _spans(record, record.actuation.effort[:, actuator] != 0.0)
 
 
 def watchdog_spans(record: RunRecord) -> list[Span]:
@@ -40,7 +40,7 @@ def watchdog_spans(record: RunRecord) -> list[Span]:
 
 def _spans(record: RunRecord, flags: np.ndarray) -> list[Span]:
     """Times between which a flag of each sample of `record.applied` is set."""
-    stamp_s = record.applied.stamp_s
+    stamp_s = record.actuation.stamp_s
     if not len(stamp_s):
         return []
     begin_s = record.motion.stamp_s[0] if len(record.motion) else stamp_s[0]
@@ -54,7 +54,7 @@ def _spans(record: RunRecord, flags: np.ndarray) -> list[Span]:
 
 def draw_actuators(axes: Axes, run: View) -> None:
     """One row for each actuator: a bar wherever a valve was open, else the share of full command."""
-    names = run.record.applied.names
+    names = run.record.actuation.names
     if run.binary:
         _bars(axes, run, len(names))
     elif run.judgement is not None:
@@ -99,7 +99,7 @@ def _shares(axes: Axes, run: View, judgement: Judgement) -> None:
 def draw_use(axes: Axes, runs: Sequence[View]) -> None:
     """Open-valve time, or time at full command, added up over the run."""
     for run, judgement in judged(runs):
-        count = len(run.record.applied.names)
+        count = len(run.record.actuation.names)
         spent = np.cumsum(judgement.run.effort[0]) * count * judgement.run.control_dt
         axes.plot(judgement.time_s, spent, color=run.colour, label=run.label)
     axes.set_ylim(bottom=0.0)

@@ -14,7 +14,7 @@ from fulmar_core.calibration import DRAGS
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.hydrodynamics import drag
 from fulmar_core.identification.held_input import followed, for_each_copy
-from fulmar_core.identification.model import Unknown, Values, nominal_world
+from fulmar_core.identification.model import USEFUL_DELAY_S, Unknown, Values, nominal_world
 from fulmar_core.identification.windows import Windows
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
@@ -37,14 +37,21 @@ class BoatModel:
         unknowns = [
             Unknown("mass", robot.body.mass, "kg"),
             Unknown("yaw_inertia", robot.body.inertia[2], "kg·m²"),
-            Unknown("delay", robot.actuators.response.delay_s, "s", positive=False),
+            Unknown("delay", robot.actuators.response.delay_s, "s", positive=False, useful=USEFUL_DELAY_S),
         ]
         for axis, i in DRAGS:
             force, speed = ("N·m", "rad/s") if axis == "yaw" else ("N", "m/s")
             drags = self._water.linear_damping[i], self._water.quadratic_damping[i]
             units = f"{force} per {speed}", f"{force} per ({speed})²"
             unknowns += [
-                Unknown(f"{axis}_{kind}_drag", drag_now, unit, positive=False, scale=max(*drags, 1.0))
+                Unknown(
+                    f"{axis}_{kind}_drag",
+                    drag_now,
+                    unit,
+                    positive=False,
+                    scale=max(*drags, 1.0),
+                    useful=max(*drags, 1.0),
+                )
                 for kind, drag_now, unit in zip(("linear", "quadratic"), drags, units, strict=True)
             ]
         self.unknowns = tuple(unknowns)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
+import numpy as np
+
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.thrusters import Thrusters
@@ -12,13 +14,14 @@ from fulmar_core.calibration import Calibration, Measured
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.identification.boat import BoatModel
 from fulmar_core.identification.drive import Drive
-from fulmar_core.identification.fit import Fit, fit
-from fulmar_core.identification.model import Known, Model
+from fulmar_core.identification.fit import Estimate, Fit, fit
+from fulmar_core.identification.model import Known, Model, Unknown
 from fulmar_core.identification.platform import PlatformModel, ballast_name
 from fulmar_core.identification.wheels import WheelModel
 from fulmar_core.robot import Robot
 
 EXACT = 1e-6  # relative standard deviation of what is said to be known without an error
+NOTHING_TOLD = "the runs tell nothing of the robot: it hardly moved. Drive it, as with --controller excite."
 SIGMAS = 1.96  # half a 95 % interval, in standard deviations
 
 
@@ -37,6 +40,9 @@ class Identified:
     fit: Fit
     scale: str  # what the scale of forces rests on, in a sentence
     trusted: bool  # whether that was measured; False: it is the robot's YAML
+    untold: tuple[
+        str, ...
+    ] = ()  # quantities that the runs tell nothing about: intervals wider than their values
 
 
 def identify(
@@ -68,24 +74,41 @@ def identify(
         if each.name not in names:
             raise UnknownNameError("quantity", each.name, names)
     noise = robot.sensors.odometry
-    found = fit(
-        model,
-        drives,
-        known,
-        dt=robot.timing.physics_dt,
-        noise=(max(noise.position.std, 1e-4), max(noise.heading.std, 1e-4)),
+    try:
+        found = fit(
+            model,
+            drives,
+            known,
+            dt=robot.timing.physics_dt,
+            noise=(max(noise.position.std, 1e-4), max(noise.heading.std, 1e-4)),
+        )
+    except np.linalg.LinAlgError as error:  # without motion no number follows from it
+        raise ConfigError(NOTHING_TOLD) from error
+    untold = tuple(
+        unknown.name for unknown in model.unknowns if not _told(unknown, found.estimates[unknown.name])
     )
-    return Identified(found, scale, trusted)
+    return Identified(found, scale, trusted, untold)
+
+
+def _told(unknown: Unknown, found: Estimate) -> bool:
+    """Whether an estimate says more than that the quantity exists."""
+    return (found.high - found.low) / 2.0 <= max(abs(found.value), unknown.useful)
 
 
 def calibration_of(robot: Robot, identified: Identified, runs: Sequence[str] = ()) -> Calibration:
-    """What a simulation can take over: everything but the ballasts."""
-    allowed = {field.name for field in fields(Calibration)}
+    """What a simulation can take over: everything that the runs told, but the ballasts.
+
+    Raises:
+        ConfigError: They told nothing.
+    """
+    allowed = {field.name for field in fields(Calibration)} - set(identified.untold)
     measured = {
         name: Measured(found.value, found.low, found.high)
         for name, found in identified.fit.estimates.items()
         if name in allowed
     }
+    if not measured:
+        raise ConfigError(NOTHING_TOLD)
     return Calibration(robot=robot.name, runs=tuple(runs), **measured)
 
 

@@ -14,6 +14,7 @@ from fulmar_core.disturbances.world import World
 from fulmar_core.identification.windows import Windows
 from fulmar_core.robot import Robot
 
+USEFUL_DELAY_S, USEFUL_PLACE_M = 0.1, 0.1  # a worse one helps no simulation
 Values = Mapping[str, np.ndarray]  # each unknown in its own unit, shape (copies, 1)
 
 
@@ -26,6 +27,9 @@ class Unknown:
     unit: str
     positive: bool = True  # searched by its logarithm: it has a size, and so has its relative error
     scale: float = 1.0  # its usual size, for one that may be 0 or less
+    useful: float = (
+        0.0  # half of the widest interval that still tells something, for one that may be 0 or less
+    )
     blur: float = 0.0  # standard deviation of what the model itself errs by, in the unknown's unit
 
     def to_search(self, value: float) -> float:

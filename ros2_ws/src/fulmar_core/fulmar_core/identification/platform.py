@@ -16,7 +16,7 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.identification.drive import Drive
 from fulmar_core.identification.held_input import for_each_copy, mean_over_steps
-from fulmar_core.identification.model import Unknown, Values, nominal_world
+from fulmar_core.identification.model import USEFUL_DELAY_S, USEFUL_PLACE_M, Unknown, Values, nominal_world
 from fulmar_core.identification.windows import Windows
 from fulmar_core.motion import to_center
 from fulmar_core.planar import PlanarState
@@ -52,14 +52,14 @@ class PlatformModel:
         unknowns = [
             Unknown("thrust", robot.actuators.thrust, "N"),
             Unknown("mass", body.mass, "kg"),
-            Unknown("delay", robot.actuators.response.delay_s, "s", positive=False),
-            Unknown("opening_delay", 0.0, "s", positive=False),
+            Unknown("delay", robot.actuators.response.delay_s, "s", positive=False, useful=USEFUL_DELAY_S),
+            Unknown("opening_delay", 0.0, "s", positive=False, useful=USEFUL_DELAY_S),
         ]
         for load in (0, *ballasts):
             unknowns += [
                 Unknown(of_load("yaw_inertia", load), body.inertia[2], "kg·m²"),
-                Unknown(of_load("center_of_mass_x", load), 0.0, "m", positive=False),
-                Unknown(of_load("center_of_mass_y", load), 0.0, "m", positive=False),
+                Unknown(of_load("center_of_mass_x", load), 0.0, "m", positive=False, useful=USEFUL_PLACE_M),
+                Unknown(of_load("center_of_mass_y", load), 0.0, "m", positive=False, useful=USEFUL_PLACE_M),
             ]
         unknowns += [Unknown(ballast_name(load), mass, "kg") for load, mass in ballasts.items()]
         self.unknowns = tuple(unknowns)

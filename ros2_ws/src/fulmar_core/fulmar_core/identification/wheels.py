@@ -11,7 +11,7 @@ import numpy as np
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.dynamics.rolling import SERVO_S
 from fulmar_core.identification.held_input import followed, for_each_copy
-from fulmar_core.identification.model import Unknown, Values
+from fulmar_core.identification.model import USEFUL_DELAY_S, Unknown, Values
 from fulmar_core.identification.windows import Windows
 from fulmar_core.robot import Robot
 
@@ -38,7 +38,7 @@ class WheelModel:
             Unknown("wheel_scale", 1.0, "-"),
             Unknown("turn_scale", 1.0, "-"),
             Unknown("lag", max(response.lag_s, SERVO_S), "s", blur=SECOND_LAG_S),
-            Unknown("delay", response.delay_s, "s", positive=False, blur=SECOND_LAG_S),
+            Unknown("delay", response.delay_s, "s", positive=False, useful=USEFUL_DELAY_S, blur=SECOND_LAG_S),
         )
 
     def own_of(self, states: np.ndarray) -> np.ndarray:

@@ -1,0 +1,121 @@
+"""What guarded a recorded run: its limits, its e-stop, its fallback, and policies that took over on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypedDict
+
+from fulmar_bringup.bags.contents import Bag, json_object
+from fulmar_bringup.bags.decode import messages
+from fulmar_bringup.bags.told import Told
+from fulmar_core.errors import BagError
+from fulmar_core.safety.area import NO_AREA
+from fulmar_core.safety.estop import EstopWatch
+from fulmar_core.topics import ESTOP, METADATA, SWAP
+
+# A message reaches the controller and the recorder at different times; what lies within is for the record to tell.
+SLACK_NS = 50_000_000
+
+
+class Limits(TypedDict):
+    """Guards by the names that they have in `ControllerSettings`."""
+
+    fallback: str
+    estop: bool
+    max_run_time_s: float
+    area: tuple[float, ...]
+
+
+def limits_of(info: Mapping[str, Any]) -> Limits:
+    """The guards that a run was started with; none where it names none.
+
+    Raises:
+        BagError: They make no sense.
+    """
+    told = info.get("guards") or {}
+    try:
+        return Limits(
+            fallback=str(told.get("fallback") or ""),
+            estop=bool(told.get("estop")),
+            max_run_time_s=float(told.get("max_run_time_s") or 0.0),
+            area=tuple(float(side) for side in told.get("area") or NO_AREA),
+        )
+    except (AttributeError, TypeError, ValueError) as error:
+        raise BagError(f"the guards that the bag names make no sense: {error}.") from error
+
+
+def begins_with_its_run(info: Mapping[str, Any]) -> bool:
+    """Whether a bag holds its run from the beginning, and not just what was before a fault."""
+    told = info.get("recording")
+    return not (isinstance(told, Mapping) and told.get("mode") == "ring")
+
+
+def presses_of(bag: Bag) -> tuple[Told, ...]:
+    """What the e-stop said: true is pressed."""
+    return tuple(Told(log, 0, bool(message.data)) for log, message in messages(bag.of(ESTOP)))
+
+
+def changes_of(bag: Bag) -> tuple[Told, ...]:
+    """Folder and SHA-256 of each policy that took over on request, told when it did; requests that failed are none."""
+    asked = [(log, message.data) for log, message in messages(bag.of(SWAP))]
+    said = [(log, json_object(message.data) or {}) for log, message in messages(bag.of(METADATA))]
+    ends = [log for log, _ in asked[1:]] + [1 << 63]
+    found = []
+    for (begin, folder), end in zip(asked, ends, strict=False):
+        new = [(log, words) for log, words in said if begin <= log < end and not words.get("fallback")]
+        if new:
+            log, words = new[0]
+            found.append(Told(log, 0, (folder, str(words.get("sha256") or ""))))
+    return tuple(found)
+
+
+class RecordedEstop:
+    """The e-stop as the controller heard it: at one instant, not yet and already, by the slack of the record."""
+
+    def __init__(self, presses: tuple[Told, ...], *, required: bool) -> None:
+        """Begin without having heard anything.
+
+        Args:
+            presses: From `presses_of`.
+            required: Whether nothing may move before it is heard.
+
+        Raises:
+            BagError: It is required, and the bag holds nothing of it.
+        """
+        if required and not presses:
+            raise BagError("the run was guarded by an e-stop, of which the bag holds nothing.")
+        self._presses = presses
+        self._late, self._early = (_Ear(presses, required, offset) for offset in (-SLACK_NS, SLACK_NS))
+
+    def reason(self, log_ns: int, *, acted: bool) -> str:
+        """Why nothing may move at a time of the record; empty if it may.
+
+        Args:
+            log_ns: The time; not before the one of the last call [ns].
+            acted: What the record says, which decides while a press or a release was on its way.
+        """
+        late, early = self._late.reason(log_ns), self._early.reason(log_ns)
+        if bool(late) == bool(early):
+            return early
+        return "" if acted else late or early
+
+    def holds(self, log_ns: int) -> bool:
+        """Whether it was heard, and stopped everything without a doubt, at a time of the record [ns]."""
+        return all(ear.reason(log_ns) and ear.watch.heard for ear in (self._late, self._early))
+
+
+class _Ear:
+    """Hears everything somewhat earlier or later than the recorder."""
+
+    def __init__(self, presses: tuple[Told, ...], required: bool, offset_ns: int) -> None:
+        self.watch = EstopWatch(required=required)
+        self._rest = iter(presses)
+        self._next = next(self._rest, None)
+        self._offset_ns = offset_ns
+
+    def reason(self, log_ns: int) -> str:
+        now_ns = log_ns + self._offset_ns
+        while self._next is not None and self._next.log_ns <= now_ns:
+            self.watch.hear(self._next.what, self._next.log_ns)
+            self._next = next(self._rest, None)
+        return self.watch.reason(now_ns)
