@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
+import psutil
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -196,8 +197,10 @@ def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(recor
     recorder.wait_until_recording()
     publisher = odometry(node, lockstep=True)
     recorder.process.send_signal(signal.SIGSTOP)
+    while recorder.process.status() != psutil.STATUS_STOPPED:
+        time.sleep(0.01)
     with pytest.raises(LockstepError, match="a reader has taken nothing for 0"):
-        for _ in range(6000):
+        for _ in range(20_000):
             publish_patiently(publisher, Odometry())
 
 
