@@ -197,7 +197,7 @@ def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(recor
     recorder.wait_until_recording()
     publisher = odometry(node, lockstep=True)
     recorder.process.send_signal(signal.SIGSTOP)
-    while recorder.process.status() != psutil.STATUS_STOPPED:
+    while psutil.Process(recorder.process.pid).status() != psutil.STATUS_STOPPED:
         time.sleep(0.01)
     with pytest.raises(LockstepError, match="a reader has taken nothing for 0"):
         for _ in range(20_000):

@@ -22,7 +22,8 @@ from fulmar_core.topics import ESTOP, STATUS, SWAP
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
-FIND_S, ANSWER_S, SAY_S = 3.0, 2.0, 1.0
+FIND_S = 7.0  # whose first announcements are lost announces himself again after 3 s
+HEAR_S, ANSWER_S, SAY_S = 3.0, 2.0, 1.0
 LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
 
 Answer = tuple[bool, str]  # whether it was done, and what was said
@@ -124,7 +125,7 @@ class Operator:
                     wire.publish(Bool(data=True))
                     if wire.get_subscription_count():
                         heard.add(space)
-            return now - began > (SAY_S if len(heard) == len(wires) else FIND_S)
+            return now - began > (SAY_S if len(heard) == len(wires) else HEAR_S)
 
         return heard, self.ask_all(services, say)
 
