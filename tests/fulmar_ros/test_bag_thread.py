@@ -120,7 +120,9 @@ def test_the_bag_tells_what_became_of_every_message(disk, tmp_path):
     assert recording == {"complete": True, "received": 50, "dropped": account.dropped}
 
 
-@pytest.mark.skipif(os.getuid() != 0, reason="only root may mount a small disk")
+@pytest.mark.skipif(
+    os.getuid() != 0, reason="only root may mount a small disk; the tests above refuse writes instead"
+)
 def test_on_a_disk_of_256_kb_the_bag_stays_readable_and_goes_on_when_there_is_room(tmp_path):
     """The real thing: a file system without room."""
     disk = tmp_path / "disk"

@@ -68,7 +68,9 @@ def test_torch_plays_every_task_as_numpy_does(name):
     assert_alike(load_robot("leatherback"), load_task(name), "float64", "cpu")
 
 
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics card")
+@pytest.mark.skipif(
+    not torch.cuda.is_available(), reason="no CUDA device; the same comparison on the processor runs above"
+)
 @pytest.mark.parametrize("dtype", CLOSE)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_graphics_card_moves_every_robot_as_numpy_does(name, dtype):

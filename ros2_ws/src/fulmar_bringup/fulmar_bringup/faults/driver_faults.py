@@ -5,8 +5,9 @@ from __future__ import annotations
 import signal
 
 from fulmar_bringup.faults.fault import Fault
-from fulmar_bringup.faults.finding import Outcome, stopped
+from fulmar_bringup.faults.finding import Outcome
 from fulmar_bringup.faults.live_system import LiveSystem
+from fulmar_bringup.faults.process_faults import signalled
 from fulmar_bringup.faults.surroundings import Surroundings
 from fulmar_core.robot import Robot
 from hardware_drivers.settings import KingfisherNmea, Kobuki, hardware_of, load_hardware
@@ -28,10 +29,8 @@ def driver_hangs(live: LiveSystem) -> Outcome:
 
 
 def _driver(live: LiveSystem, number: signal.Signals) -> Outcome:
-    since_s = live.until_it_moves()
-    live.send("plant", number)
     own_s = OWN_TIMEOUT_S[type(load_hardware(live.plan.hardware).driver)]
-    return stopped(live, since_s, own_s + live.tick_s + REPORTS_S)
+    return signalled(live, "plant", number, own_s + live.tick_s + REPORTS_S)
 
 
 def _why_not(robot: Robot) -> str:
@@ -39,7 +38,7 @@ def _why_not(robot: Robot) -> str:
     if not files:
         return f"there is no driver for '{robot.name}'"
     if type(load_hardware(files[0]).driver) not in OWN_TIMEOUT_S:
-        return "its device has no watchdog of its own: valves stay as they were, and only hardware can help"
+        return "its device has no watchdog of its own: only hardware can close the valves then"
     return ""
 
 

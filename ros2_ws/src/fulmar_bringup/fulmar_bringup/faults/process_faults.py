@@ -27,32 +27,32 @@ COMPLAINT_S = 10.0  # a recorder looks at its disk now and then
 
 def controller_killed(live: LiveSystem) -> Outcome:
     """SIGKILL of the node that commands."""
-    return _stops(live, "controller", signal.SIGKILL, live.silenced_s)
+    return signalled(live, "controller", signal.SIGKILL, live.silenced_s)
 
 
 def controller_hangs(live: LiveSystem) -> Outcome:
     """SIGSTOP of the node that commands."""
-    return _stops(live, "controller", signal.SIGSTOP, live.silenced_s)
+    return signalled(live, "controller", signal.SIGSTOP, live.silenced_s)
 
 
 def estop_killed(live: LiveSystem) -> Outcome:
     """SIGKILL of the e-stop: its silence counts as pressed."""
-    return _stops(live, "estop", signal.SIGKILL, ESTOP_S + live.tick_s + live.ramp_s)
+    return signalled(live, "estop", signal.SIGKILL, ESTOP_S + live.tick_s + live.ramp_s)
 
 
 def estop_hangs(live: LiveSystem) -> Outcome:
     """SIGSTOP of the e-stop."""
-    return _stops(live, "estop", signal.SIGSTOP, ESTOP_S + live.tick_s + live.ramp_s)
+    return signalled(live, "estop", signal.SIGSTOP, ESTOP_S + live.tick_s + live.ramp_s)
 
 
 def estimator_killed(live: LiveSystem) -> Outcome:
     """SIGKILL of the node that says where the robot is."""
-    return _stops(live, "estimator", signal.SIGKILL, live.watchdog_s + live.corrected_s)
+    return signalled(live, "estimator", signal.SIGKILL, live.watchdog_s + live.corrected_s)
 
 
 def estimator_hangs(live: LiveSystem) -> Outcome:
     """SIGSTOP of the node that says where the robot is."""
-    return _stops(live, "estimator", signal.SIGSTOP, live.watchdog_s + live.corrected_s)
+    return signalled(live, "estimator", signal.SIGSTOP, live.watchdog_s + live.corrected_s)
 
 
 def mocap_lost(live: LiveSystem) -> Outcome:
@@ -63,7 +63,8 @@ def mocap_lost(live: LiveSystem) -> Outcome:
     return stopped(live, since_s, bridge_s + live.watchdog_s + live.corrected_s)
 
 
-def _stops(live: LiveSystem, name: str, number: signal.Signals, limit_s: float) -> Outcome:
+def signalled(live: LiveSystem, name: str, number: signal.Signals, limit_s: float) -> Outcome:
+    """Send a signal to one process while the robot moves; the robot has to stop within the limit [s]."""
     since_s = live.until_it_moves()
     live.send(name, number)
     return stopped(live, since_s, limit_s)
