@@ -100,7 +100,7 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
     if calibration is not None and calibration != (job.out / CALIBRATION_FILE).absolute():
         (job.out / CALIBRATION_FILE).write_bytes(calibration.read_bytes())
     train(
-        load_robot(job.robot),
+        job.settings.learner_of(load_robot(job.robot)),
         load_task(job.task),
         job.settings,
         seed=job.seed,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -156,6 +156,7 @@ class TrainingSettings:
     )
     mirror: bool = False  # goals on the right are shown, and answered, as on the left
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
+    control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
     def __post_init__(self) -> None:
         """Refuse sizes that do not divide."""
@@ -174,6 +175,19 @@ class TrainingSettings:
             )
         if min(self.worlds, self.threads) < 1 or self.time_limit_s <= 0.0:
             raise ValueError("'worlds' and 'threads' must be at least 1, 'time_limit_s' greater than 0.")
+
+    def learner_of(self, robot: Robot) -> Robot:
+        """The robot as it learns: with the rate of the commands that is asked for.
+
+        Raises:
+            ConfigError: The rate does not divide that of the robot's physics.
+        """
+        if self.control_hz is None:
+            return robot
+        try:
+            return replace(robot, timing=replace(robot.timing, control_hz=self.control_hz))
+        except ValueError as error:
+            raise ConfigError(f"'{robot.name}' cannot be commanded at this rate: {error}") from error
 
     def strength(self, progress: float) -> float:
         """Strength of the scenario when this share of the run is over [-]."""

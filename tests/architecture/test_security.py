@@ -133,7 +133,7 @@ def test_children_are_found_on_this_host_alone_unless_the_environment_asks_other
 
 def test_a_node_that_is_started_by_hand_stays_on_this_host_too():
     code = (
-        "import os; from fulmar_ros.runtime import stay_on_this_host; stay_on_this_host();"
+        "import os; from fulmar_ros.middleware import set_up_middleware; set_up_middleware();"
         "print(os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'])"
     )
     env = {key: value for key, value in os.environ.items() if key != "ROS_AUTOMATIC_DISCOVERY_RANGE"}

@@ -115,6 +115,18 @@ def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):
     assert "success 0.875 of 16 episodes in MuJoCo" in told
 
 
+def test_the_rate_of_the_commands_may_be_another_than_the_robot_s(learned, tmp_path):
+    from fulmar_core.robot import load_robot
+
+    assert call(train, *PLATFORM, "--control-hz", 50, "--out", tmp_path / "run")[0] == 0
+    (job,) = learned
+    assert job.settings.learner_of(load_robot(job.robot)).timing.control_hz == 50.0
+    with pytest.raises(ConfigError, match="must divide the physics rate"):
+        call(train, *PLATFORM, "--control-hz", 7, "--out", tmp_path / "other")
+    with pytest.raises(ConfigError, match="--resume"):
+        call(train, "--resume", tmp_path / "run", "--control-hz", 50)
+
+
 def test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path):
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task

@@ -12,7 +12,9 @@ from sensor_msgs.msg import JointState
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
+from fulmar_core.health.informer import Informer
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ACTUATORS_HEALTH, COMMAND
 from fulmar_ros.controller_node import ControllerNode
@@ -56,6 +58,26 @@ def test_a_valve_that_stays_closed_is_in_the_bag_of_its_run(ros_domain: RosDomai
     assert np.any(used & dead)
     assert np.all(last[used & dead] < 0.2)
     assert np.all(last[~dead] > 0.5)
+
+
+@pytest.mark.real_time
+def test_a_command_does_not_wait_for_a_health_that_only_a_recorder_wants(
+    stream: Stream, controller: ControllerNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else recording would make the control loop slower."""
+    answered = []
+
+    def see(measurement: Measurement, _command: np.ndarray, _informer: Informer, *, wanted: bool) -> None:
+        answered.append(wanted and controller._answered_ns == measurement.stamp_ns)
+
+    monkeypatch.setattr(controller._actuators, "see", see)
+    stream.neighbour.node.create_subscription(
+        JointState, ACTUATORS_HEALTH.name, lambda _message: None, subscriber_qos(ACTUATORS_HEALTH)
+    )
+    until(lambda: controller.wires.health_wanted)
+    answered.clear()
+    until(lambda: len(answered) > 5)
+    assert all(answered[1:])
 
 
 @pytest.mark.real_time

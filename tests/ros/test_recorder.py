@@ -222,8 +222,8 @@ from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from fulmar_core.topics import ODOMETRY
 from fulmar_ros.qos import publisher_qos
-from fulmar_ros.runtime import repair_losses_soon
-repair_losses_soon()
+from fulmar_ros.middleware import set_up_middleware
+set_up_middleware()
 rclpy.init()
 node = rclpy.create_node("talker", namespace=sys.argv[1])
 publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))

@@ -19,6 +19,7 @@ from typing import IO
 import psutil
 
 from fulmar_bringup.node_table import NodeSpec, Parameter
+from fulmar_ros.middleware import middleware_environment
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
 LAST_WORDS_S = 1.0  # for what a child that ended has left in the pipe; a grandchild may keep it open
@@ -131,7 +132,7 @@ def command_line(spec: NodeSpec) -> list[str]:
 def child_environment() -> dict[str, str]:
     """Environment that every node gets: local discovery unless asked otherwise, one thread for linear algebra."""
     return {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
+        **middleware_environment(),
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
         "PYTHONUNBUFFERED": "1",

@@ -16,9 +16,9 @@ from rclpy.task import Future
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
-from fulmar_bringup.processes import child_environment
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP, STATUS, SWAP
+from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
@@ -180,8 +180,7 @@ class Operator:
 @contextlib.contextmanager
 def operator() -> Iterator[Operator]:
     """An operator whose node spins until the context ends."""
-    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    os.environ[key] = child_environment()[key]
+    set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     errors: list[Exception] = []
     node = rclpy.create_node(f"operator_{os.getpid()}")

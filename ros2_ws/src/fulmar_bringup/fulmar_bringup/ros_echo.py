@@ -11,6 +11,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
 from fulmar_core.topics import METADATA
+from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
@@ -26,6 +27,7 @@ def round_trip_ms(timeout_s: float = 5.0) -> float | None:
     Returns:
         Time [ms], or None if a message did not come.
     """
+    set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node("doctor", namespace="/fulmar_doctor")

@@ -30,9 +30,10 @@ def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], No
     def alive() -> None:
         raise_if_ended(group)
         if time.monotonic() - began_s > START_TIMEOUT_S:
-            said = overseer.controller.message or "nothing"
+            plant, controller = (each.message or "nothing" for each in (overseer.plant, overseer.controller))
             raise RunFailed(
-                f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the controller said: {said}). "
+                f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the plant said: {plant}; "
+                f"the controller said: {controller}). "
                 "Is another system running in this ROS domain? Try `fulmar doctor`."
             )
 

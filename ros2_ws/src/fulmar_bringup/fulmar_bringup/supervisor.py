@@ -6,7 +6,6 @@ The only module of the bringup that speaks ROS while a run is on. What came of t
 from __future__ import annotations
 
 import contextlib
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -20,15 +19,15 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_bringup.processes import child_environment
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_ros.goal_messages import TYPES, goal_message, obstacles_message
+from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import repair_losses_soon, spinning
+from fulmar_ros.runtime import spinning
 
 START_TIMEOUT_S = 30.0
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
@@ -169,9 +168,7 @@ class Supervisor:
 @contextlib.contextmanager
 def supervisor(robot: str, task: Task) -> Iterator[Supervisor]:
     """A supervisor that listens in a thread of its own until the context ends."""
-    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    os.environ[key] = child_environment()[key]
-    repair_losses_soon()
+    set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("supervisor", namespace=f"/{robot}")
     try:

@@ -18,6 +18,7 @@ from visualization_msgs.msg import MarkerArray
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode, arbitrate
@@ -344,14 +345,13 @@ class ControllerNode(LifecycleNode):
                 decision = self._arbitrate()
                 self._begin_anew()
                 observation = self._observe(measurement) if decision.may_act and measurement else None
-            health = self._watch(measurement) if measurement else None
+            before, informer = self._answer, self._succession.current.informer
+            health = self._watch(measurement, before, informer) if informer.listens else None
             if observation is not None:
                 command, action, problem = self._act(observation)
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
             self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
             return
-        if health is not None:
-            self.wires.publish_actuators_health(health, stamp)
         speaks = action is not None or decision.mode is not Mode.IDLE
         if speaks and not self._speak(partial(self.wires.publish_command, command, stamp)):
             return
@@ -362,6 +362,10 @@ class ControllerNode(LifecycleNode):
             self._judge(problem)
             self._acted += 1
             self._set(active_s=self._acted * self._control_ns / 1e9)
+        if not informer.listens:  # only for others: the command does not wait for it
+            health = self._watch(measurement, before, informer)
+        if health is not None:
+            self.wires.publish_actuators_health(health, stamp)
         self._tell_status(decision)
 
     def _speak(self, publish: Callable[[], None]) -> bool:
@@ -383,9 +387,12 @@ class ControllerNode(LifecycleNode):
             self.controller.reset()
         self._anew, self._acted_epoch = False, self._epoch
 
-    def _watch(self, measurement: Measurement) -> np.ndarray | None:
-        informer = self._succession.current.informer
-        return self._actuators.see(measurement, self._answer, informer, wanted=self.wires.health_wanted)
+    def _watch(
+        self, measurement: Measurement | None, command: np.ndarray, informer: Informer
+    ) -> np.ndarray | None:
+        if measurement is None:
+            return None
+        return self._actuators.see(measurement, command, informer, wanted=self.wires.health_wanted)
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""

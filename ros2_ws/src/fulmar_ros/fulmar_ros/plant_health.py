@@ -29,12 +29,14 @@ class PlantHealth:
     Attributes:
         mode: inactive, waiting, running, stopping, finished or fault.
         reason: Why it is in fault, or could not be configured.
+        awaited: Subscribers without whom it does not begin.
         more: What a device has to tell by itself; see `Device.health`.
     """
 
     def __init__(self, robot: str) -> None:
         """Begin inactive."""
         self.mode, self.reason = "inactive", ""
+        self.awaited = 0
         self._robot = robot
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
@@ -105,6 +107,8 @@ class PlantHealth:
         if self._guard.last_rejection:
             count = self._guard.rejected
             return "warn", f"{count} commands refused, the last: {self._guard.last_rejection}", "refused"
+        if self.mode == "waiting" and self.awaited:
+            return "ok", f"waiting: {self._wires.subscribers()} of {self.awaited} listen", ""
         return "ok", self.mode, ""
 
     def _estop(self) -> tuple[str, str, str] | None:

@@ -73,6 +73,7 @@ class PlantNode(LifecycleNode):
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self.health = PlantHealth(self.robot.name)
+        self.health.awaited = self.settings.wait_for_subscribers
         timeout_s = self.settings.timeout_s(self.robot)
         if timeout_s == 0.0:
             self.get_logger().warning(

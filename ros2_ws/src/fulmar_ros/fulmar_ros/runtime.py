@@ -16,7 +16,6 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -28,6 +27,7 @@ from rclpy.task import Future
 
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
+from fulmar_ros.middleware import set_up_middleware
 
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
@@ -68,8 +68,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     end_with_parent()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
-    stay_on_this_host()
-    repair_losses_soon()
+    set_up_middleware()
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot read
@@ -83,21 +82,6 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         return BAD_USAGE
     finally:
         rclpy.try_shutdown()
-
-
-def stay_on_this_host() -> None:
-    """Let nobody on the network find this process, unless the environment asks for it; call before `rclpy.init`."""
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-
-
-def repair_losses_soon() -> None:
-    """Let Fast DDS send again soon what got lost, unless the environment sets it up; call before `rclpy.init`."""
-    names = (
-        "FASTRTPS_DEFAULT_PROFILES_FILE",
-        "FASTDDS_DEFAULT_PROFILES_FILE",
-    )  # Jazzy's, and that of later ones
-    if not any(name in os.environ for name in names):
-        os.environ |= dict.fromkeys(names, str(Path(__file__).with_name("fast_dds.xml")))
 
 
 def end_with_parent() -> None:

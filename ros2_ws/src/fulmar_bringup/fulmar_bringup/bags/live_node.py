@@ -43,6 +43,7 @@ from fulmar_core.topics import (
 )
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.message_reader import stamp_ns
+from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
@@ -137,6 +138,7 @@ class _Heard:
 
 
 def _exchange(raw: dict[str, list[bytes]], course: Course, group: ProcessGroup) -> tuple[Answers, str | None]:
+    set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node("plant", namespace=f"/{course.robot.name}")

@@ -22,6 +22,7 @@ from fulmar_bringup.bags.decode import stamps_ns
 from fulmar_core.errors import BagError, ConfigError, UnknownNameError
 from fulmar_core.topics import CLOCK, ODOMETRY, WIRES
 from fulmar_ros.convert import stamp_of
+from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import spinning
 
@@ -173,6 +174,7 @@ def play(
         BagError: No type of any topic is installed.
     """
     stop = stop or threading.Event()
+    set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("bag_player")
     try:

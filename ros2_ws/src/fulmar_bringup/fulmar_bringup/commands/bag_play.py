@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Annotated
 
 import typer
@@ -40,12 +39,9 @@ def play(
     Try, with a controller listening: fulmar bag play runs/demo_x/lqr --topic odom --topic goal_pose --clock
     """
     from fulmar_bringup.extras import require
-    from fulmar_bringup.processes import child_environment
 
     require("rclpy")
     opened = open_and_warn(bag)
-    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    os.environ.setdefault(key, child_environment()[key])
     from fulmar_bringup.bags.player import play as publish
     from fulmar_bringup.bags.player import schedule
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Annotated
 
 import typer
@@ -51,7 +50,7 @@ def goals(
     if robot is None:
         raise ConfigError(f"whose goals? Example: fulmar goals {name} --robot floating_platform")
     from fulmar_bringup.node_table import goals_spec
-    from fulmar_bringup.processes import child_environment, command_line
+    from fulmar_bringup.processes import command_line
     from fulmar_core.goal_files import load_goals
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
@@ -60,8 +59,6 @@ def goals(
         load_goals(name), load_robot(robot), as_path=as_path
     )  # whatever is wrong is said in one line
     spec = goals_spec(robot, name, as_path=as_path, control_hz=control_hz)
-    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    os.environ.setdefault(key, child_environment()[key])
     from fulmar_ros.goal_node import GoalNode
     from fulmar_ros.runtime import run_node
 

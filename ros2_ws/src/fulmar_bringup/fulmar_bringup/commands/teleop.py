@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Annotated
 
 import typer
@@ -39,7 +38,7 @@ def teleop(
     fulmar teleop kingfisher --no-keyboard --share 1
     """
     from fulmar_bringup.node_table import NodeSpec
-    from fulmar_bringup.processes import child_environment, command_line
+    from fulmar_bringup.processes import command_line
     from fulmar_core.robot import load_robot
     from fulmar_core.topics import GIVE_BACK
 
@@ -59,8 +58,6 @@ def teleop(
         "share": share,
     }
     spec = NodeSpec("teleop", "fulmar_ros", "teleop_node", "fulmar_ros.teleop_node", f"/{robot}", parameters)
-    key = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    os.environ.setdefault(key, child_environment()[key])
     from fulmar_ros.runtime import run_node
     from fulmar_ros.teleop_node import TeleopNode
 

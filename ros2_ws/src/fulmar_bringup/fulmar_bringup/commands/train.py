@@ -50,6 +50,12 @@ def train(
             metavar="NAME", help="A file of configs/training, or a path; by robot and task by default."
         ),
     ] = None,
+    control_hz: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ", help="Rate of the commands; the settings', or the robot's own by default."
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run folder; runs/train/<time>... by default.")
     ] = None,
@@ -84,6 +90,8 @@ def train(
     fulmar train turtlebot2 go_to_position --seeds 5
 
     fulmar train --resume runs/train/mine --time-limit 300
+
+    fulmar train floating_platform go_to_pose --control-hz 50 --updates 20
     """
     from training.jobs import Job
 
@@ -91,6 +99,8 @@ def train(
         require("wandb")
     if executor not in ("local", "ray"):
         raise ConfigError(f"--executor {executor}: must be local or ray.")
+    if control_hz is not None and resume:
+        raise ConfigError("--resume goes on at the rate that the run began with; leave --control-hz out.")
     if calibration is not None:
         if resume:
             raise ConfigError(
@@ -116,6 +126,8 @@ def train(
 
         enough = StopAtSuccess(stop_at_success)
         job = replace(job, settings=replace(job.settings, stop_at_success=enough))
+    if control_hz is not None:
+        job = _commanded_at(job, control_hz)
     job = replace(job, name=f"{job.robot}_{job.task}_{job.seed}")
     if resume and seeds > 1:
         raise ConfigError(
@@ -125,6 +137,14 @@ def train(
         _one(job, as_json=as_json)
     else:
         _campaign(job, seeds, _executor(executor, address), as_json=as_json)
+
+
+def _commanded_at(job: Job, control_hz: float) -> Job:
+    from fulmar_core.robot import load_robot
+
+    settings = replace(job.settings, control_hz=control_hz)
+    settings.learner_of(load_robot(job.robot))  # whatever is wrong is said before anything starts
+    return replace(job, settings=settings)
 
 
 def _asked(

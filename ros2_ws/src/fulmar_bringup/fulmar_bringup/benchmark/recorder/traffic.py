@@ -19,8 +19,8 @@ from fulmar_core.robot import Robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.deadline import Deadlines
+from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos
-from fulmar_ros.runtime import repair_losses_soon
 
 ODOMETRY_HZ, EVERY = 200.0, 4  # commands: every fourth
 MATCH_TIMEOUT_S = 30.0
@@ -77,7 +77,7 @@ class Traffic:
 @contextlib.contextmanager
 def traffic(robot: Robot) -> Iterator[Traffic]:
     """Traffic that has not begun, in the ROS domain of the environment; it ends with the context."""
-    repair_losses_soon()
+    set_up_middleware()
     context = rclpy.Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("traffic", namespace=f"/{robot.name}", context=context)
