@@ -112,7 +112,7 @@ def _ros_round_trip() -> Finding:
     return Finding("ROS 2 publish and receive", True, f"{best:.2f} ms (median) in domain {domain}")
 
 
-_ROS_ADVICE = "Is loopback up, and does no firewall stop UDP on it? Try another ROS_DOMAIN_ID."
+_ROS_ADVICE = "Is loopback up and /dev/shm writable, and not full? Try another ROS_DOMAIN_ID."
 
 
 def _timing() -> Finding:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from fulmar_bringup.abandoned_memory import give_back_abandoned_memory
 from fulmar_bringup.environment import environment
 from fulmar_core.errors import ConfigError
 
@@ -71,6 +72,7 @@ def claimed_domain() -> Iterator[int]:
                 f"another `fulmar run` is using ROS domain {domain}, and two in one domain would mix. "
                 "Wait for it to end, or set ROS_DOMAIN_ID to another number."
             )
+        give_back_abandoned_memory()
         yield domain
 
 

@@ -32,7 +32,7 @@ def recorder(
     ] = 600.0,
     lockstep_hz: Annotated[
         float, typer.Option(metavar="HZ", min=0.1, help="Lock step: steps a simulated second.")
-    ] = 10.0,
+    ] = 25.0,
     lockstep_s: Annotated[
         float, typer.Option(metavar="S", min=1.0, help="Lock step: simulated seconds.")
     ] = 1500.0,

@@ -106,6 +106,7 @@ class _Search:
         self._weight = windows.valid[:, :, None] * np.ones(3)
         self._prior = [_prior(model, each) for each in known]
 
+    @np.errstate(over="ignore", invalid="ignore")  # a step whose prediction leaves all bounds is taken back
     def run(self, place: np.ndarray) -> np.ndarray:
         """Search from `place`; returns where the cost is least."""
         own, damping = self._own, 1e-3
@@ -236,8 +237,7 @@ class _Search:
     def _residuals(self, places: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Same for copies: places (p, copies), own (q, copies, w)."""
         values = {u.name: u.from_search(places[i])[:, None] for i, u in enumerate(self.model.unknowns)}
-        with np.errstate(over="ignore", invalid="ignore"):
-            grid = self.model.predict(values, own, self.windows)
+        grid = self.model.predict(values, own, self.windows)
         return np.asarray((self.windows.pose - self.windows.at_measurements(grid)) / self.sigma)
 
     def _slopes(self, place: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,0 +1,43 @@
+"""What killed processes leave in shared memory is given back, and nothing else."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+
+from fulmar_bringup.abandoned_memory import give_back_abandoned_memory
+
+SEGMENT, PORT = "fastrtps_0123456789abcdef", "fastrtps_port7411"
+
+
+def left(folder, *names, age_s=60.0):
+    then = time.time() - age_s
+    for name in names:
+        (folder / name).write_bytes(b"x")
+        os.utime(folder / name, (then, then))
+
+
+def test_what_nobody_holds_is_given_back_with_all_that_belongs_to_it(tmp_path):
+    left(tmp_path, SEGMENT, f"{SEGMENT}_el", PORT, f"{PORT}_el", f"sem.{PORT}_mutex")
+    assert give_back_abandoned_memory(tmp_path) == 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_a_living_process_holds_stays(tmp_path):
+    left(tmp_path, SEGMENT, f"{SEGMENT}_el")
+    with (tmp_path / f"{SEGMENT}_el").open() as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert give_back_abandoned_memory(tmp_path) == 0
+    assert (tmp_path / SEGMENT).exists()
+
+
+def test_what_has_just_been_made_and_what_others_made_stays(tmp_path):
+    left(tmp_path, SEGMENT, f"{SEGMENT}_el", age_s=0.0)
+    left(tmp_path, "sem.mp-abcdefgh", "fastrtps_notes_el", "psm_01234567")
+    assert give_back_abandoned_memory(tmp_path) == 0
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+def test_where_there_is_none_nothing_happens(tmp_path):
+    assert give_back_abandoned_memory(tmp_path / "none") == 0
