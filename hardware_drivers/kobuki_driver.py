@@ -25,6 +25,7 @@ from hardware_drivers.kobuki_protocol import (
 )
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import Kobuki
+from hardware_drivers.standing_wheels import StandingWheels
 from hardware_drivers.wheel_odometry import WheelOdometry
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous
@@ -50,6 +51,7 @@ class KobukiDriver:
         self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
+        self._standing = StandingWheels()
         self._begin: tuple[float, float, float] | None = None
         self._core: CoreSensors | None = None
         self._sent = robot.actuators.safe_command
@@ -133,6 +135,9 @@ class KobukiDriver:
         begin, stamp_ns = self._begin, self._time.stamp_ns(core.time_ms, now_ns)
         if begin is not None:
             self._odometry.begin(*begin)
+        rims = self.robot.actuators.wheel_speeds(self._sent) * WHEEL_RADIUS
+        if problem := self._standing.problem(rims, np.array((core.left, core.right)), stamp_ns / 1e9):
+            self._feedback.fail(problem)
         rate = math.radians(inertia.rate)
         gyro = math.radians(inertia.angle)
         state = self._odometry.see(core.left, core.right, gyro, rate, stamp_ns / 1e9)

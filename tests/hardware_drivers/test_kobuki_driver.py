@@ -91,6 +91,22 @@ def test_what_touches_stops_the_base_which_may_only_back_off(bench, driver, what
     assert "only backs off" in driver.health()["warning"]
 
 
+@pytest.mark.parametrize("frozen", [0, 1])
+def test_an_encoder_that_stands_while_its_wheel_is_told_to_turn_ends_the_run(bench, driver, frozen):
+    turning = bench.device._wheels
+    drive(driver, (0.2, 0.0), 0.3)
+    stood = turning()[frozen]
+    bench.device._wheels = lambda: tuple(stood if i == frozen else angle for i, angle in enumerate(turning()))
+    with pytest.raises(DeviceError, match="its encoder has stood for 1 s"):
+        drive(driver, (0.2, 0.0), 3.0)
+
+
+def test_a_base_that_is_told_to_stand_may_stand_for_ever(driver):
+    drive(driver, (0.2, 0.0), 0.3)
+    drive(driver, (0.0, 0.0), 1.5)
+    assert drive(driver, (0.2, 0.0), 0.3).odometry is not None
+
+
 def test_a_wheel_in_the_air_stops_everything(bench, driver):
     bench.device.wheel_drops = 1
     until(lambda: not driver.step(np.array([-0.3, 0.0])).applied.any())

@@ -138,6 +138,14 @@ def test_an_answer_to_what_is_older_than_the_watchdog_opens_no_valve_and_does_no
     assert guard.watchdog.silent_ns(1) == 0
 
 
+def test_the_safe_command_is_taken_at_once_however_old_what_it_answers_is(guard):
+    """A controller whose sensor fell silent answers the last that it saw: then the valves close, no later."""
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS)
+    assert guard.offer(NAMES, [0.0] * 8, 150 * MS, stamp_ns=5000 * MS, outdated=True)
+    assert not guard.output(151 * MS).any()
+    assert not guard.offer(NAMES, GOOD, 152 * MS, stamp_ns=5000 * MS, outdated=True)
+
+
 def test_in_lock_step_no_answer_is_too_old_since_time_stands_still():
     guard = ActuatorGuard(THRUSTERS, Watchdog(200 * MS), lockstep=True)
     assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS, outdated=True)

@@ -80,7 +80,7 @@ class ActuatorGuard:
         """Take a controller's command if it can be carried out and no person has the actuators.
 
         A refused command does not feed the watchdog: a controller that sends nothing but nonsense, or what it should
-        have said long ago, counts as silent.
+        have said long ago, counts as silent. The safe command is taken however old the observation is.
 
         Args:
             names: Actuator names as sent.
@@ -96,6 +96,7 @@ class ActuatorGuard:
             return False
         if self.watchdog.silent_ns(now_ns) > LEFTOVERS_NS:
             self._stamp_ns = 0  # one stray stamp from the future must not lock everybody out for good
+        outdated = outdated and not self._is_safe(values)  # it comes late where a sensor fell silent
         if not self._check(names, values, self._stamp_problem(stamp_ns or 0, outdated=outdated)):
             return False
         answers_anew = bool(stamp_ns) and (stamp_ns or 0) > self._stamp_ns
@@ -166,7 +167,11 @@ class ActuatorGuard:
         """Whether a person who has just given back would take the actuators with a safe command that came late."""
         if self._given_back_ns is None or now_ns - self._given_back_ns > LAST_WORDS_NS:
             return False
-        return bool(np.all(np.asarray(values, dtype=float) == self._actuators.safe_command))
+        return self._is_safe(values)
+
+    def _is_safe(self, values: Sequence[float]) -> bool:
+        safe = self._actuators.safe_command
+        return len(values) == len(safe) and bool(np.all(np.asarray(values, dtype=float) == safe))
 
     def _check(self, names: Sequence[str], values: Sequence[float], problem: str | None) -> bool:
         count = len(self._actuators.names)
