@@ -30,7 +30,7 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
             yaw = float(yaw_of(motion.quat_xyzw[judgement.samples[index]]))
             _body(axes, xy[index], yaw, radius, run.colour)
         if order == 0:
-            axes.text(xy[0, 0], xy[0, 1] + 1.15 * radius, "start", ha="center", va="bottom")
+            _word(axes, "start", xy[0], radius, va="bottom")
             for x, y, disc in run.record.obstacles:
                 axes.add_patch(Circle((x, y), disc, facecolor=FAINT, alpha=0.55, linewidth=0, zorder=3))
         if not np.isnan(judgement.block).all():
@@ -44,8 +44,7 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
             for target in _given(judgement):
                 _goal(axes, judgement, target, radius)
             if order == 0:
-                x, y, _ = judgement.targets[-1]
-                axes.text(x, y - 1.15 * radius, "goal", ha="center", va="top")
+                _word(axes, "goal", judgement.targets[-1, :2], -radius, va="top")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     axes.margins(0.1)
@@ -78,6 +77,13 @@ def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
 def has_place(judgement: Judgement) -> bool:
     """Whether the goal is one place in the world."""
     return judgement.task.goal_topic in ("goal_pose", "goal_point")
+
+
+def _word(axes: Axes, text: str, place: np.ndarray, away: float, *, va: str) -> None:
+    """A word so far above a place, or below it, with room for it within the axes."""
+    x, y = place
+    axes.text(x, y + 1.15 * away, text, ha="center", va=va)
+    axes.plot(x, y + 1.5 * away, linestyle="none")
 
 
 def _waypoints(axes: Axes, judgement: Judgement, *, named: bool) -> None:
