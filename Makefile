@@ -96,11 +96,10 @@ policies: dev ## Make the shipped policies that are missing or out of date (unde
 replay-bags: dev ## Record the reference bags of the tests anew, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
 
-# What keeps the time of the wall clock runs alone, all else on two cores. 5: nothing of a part was asked for. Once in some
-# thousand starts the middleware does not match two endpoints; a run that ended for it says so, and is told again.
+# What keeps the time of the wall clock runs alone, all else on two cores. 5: nothing of a part was asked for.
 define run_tests
 code=5; \
-run() { $(BIN)/python -m pytest --reruns 1 --only-rerun "did not get ready within" "$$@" $(PYTEST_ARGS); }; \
+run() { $(BIN)/python -m pytest "$$@" $(PYTEST_ARGS); }; \
 for part in "not real_time" real_time; do \
 	last=0; \
 	if [ $$part = real_time ]; then run tests/ros -m "$$part$(1)" || last=$$?; \

@@ -19,8 +19,8 @@ def left(folder, *names, age_s=60.0):
 
 
 def test_what_nobody_holds_is_given_back_with_all_that_belongs_to_it(tmp_path):
-    left(tmp_path, SEGMENT, f"{SEGMENT}_el", PORT, f"{PORT}_el", f"sem.{PORT}_mutex")
-    assert give_back_abandoned_memory(tmp_path) == 2
+    left(tmp_path, SEGMENT, f"{SEGMENT}_el")
+    assert give_back_abandoned_memory(tmp_path) == 1
     assert not list(tmp_path.iterdir())
 
 
@@ -34,9 +34,18 @@ def test_what_a_living_process_holds_stays(tmp_path):
 
 def test_what_has_just_been_made_and_what_others_made_stays(tmp_path):
     left(tmp_path, SEGMENT, f"{SEGMENT}_el", age_s=0.0)
-    left(tmp_path, "sem.mp-abcdefgh", "fastrtps_notes_el", "psm_01234567")
+    left(tmp_path, "sem.mp-abcdefgh", "fastrtps_notes_el", "psm_01234567", PORT, f"{PORT}_el")
     assert give_back_abandoned_memory(tmp_path) == 0
-    assert len(list(tmp_path.iterdir())) == 5
+    assert len(list(tmp_path.iterdir())) == 7
+
+
+def test_what_another_user_left_stays(tmp_path, monkeypatch):
+    """Also where we are root and could remove it."""
+    left(tmp_path, SEGMENT, f"{SEGMENT}_el")
+    stranger = os.getuid() + 1
+    monkeypatch.setattr(os, "getuid", lambda: stranger)
+    assert give_back_abandoned_memory(tmp_path) == 0
+    assert (tmp_path / SEGMENT).exists()
 
 
 def test_where_there_is_none_nothing_happens(tmp_path):

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import os
 import re
 import time
 from pathlib import Path
 
 SHARED_MEMORY = Path("/dev/shm")
-LOCK = re.compile(r"fastrtps_(?:port\d+|[0-9a-f]{16})_el")
+LOCK = re.compile(r"fastrtps_[0-9a-f]{16}_el")  # not of ports: several processes share one
 YOUNG_S = 10.0  # who has just made a file may not have locked it yet
 
 
@@ -29,12 +30,12 @@ def give_back_abandoned_memory(folder: Path = SHARED_MEMORY) -> int:
     removed = 0
     for lock in _locks(folder):
         with contextlib.suppress(OSError), lock.open() as held:  # somebody else's, or gone meanwhile
-            if time.time() - lock.stat().st_mtime < YOUNG_S:
+            about = lock.stat()
+            if about.st_uid != os.getuid() or time.time() - about.st_mtime < YOUNG_S:
                 continue
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            piece = lock.with_name(lock.name.removesuffix("_el"))
-            for each in (piece, lock.with_name(f"sem.{piece.name}_mutex"), lock):
-                each.unlink(missing_ok=True)
+            lock.with_name(lock.name.removesuffix("_el")).unlink(missing_ok=True)
+            lock.unlink(missing_ok=True)
             removed += 1
     return removed
 

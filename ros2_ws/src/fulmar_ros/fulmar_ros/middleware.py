@@ -8,9 +8,8 @@ from pathlib import Path
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 # Jazzy's name of the file, and that of later ones.
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-OWN_PROFILES = Path(__file__).with_name(
-    "fast_dds.xml"
-)  # says soon who is there, and sends again soon what got lost
+# Says soon who is there, and sends again soon what got lost.
+OWN_PROFILES = Path(__file__).with_name("fast_dds.xml")
 
 
 def middleware_environment() -> dict[str, str]:
