@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from nav_msgs.msg import Odometry
 
@@ -14,6 +15,7 @@ from fulmar_bringup.faults.fault import Fault
 from fulmar_bringup.faults.finding import STAYS_S, Outcome, stopped
 from fulmar_bringup.faults.live_system import LiveSystem
 from fulmar_bringup.faults.spoiler import Spoil, delayed, lost
+from fulmar_bringup.faults.surroundings import Surroundings
 from fulmar_core.safety.input_gate import FROZEN_AFTER
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.message_reader import stamp_ns
@@ -32,8 +34,8 @@ def _spoilt(live: LiveSystem, spoil: Spoil, detection_s: float) -> Outcome:
     return stopped(live, since_s, detection_s + live.corrected_s)
 
 
-def _changed(change: Callable[[Odometry], None]) -> Spoil:
-    def spoil(message: Odometry) -> Odometry:
+def _changed(change: Callable[[Any], None]) -> Spoil:
+    def spoil(message: Any) -> Any:
         change(message)
         return message
 
@@ -103,22 +105,29 @@ def odometry_late(live: LiveSystem) -> Outcome:
     return _spoilt(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
 
 
-def time_jump_forwards(live: LiveSystem) -> Outcome:
-    """The clock of the measurements is set."""
-    return _jump(live, FORWARD_NS)
-
-
-def time_jump_backwards(live: LiveSystem) -> Outcome:
-    """The same, back: for the plant, whose own clock did not jump, the answers come far too late."""
-    since_s = _leap(live, -BACKWARD_NS)
+def odometry_dated_back(live: LiveSystem) -> Outcome:
+    """Its stamps jump back, and no clock did: for the plant, answers to them come far too late."""
+    since_s = _until_mid_way(live)
+    live.spoiler.spoil = _stamped(-BACKWARD_NS)
     outcome = stopped(live, since_s, live.silenced_s)
     epoch, _ = _epoch(live, since_s)
     return replace(outcome, passed=outcome.passed and epoch not in ("", "0"))
 
 
+def time_jump_forwards(live: LiveSystem) -> Outcome:
+    """The clock of the plant is set, by which it stamps what it measures and reads what it is answered."""
+    return _jump(live, FORWARD_NS)
+
+
+def time_jump_backwards(live: LiveSystem) -> Outcome:
+    """The same, back."""
+    return _jump(live, -BACKWARD_NS)
+
+
 def _jump(live: LiveSystem, by_ns: int) -> Outcome:
     """A new epoch begins, in words, and the robot goes on in it."""
-    since_s = _leap(live, by_ns)
+    since_s = _until_mid_way(live)
+    live.spoiler.spoil, live.answers.spoil = _stamped(by_ns), _stamped(-by_ns)
     time.sleep(EPOCH_S)
     epoch, mode = _epoch(live, since_s)
     told = epoch not in ("", "0")
@@ -129,17 +138,18 @@ def _jump(live: LiveSystem, by_ns: int) -> Outcome:
     return Outcome("controller" if told else "", said, told and goes_on)
 
 
-def _leap(live: LiveSystem, by_ns: int) -> float:
-    """Let the stamps of the odometry jump under way, and say when [s]."""
-
-    def change(message: Odometry) -> None:
-        message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
-
+def _until_mid_way(live: LiveSystem) -> float:
+    """Let it go far enough for a jump back to end after the beginning of time, and say when that is [s]."""
     live.until_it_moves()
     time.sleep(BEFORE_S)
-    since_s = time.monotonic()
-    live.spoiler.spoil = _changed(change)
-    return since_s
+    return time.monotonic()
+
+
+def _stamped(by_ns: int) -> Spoil:
+    def change(message: Any) -> None:
+        message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
+
+    return _changed(change)
 
 
 def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
@@ -148,17 +158,19 @@ def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
     return (words[-1].values["epoch"], words[-1].values["mode"]) if words else ("", "silent")
 
 
-INPUT_FAULTS = tuple(
-    Fault(do)
-    for do in (
-        odometry_silent,
-        odometry_late,
-        odometry_frozen,
-        odometry_not_a_number,
-        odometry_in_a_wrong_frame,
-        odometry_with_a_wrong_quaternion,
-        odometry_out_of_order,
-        time_jump_forwards,
-        time_jump_backwards,
-    )
+INPUT_FAULTS = (
+    *(
+        Fault(do)
+        for do in (
+            odometry_silent,
+            odometry_late,
+            odometry_frozen,
+            odometry_not_a_number,
+            odometry_in_a_wrong_frame,
+            odometry_with_a_wrong_quaternion,
+            odometry_out_of_order,
+            odometry_dated_back,
+        )
+    ),
+    *(Fault(do, Surroundings(answers_pass=True)) for do in (time_jump_forwards, time_jump_backwards)),
 )

@@ -75,6 +75,7 @@ class LiveSystem:
         self.robot = robot
         self.witness = Witness(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
         self.spoiler = Spoiler(bystander, about.spoilt or command_wire(robot))
+        self._answers = Spoiler(bystander, command_wire(robot)) if about.answers_pass else None
         self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz
         self.watchdog_s = default_timeout(self.beat_s)
         actuators = robot.actuators
@@ -92,6 +93,12 @@ class LiveSystem:
         """The hosts that plant and controller are on; there must be two."""
         assert self._hosts is not None
         return self._hosts
+
+    @property
+    def answers(self) -> Spoiler:
+        """What commands pass through, beside the measurements; they must."""
+        assert self._answers is not None
+        return self._answers
 
     def begin(self) -> None:
         """Give the goal, and start the plant.
@@ -185,12 +192,10 @@ def _specs(request: RunRequest, about: Surroundings, robot: Robot, wires: Path) 
         *([run_goals_spec(plan)] if plan.goals else []),
         *([_teleop_spec(plan)] if about.by_hand else []),
     ]
-    wire = about.spoilt or command_wire(robot)
-    source = _publisher_of(wire, plan)
-    return [
-        replace(spec, remappings={wire.name: source_of(wire)}) if spec.name == source else spec
-        for spec in specs
-    ]
+    commands = command_wire(robot)
+    spoilt = [about.spoilt or commands, *([commands] if about.answers_pass else [])]
+    sources = {_publisher_of(wire, plan): {wire.name: source_of(wire)} for wire in spoilt}
+    return [replace(spec, remappings=sources[spec.name]) if spec.name in sources else spec for spec in specs]
 
 
 def _publisher_of(wire: Wire, plan: RunPlan) -> str:

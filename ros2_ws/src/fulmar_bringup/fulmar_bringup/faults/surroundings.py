@@ -24,6 +24,7 @@ class Surroundings:
 
     guards: Mapping[str, Any] = field(default_factory=dict)  # beside the e-stop
     spoilt: Wire | None = ODOMETRY  # the wire that passes through the spoiler; None: the robot's commands
+    answers_pass: bool = False  # the robot's commands, too, pass through a spoiler, of their own
     by_goal_node: bool = False  # a node of its own tells goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     emulated: bool = False  # a driver drives an emulated device
