@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import math
+import time
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 
 from fulmar_bringup.bags.contents import open_bag
 from fulmar_bringup.bags.decode import stamps_ns
+from fulmar_bringup.faults.finding import stopped
 from fulmar_bringup.faults.kept import kept_of
+from fulmar_bringup.faults.live_system import LiveSystem
+from fulmar_bringup.faults.surroundings import USUAL, request_of
 from fulmar_bringup.faults.witness import Word, first_complaint
 from fulmar_core.topics import ODOMETRY
 
@@ -35,6 +42,20 @@ def test_the_same_words_of_another_node_or_after_good_ones_are_new():
     assert first_complaint([word(99.5, "stale", "estimator"), word(100.5, "stale")], FAULT_S) is not None
     again = [word(99.0, "stale"), word(99.5, "running"), word(100.5, "stale")]
     assert first_complaint(again, FAULT_S) is not None
+
+
+@pytest.mark.parametrize("robot", ["floating_platform", "turtlebot2", "kingfisher"])
+@pytest.mark.parametrize("late_s", [-0.01, 0.01])
+def test_whether_a_robot_stopped_in_time_can_be_told_in_json(robot: str, late_s: float, tmp_path: Path):
+    live = LiveSystem(request_of(robot, tmp_path / "bag"), MagicMock(), MagicMock(), MagicMock(), USUAL, None)
+    since_s = time.monotonic() - 10.0
+    at_s = since_s + live.silenced_s + late_s
+    live.witness = MagicMock(
+        applied_since=lambda _: [(at_s - 0.02, True), (at_s, False)],
+        complaint_since=lambda _: word(at_s, "no command"),
+    )
+    told = json.loads(json.dumps(asdict(stopped(live, since_s, live.silenced_s))))
+    assert told["passed"] is (late_s < 0.0)
 
 
 @pytest.fixture(scope="module")

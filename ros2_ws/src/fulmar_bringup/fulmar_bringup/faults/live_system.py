@@ -81,7 +81,7 @@ class LiveSystem:
         actuators = robot.actuators
         pairs = zip(actuators.scale, actuators.response.slew, strict=False)
         # As fast as commands may change. A plant that stops by itself asks for it only where wheels would slide.
-        slew_s = max((most / rate for most, rate in pairs), default=0.0)
+        slew_s = max((float(most / rate) for most, rate in pairs), default=0.0)
         self.ramp_s = slew_s if isinstance(actuators, Rolling) else 0.0
         # From the last command to standstill.
         self.silenced_s = self.watchdog_s + self.tick_s + self.ramp_s
