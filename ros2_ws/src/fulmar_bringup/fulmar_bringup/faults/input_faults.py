@@ -109,7 +109,8 @@ def odometry_dated_back(live: LiveSystem) -> Outcome:
     """Its stamps jump back, and no clock did: for the plant, answers to them come far too late."""
     since_s = _until_mid_way(live)
     live.spoiler.spoil = _stamped(-BACKWARD_NS)
-    outcome = stopped(live, since_s, live.silenced_s)
+    # What was measured just before is answered with the next beat, and that answer counts.
+    outcome = stopped(live, since_s, live.silenced_s + live.beat_s)
     epoch, _ = _epoch(live, since_s)
     return replace(outcome, passed=outcome.passed and epoch not in ("", "0"))
 
