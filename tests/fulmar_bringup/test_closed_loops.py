@@ -48,6 +48,21 @@ def test_a_campaign_counts_what_succeeds_and_names_what_does_not(tmp_path: Path)
     assert figures["device"] == "none"
 
 
+@dataclass(frozen=True)
+class Broken(Recounted):
+    """A case whose run fails, while its recorder ends in good order."""
+
+    def prepared(self, seed: int) -> contextlib.AbstractContextManager[Command]:
+        script = "echo 'fulmar: no base answers' >&2; echo '[recorder] recorded 9 messages' >&2; exit 3"
+        return contextlib.nullcontext(Command(("sh", "-c", script), (), {}))
+
+
+def test_a_run_without_figures_is_told_with_how_it_ended_and_what_was_wrong(tmp_path: Path) -> None:
+    (figures,) = measure([Broken("mine", tmp_path)], Campaign(1, 10.0, 1), lambda _done: None)
+    (missed,) = figures["missed"]
+    assert missed["failure"] == "it ended with 3, and last said: fulmar: no base answers"
+
+
 def test_a_campaign_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> None:
     case, kept = Recounted("mine", tmp_path / "notes"), tmp_path / "kept"
     kept.mkdir()

@@ -145,7 +145,7 @@ def _run(case: Case, seed: int, campaign: Campaign, free: queue.SimpleQueue[int]
 
 
 def _output(case: Case, seed: int, seconds: float, domain: int, record: Path) -> tuple[str, str]:
-    """What the command prints: its JSON object, and what it says besides."""
+    """What the command prints: its JSON object; and what is to be said where that is missing."""
     run = [sys.executable, "-m", "fulmar_bringup.cli", "run", case.robot, "--task", case.task]
     run += ["--seed", str(seed), "--duration", str(seconds), "--record", str(record), "--json"]
     with case.prepared(seed) as command:
@@ -161,15 +161,21 @@ def _output(case: Case, seed: int, seconds: float, domain: int, record: Path) ->
             )
         except subprocess.TimeoutExpired:
             return "", "it did not end in time"
-    return done.stdout, done.stderr
+    ended = f"it ended with {done.returncode}, and last said: "
+    said = done.stderr.strip().splitlines() or ["nothing"]
+    return done.stdout, ended + next((line for line in reversed(said) if _tells(line)), said[-1])
 
 
-def _episode(seed: int, out: str, err: str) -> Episode:
+def _tells(line: str) -> bool:
+    """Whether a line may say what went wrong: those of a process that ended in good order do not."""
+    return not line.startswith("[recorder] record")
+
+
+def _episode(seed: int, out: str, problem: str) -> Episode:
     try:
         summary = json.loads(out)
     except ValueError:
-        last = err.strip().splitlines()[-1:] or ["it said nothing"]
-        return Episode(seed, False, last[0], None, None, None)
+        return Episode(seed, False, problem, None, None, None)
     return Episode(
         seed,
         bool(summary["success"]) and not summary["failure"],
