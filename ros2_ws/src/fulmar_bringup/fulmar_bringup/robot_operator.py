@@ -13,20 +13,18 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from std_msgs.msg import Bool, String
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, stop_robots
 from fulmar_core.errors import RunFailed
-from fulmar_core.topics import ESTOP, STATUS, SWAP
+from fulmar_core.topics import STATUS, SWAP
 from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
 FIND_S = 7.0  # whose first announcements are lost announces himself again after 3 s
-HEAR_S, ANSWER_S, SAY_S = 3.0, 2.0, 1.0
 LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
-
-Answer = tuple[bool, str]  # whether it was done, and what was said
 
 
 class Operator:
@@ -48,14 +46,6 @@ class Operator:
             wait_s,
         )
 
-    def plants(self, robot: str | None, *, wait_s: float) -> list[str]:
-        """Namespaces in which a plant runs; arguments as of `robots_with`."""
-        return self._found(
-            lambda: [space for name, space in self._node.get_node_names_and_namespaces() if name == "plant"],
-            robot,
-            wait_s,
-        )
-
     def ask(self, service: str) -> tuple[bool, str]:
         """Call a Trigger service by its full name.
 
@@ -70,14 +60,11 @@ class Operator:
             raise RunFailed(f"nobody answers on {service} within {ANSWER_S:g} s.")
         return answer
 
-    def ask_all(
-        self, services: Sequence[str], meanwhile: Callable[[], bool] = lambda: True
-    ) -> dict[str, Answer | None]:
+    def ask_all(self, services: Sequence[str]) -> dict[str, Answer | None]:
         """Call Trigger services by their full names, all at once.
 
         Args:
             services: Which.
-            meanwhile: Called over and over until it returns true, for at least as long as answers are missing.
 
         Returns:
             What each said; None where no answer comes within 2 s.
@@ -90,44 +77,15 @@ class Operator:
                 if name not in futures and client.service_is_ready():
                     futures[name] = client.call_async(Trigger.Request())
             answered = all(name in futures and futures[name].done() for name in clients)
-            if meanwhile() and (answered or time.monotonic() > until):
+            if answered or time.monotonic() > until:
                 break
             time.sleep(ASK_S)
         said = {name: future.result() for name, future in futures.items() if future.done()}
         return {name: (said[name].success, said[name].message) if name in said else None for name in clients}
 
-    def stop_all(
-        self, spaces: Sequence[str], services: Sequence[str]
-    ) -> tuple[set[str], dict[str, Answer | None]]:
-        """Say on the wires themselves that the e-stop is pressed, and ask the nodes for it to say so from then on.
-
-        Args:
-            spaces: Namespaces of robots.
-            services: Of those that have an e-stop node.
-
-        Returns:
-            In which namespaces somebody hears the wire, and what the nodes say, as of `ask_all`.
-        """
-        wires = {
-            space: self._node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
-            for space in spaces
-        }
-        began = said = -1.0
-        heard: set[str] = set()
-
-        def say() -> bool:
-            nonlocal began, said
-            now = time.monotonic()
-            began = now if began < 0.0 else began
-            if now - said > LOOK_S:
-                said = now
-                for space, wire in wires.items():
-                    wire.publish(Bool(data=True))
-                    if wire.get_subscription_count():
-                        heard.add(space)
-            return now - began > (SAY_S if len(heard) == len(wires) else HEAR_S)
-
-        return heard, self.ask_all(services, say)
+    def stop_all(self, robot: str | None) -> list[Stopped]:
+        """Stop every robot, or one; see `stop_robots`."""
+        return stop_robots(self._node, robot, find_s=FIND_S)
 
     def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
         """Ask a controller to go on with another policy.

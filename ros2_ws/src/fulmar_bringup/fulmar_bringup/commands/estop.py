@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +10,9 @@ from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import RunFailed
 from fulmar_core.exit_codes import FAILED
+
+if TYPE_CHECKING:
+    from fulmar_bringup.stop_robots import Stopped
 
 
 def estop(
@@ -34,22 +37,24 @@ def estop(
     fulmar estop floating_platform --reset
     """
     from fulmar_bringup.robot_operator import FIND_S, operator
-    from fulmar_core.topics import ESTOP_RESET, ESTOP_TRIGGER
+    from fulmar_core.topics import ESTOP_RESET
 
-    service = ESTOP_RESET if reset else ESTOP_TRIGGER
-    answers = []
     with operator() as person:
-        spaces = person.robots_with(service, robot, wait_s=FIND_S)
-        asked = {space: f"{space}/{service}" for space in spaces}
-        heard: set[str] = set()
         if reset:
+            asked = {
+                space: f"{space}/{ESTOP_RESET}"
+                for space in person.robots_with(ESTOP_RESET, robot, wait_s=FIND_S)
+            }
             said = person.ask_all(list(asked.values()))
-        else:  # the wire itself stops those that run without a node for it, or with one that hangs
-            spaces = sorted({*spaces, *person.plants(robot, wait_s=0.5 if spaces else FIND_S)})
-            heard, said = person.stop_all(spaces, list(asked.values()))
-        for space in spaces:
-            done, words = said.get(asked.get(space, "")) or _unanswered(space in asked, space in heard)
-            answers.append({"robot": space.strip("/"), "done": done, "said": words})
+            came = {
+                space: said[name] or (False, "its e-stop node does not answer")
+                for space, name in asked.items()
+            }
+        else:
+            came = {one.space: one.answer or _unanswered(one) for one in person.stop_all(robot)}
+    answers = [
+        {"robot": space.strip("/"), "done": done, "said": words} for space, (done, words) in came.items()
+    ]
     if not answers:
         whom = f"'{robot}'" if robot else "any robot"
         raise RunFailed(
@@ -68,9 +73,11 @@ def estop(
         raise typer.Exit(FAILED)
 
 
-def _unanswered(has_node: bool, heard: bool) -> tuple[bool, str]:
-    """Whether a robot is stopped whose e-stop node says nothing, or that has none; and words for it."""
-    node = "its e-stop node does not answer" if has_node else "it has no e-stop node"
-    if heard:
-        return True, f"stopped on the wire, since {node}: it stays so until one is started and reset"
-    return False, f"{node}, and nobody hears the wire: cut the power"
+def _unanswered(robot: Stopped) -> tuple[bool, str]:
+    """Whether a robot is stopped for which no e-stop node answers, and words for it."""
+    if robot.heard:
+        return (
+            True,
+            "stopped on the wire, since no e-stop node answers: it stays so until one is started and reset",
+        )
+    return False, "no e-stop node answers, and nobody hears the wire: cut the power"

@@ -1,0 +1,108 @@
+"""Stop robots as they are found: on the wire itself, at once, and through their e-stop nodes, so that it lasts."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.task import Future
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from fulmar_core.topics import ESTOP, ESTOP_TRIGGER
+from fulmar_ros.qos import publisher_qos
+
+Answer = tuple[bool, str]  # whether it was done, and what was said
+SAY_S = 0.05  # between two words on the wire
+STAY_S = 1.0  # at least so long, for robots that are found after the first
+MISS_S = 3.0  # so long for a robot whose e-stop node is not found, or whose wire nobody hears
+ANSWER_S = 2.0  # in which a node must answer
+_BEAT_S = 0.005
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """What came of one robot."""
+
+    space: str  # its namespace
+    heard: bool  # somebody hears what is said on its wire
+    answer: Answer | None  # of its e-stop node
+
+
+def stop_robots(node: Node, robot: str | None, *, find_s: float) -> list[Stopped]:
+    """Say on the wire of every robot that the e-stop is pressed, and ask its e-stop node to say so from then on.
+
+    A robot is stopped as soon as its plant or its e-stop node is seen. Meanwhile others are looked for, and its node,
+    if that was not seen yet: one that nobody asked goes on saying "released", and its robot would go on.
+
+    Args:
+        node: Spins already.
+        robot: Only this one; None for all.
+        find_s: After this long without any robot nobody is there [s].
+
+    Returns:
+        Every robot that was found, by name.
+    """
+    began_s = time.monotonic()
+    found: dict[str, _Robot] = {}
+    said_s = 0.0
+    while True:
+        now_s = time.monotonic()
+        if now_s - said_s > SAY_S:
+            said_s = now_s
+            for space in _spaces(node, robot) - found.keys():
+                found[space] = _Robot(node, space, now_s)
+            for one in found.values():
+                one.say()
+        if found and all(one.is_over(now_s) for one in found.values()):
+            return [found[space].stopped() for space in sorted(found)]
+        if not found and now_s - began_s > find_s:
+            return []
+        time.sleep(_BEAT_S)
+
+
+class _Robot:
+    """One that is being stopped."""
+
+    def __init__(self, node: Node, space: str, found_s: float) -> None:
+        self._space, self._found_s = space, found_s
+        self._wire: Publisher = node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
+        self._button: Client = node.create_client(Trigger, f"{space}/{ESTOP_TRIGGER}")
+        self._asked_s: float | None = None
+        self._future: Future | None = None
+        self._heard = False
+
+    def say(self) -> None:
+        """Say it once more, and ask the node as soon as it is there."""
+        self._wire.publish(Bool(data=True))
+        self._heard = self._heard or self._wire.get_subscription_count() > 0
+        if self._future is None and self._button.service_is_ready():
+            self._asked_s = time.monotonic()
+            self._future = self._button.call_async(Trigger.Request())
+
+    def is_over(self, now_s: float) -> bool:
+        """Whether nothing more is to be waited for."""
+        since_s = now_s - self._found_s
+        if self._asked_s is None or not self._heard:
+            return since_s > MISS_S
+        answered = self._future is not None and self._future.done()
+        return since_s > STAY_S and (answered or now_s - self._asked_s > ANSWER_S)
+
+    def stopped(self) -> Stopped:
+        """What came of it."""
+        said = self._future.result() if self._future is not None and self._future.done() else None
+        answer = None if said is None else (said.success, said.message)
+        return Stopped(self._space, self._heard, answer)
+
+
+def _spaces(node: Node, robot: str | None) -> set[str]:
+    """Namespaces with a plant or an e-stop node, as far as they are seen now."""
+    button = f"/{ESTOP_TRIGGER}"
+    found = {
+        name.removesuffix(button) for name, _ in node.get_service_names_and_types() if name.endswith(button)
+    }
+    found |= {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
+    return found if robot is None else found & {f"/{robot}"}
