@@ -121,6 +121,7 @@ def test_a_base_slows_down_as_fast_as_it_may_and_no_faster(bench, driver):
     def watch() -> None:
         while not over.wait(0.002):
             seen.append((time.monotonic(), bench.command[0]))
+        seen.append((time.monotonic(), bench.command[0]))  # with the last, which ended the watch
 
     watcher = threading.Thread(target=watch)
     watcher.start()
