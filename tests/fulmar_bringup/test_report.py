@@ -76,7 +76,7 @@ def test_a_page_shows_every_picture_with_words(compared):
     for label in (
         "x [m]",
         "time [s]",
-        "from measurement to command [ms]",
+        "from measurement to command, as recorded [ms]",
         "commands [%]",
         "open-valve time [s]",
     ):
