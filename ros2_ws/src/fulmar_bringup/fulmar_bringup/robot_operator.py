@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -16,7 +16,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, stop_robots
+from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, spaces_with, stop_robots
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import STATUS, SWAP
 from fulmar_ros.middleware import set_up_middleware
@@ -36,15 +36,16 @@ class Operator:
 
     def robots_with(self, service: str, robot: str | None, *, wait_s: float) -> list[str]:
         """Namespaces that offer a service, as soon as one does; only that of one robot, if it is named."""
-        return self._found(
-            lambda: [
-                name.removesuffix(f"/{service}")
-                for name, _ in self._node.get_service_names_and_types()
-                if name.endswith(f"/{service}")
-            ],
-            robot,
-            wait_s,
-        )
+        until = time.monotonic() + wait_s
+        while True:
+            found = spaces_with(self._node, service)
+            if robot is not None:
+                found &= {f"/{robot}"}
+            if time.monotonic() > until or (found and robot is not None):
+                return sorted(found)
+            if found:  # who is found first is rarely alone: the others get a moment
+                until = min(until, time.monotonic() + SETTLE_S)
+            time.sleep(LOOK_S)
 
     def ask(self, service: str) -> tuple[bool, str]:
         """Call a Trigger service by its full name.
@@ -121,18 +122,6 @@ class Operator:
         qos = subscriber_qos(STATUS, reliable=True)
         self._node.create_subscription(DiagnosticArray, f"/{robot}/{STATUS.name}", hear, qos)
         return status
-
-    def _found(self, look: Callable[[], list[str]], robot: str | None, wait_s: float) -> list[str]:
-        until = time.monotonic() + wait_s
-        while True:
-            found = sorted(set(look()))
-            if robot is not None:
-                found = [space for space in found if space == f"/{robot}"]
-            if time.monotonic() > until or (found and robot is not None):
-                return found
-            if found:  # who is found first is rarely alone: the others get a moment
-                until = min(until, time.monotonic() + SETTLE_S)
-            time.sleep(LOOK_S)
 
 
 @contextlib.contextmanager

@@ -71,38 +71,40 @@ class _Robot:
         self._space, self._found_s = space, found_s
         self._wire: Publisher = node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
         self._button: Client = node.create_client(Trigger, f"{space}/{ESTOP_TRIGGER}")
-        self._asked_s: float | None = None
-        self._future: Future | None = None
+        self._asked: tuple[float, Future] | None = None  # when [s], and what will be answered
         self._heard = False
 
     def say(self) -> None:
         """Say it once more, and ask the node as soon as it is there."""
         self._wire.publish(Bool(data=True))
         self._heard = self._heard or self._wire.get_subscription_count() > 0
-        if self._future is None and self._button.service_is_ready():
-            self._asked_s = time.monotonic()
-            self._future = self._button.call_async(Trigger.Request())
+        if self._asked is None and self._button.service_is_ready():
+            self._asked = time.monotonic(), self._button.call_async(Trigger.Request())
 
     def is_over(self, now_s: float) -> bool:
         """Whether nothing more is to be waited for."""
         since_s = now_s - self._found_s
-        if self._asked_s is None or not self._heard:
+        if self._asked is None or not self._heard:
             return since_s > MISS_S
-        answered = self._future is not None and self._future.done()
-        return since_s > STAY_S and (answered or now_s - self._asked_s > ANSWER_S)
+        asked_s, answer = self._asked
+        return since_s > STAY_S and (answer.done() or now_s - asked_s > ANSWER_S)
 
     def stopped(self) -> Stopped:
         """What came of it."""
-        said = self._future.result() if self._future is not None and self._future.done() else None
-        answer = None if said is None else (said.success, said.message)
-        return Stopped(self._space, self._heard, answer)
+        if self._asked is None or not self._asked[1].done():
+            return Stopped(self._space, self._heard, None)
+        said = self._asked[1].result()
+        return Stopped(self._space, self._heard, (said.success, said.message))
+
+
+def spaces_with(node: Node, service: str) -> set[str]:
+    """Namespaces in which somebody offers, or asks for, a service, as far as they are seen now."""
+    end = f"/{service}"
+    return {name.removesuffix(end) for name, _ in node.get_service_names_and_types() if name.endswith(end)}
 
 
 def _spaces(node: Node, robot: str | None) -> set[str]:
     """Namespaces with a plant or an e-stop node, as far as they are seen now."""
-    button = f"/{ESTOP_TRIGGER}"
-    found = {
-        name.removesuffix(button) for name, _ in node.get_service_names_and_types() if name.endswith(button)
-    }
-    found |= {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
+    plants = {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
+    found = spaces_with(node, ESTOP_TRIGGER) | plants
     return found if robot is None else found & {f"/{robot}"}
