@@ -16,6 +16,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
 from training.network import Decision, DeployedNetwork, NetworkPlan
+from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
 
 
@@ -33,7 +34,10 @@ class _Trained:
 
 
 def deployed_network(
-    learner: BaseAlgorithm, normaliser: VecNormalize, command_scale: Iterable[float]
+    learner: BaseAlgorithm,
+    normaliser: VecNormalize,
+    command_scale: Iterable[float],
+    specialist: Specialist | None = None,
 ) -> DeployedNetwork:
     """Copy a learner's present weights and statistics.
 
@@ -41,6 +45,7 @@ def deployed_network(
         learner: PPO, recurrent PPO, SAC or TD3 with an MLP policy.
         normaliser: Holds the running mean and variance of the observations.
         command_scale: Full command of each actuator, in its own unit.
+        specialist: Who takes over where too many valves are dead.
 
     Returns:
         A network that shares nothing with the learner.
@@ -63,6 +68,8 @@ def deployed_network(
         combinations=len(choice.commands) if choice else 0,
         knows_dead=choice is not None and worlds.told,
         side=mirror.side if mirror else None,
+        specialist=specialist.network.plan if specialist else None,
+        losses=len(specialist.losses) if specialist else 0,
     )
     with torch.random.fork_rng(devices=[]):  # whoever looks at a learner must not change what it draws next
         network = DeployedNetwork(plan)
@@ -77,6 +84,8 @@ def deployed_network(
             network.take_choice(choice)
         if mirror is not None:
             network.take_mirror(mirror)
+        if specialist is not None:
+            network.take_specialist(specialist.network, specialist.losses)
         if trained.lstm is not None:
             _copy_memory(trained.lstm, network)
     return network

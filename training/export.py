@@ -70,7 +70,7 @@ def export(run: Path, out: Path) -> Passport:
             key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
         }
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
-        | {key: record[key] for key in ("recipe",) if key in record}
+        | {key: record[key] for key in ("recipe", "specialist") if key in record}
         | {"curve": _curve(record)}
         | _verdict(record),
     )
@@ -141,7 +141,10 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
 
 
 def _golden(network: DeployedNetwork, robot: Robot, task: Task, told: Told | None) -> Golden:
-    """What the network makes of held-out episodes at their start, and a few commands later."""
+    """What the network makes of held-out episodes at their start, and a few commands later.
+
+    Where it hands over to a specialist, every other robot is told of a loss that strands it.
+    """
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
     )
@@ -150,6 +153,10 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task, told: Told | Non
     for _ in range(GOLDEN_STEPS + 1):
         seen = np.asarray(simulation.observe())
         seen = np.asarray(told.complete(seen) if told else seen, dtype=np.float32)
+        if network.specialist is not None:
+            losses = network.losses.numpy()
+            stranded = seen[::2, -losses.shape[1] :]
+            stranded[:] = 1.0 - np.resize(losses, stranded.shape)
         command, logits, after = network.infer(seen, memory)
         moments.append((seen, memory, command, logits, after))
         simulation.step(command)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +11,20 @@ from stable_baselines3.common.logger import KVWriter
 
 from fulmar_core.calibration import calibration_path
 from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.tasks import Task, load_task
 from training.progress import ProgressFile, Watcher
 from training.run_folder import (
     CALIBRATION_FILE,
     CHECKPOINT_FILE,
     PROGRESS_FILE,
+    SPECIALIST_FOLDER,
     read_run_record,
     write_run_record,
 )
 from training.settings import TrainingSettings
-from training.train import check_seed, train
+from training.specialist import Specialist, load_specialist, specialist_settings
+from training.train import begin_run, check_seed, train
 
 
 @dataclass(frozen=True)
@@ -99,9 +101,33 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
     calibration = calibration_path()
     if calibration is not None and calibration != (job.out / CALIBRATION_FILE).absolute():
         (job.out / CALIBRATION_FILE).write_bytes(calibration.read_bytes())
-    train(
-        job.settings.learner_of(load_robot(job.robot)),
-        load_task(job.task),
+    robot, task = job.settings.learner_of(load_robot(job.robot)), load_task(job.task)
+    specialist, learned = None, {}
+    if settings := specialist_settings(job.settings, robot, task):
+        begin_run(
+            robot, task, job.settings,
+            seed=job.seed, out=job.out, time_limit_s=job.time_limit_s, updates=job.updates,
+        )  # fmt: skip
+        first, job = _shared(job, settings)
+        learned = _finished(first) or _train(first, robot, task, watcher)
+        specialist = load_specialist(first.out, robot, settings)
+    record = _train(job, robot, task, watcher, specialist)
+    if learned:
+        record["specialist"] = {
+            key: learned[key] for key in ("steps", "updates", "wall_s", "best", "settings")
+        }
+    if job.recipe:
+        record["recipe"] = job.recipe
+    write_run_record(job.out, record)
+    return record
+
+
+def _train(
+    job: Job, robot: Robot, task: Task, watcher: Watcher, specialist: Specialist | None = None
+) -> dict[str, Any]:
+    return train(
+        robot,
+        task,
         job.settings,
         seed=job.seed,
         out=job.out,
@@ -110,14 +136,27 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
         resume=(job.out / CHECKPOINT_FILE).is_file(),
         command=job.command,
         git_revision=job.git_revision,
+        specialist=specialist,
         watcher=watcher,
         curves=_curves(job),
     )
-    record = read_run_record(job.out)
-    if job.recipe:
-        record["recipe"] = job.recipe
-        write_run_record(job.out, record)
-    return record
+
+
+def _shared(job: Job, settings: TrainingSettings) -> tuple[Job, Job]:
+    """The specialist's part of a job, and the rest."""
+    assert job.settings.specialist is not None
+    share = job.settings.specialist.share
+    first = replace(job, settings=settings, out=job.out / SPECIALIST_FOLDER, wandb="", recipe="")
+    if job.updates is not None:
+        updates = max(1, round(share * job.updates))
+        first, job = replace(first, updates=updates), replace(job, updates=max(1, job.updates - updates))
+    if job.updates is None or job.time_limit_s is not None:
+        limit = job.time_limit_s or job.settings.time_limit_s
+        first, job = (
+            replace(first, time_limit_s=share * limit),
+            replace(job, time_limit_s=limit - share * limit),
+        )
+    return first, job
 
 
 def _curves(job: Job) -> KVWriter | None:

@@ -39,6 +39,8 @@ class NetworkPlan:
     combinations: int = 0  # of valves, to choose from for a wrench
     knows_dead: bool = False  # its last inputs are 1 for each valve, or 0 where it is dead
     side: int | None = None  # where this input is negative, it sees and answers the mirror image
+    specialist: NetworkPlan | None = None  # of the network that takes over where too many valves are dead
+    losses: int = 0  # sets of dead valves of which one is enough for that
 
     @property
     def on_off(self) -> bool:
@@ -58,6 +60,7 @@ class DeployedNetwork(nn.Module):
     choice_gas: torch.Tensor
     mirror_seen: torch.Tensor
     mirror_done: torch.Tensor
+    losses: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
         """Build an untrained network."""
@@ -75,6 +78,9 @@ class DeployedNetwork(nn.Module):
         if plan.side is not None:
             self.register_buffer("mirror_seen", torch.eye(plan.inputs))
             self.register_buffer("mirror_done", torch.eye(plan.outputs))
+        if plan.losses:
+            self.register_buffer("losses", torch.ones(plan.losses, valves))
+        self.specialist = DeployedNetwork(plan.specialist) if plan.specialist else None
         units = plan.memory // 2
         self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
         self.from_memory = nn.Linear(units, 4 * units) if units else None
@@ -103,7 +109,7 @@ class DeployedNetwork(nn.Module):
         features = torch.clamp((seen - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
         if memory is None:
             raw = self._mirrored(self.layers(features), observation, "done")
-            raw = self._appraised(raw, observation)
+            raw = self._handed_over(self._appraised(raw, observation), observation)
             return self._decide(raw), raw
         memory = self._remember(features, memory)
         raw = self._appraised(self.layers(memory[:, : self.plan.memory // 2]), observation)
@@ -140,6 +146,20 @@ class DeployedNetwork(nn.Module):
         self.choice_slope.copy_(torch.as_tensor(choice.slope))
         self.choice_offset.copy_(torch.as_tensor(choice.offset))
         self.choice_gas.copy_(torch.as_tensor(choice.gas))
+
+    def take_specialist(self, specialist: DeployedNetwork, losses: np.ndarray) -> None:
+        """Take over who acts where all valves of a row of `losses` are dead (1), shape (k, valves)."""
+        assert self.specialist is not None
+        self.specialist.load_state_dict(specialist.state_dict())
+        self.losses.copy_(torch.as_tensor(losses))
+
+    def _handed_over(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
+        """The specialist's outputs where it takes over."""
+        if self.specialist is None:
+            return raw
+        dead = 1.0 - observation[:, -self.losses.shape[1] :]
+        missing = self.losses.sum(dim=1) - dead @ self.losses.t()
+        return torch.where(missing.amin(dim=1, keepdim=True) < 0.5, self.specialist(observation)[1], raw)
 
     def _appraised(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
         """How much opening each valve is worth, where the last layer asks for a wrench; else what it put out."""
@@ -190,7 +210,7 @@ def load_network(path: Path) -> DeployedNetwork:
     """
     try:
         content = torch.load(path, weights_only=True)
-        network = DeployedNetwork(NetworkPlan(**content["plan"]))
+        network = DeployedNetwork(_plan_of(content["plan"]))
         network.load_state_dict(content["state"])
     except (
         OSError,
@@ -205,6 +225,11 @@ def load_network(path: Path) -> DeployedNetwork:
             f"{path}: holds no weights that `fulmar train` wrote ({type(error).__name__})."
         ) from error
     return network
+
+
+def _plan_of(plain: dict[str, Any]) -> NetworkPlan:
+    within = plain.get("specialist")
+    return NetworkPlan(**plain | {"specialist": _plan_of(within) if within else None})
 
 
 class NetworkController:

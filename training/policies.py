@@ -19,6 +19,7 @@ from fulmar_core.tasks import load_task
 from training.executors import Executor, Watch
 from training.jobs import Job, Outcome
 from training.settings import TrainingSettings, load_training_settings
+from training.specialist import specialist_settings
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,8 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
         "policy": asdict(policy) | {"success": None},
         "format": FORMAT,
     }
+    if own := specialist_settings(settings, load_robot(policy.robot), load_task(policy.task)):
+        ingredients["specialist"] = [_chosen(own), _chosen(load_scenario(own.scenario))]
     return hashlib.sha256(json.dumps(ingredients, sort_keys=True, default=str).encode()).hexdigest()[:16]
 
 

@@ -17,6 +17,7 @@ from training.deploy import deployed_network
 from training.network import DeployedNetwork
 from training.progress import Watcher
 from training.settings import TrainingSettings
+from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
 
 
@@ -63,6 +64,7 @@ class Session(BaseCallback):
         limits: Limits,
         worlds: BatchVecEnv,
         command_scale: np.ndarray,
+        specialist: Specialist | None,
         watcher: Watcher,
         checkpoint: Path,
         asked_to_stop: Callable[[], bool],
@@ -76,6 +78,7 @@ class Session(BaseCallback):
             limits: When to end.
             worlds: Where it learns.
             command_scale: Full command of each actuator, in its own unit.
+            specialist: Who takes over where too many valves are dead.
             watcher: Whom to tell.
             checkpoint: File to resume from later.
             asked_to_stop: Whether a person wants it to end.
@@ -83,6 +86,7 @@ class Session(BaseCallback):
         super().__init__()
         self.story, self._judge, self._settings, self._limits = story, judge, settings, limits
         self._worlds, self._command_scale, self._watcher = worlds, command_scale, watcher
+        self._specialist = specialist
         self._checkpoint, self._asked_to_stop = checkpoint, asked_to_stop
         self._before_s = story.elapsed_s
         self._began = time.monotonic()
@@ -144,7 +148,7 @@ class Session(BaseCallback):
         story = self.story
         normaliser = self.model.get_vec_normalize_env()
         assert normaliser is not None
-        network = deployed_network(self.model, normaliser, self._command_scale)
+        network = deployed_network(self.model, normaliser, self._command_scale, self._specialist)
         success, score = self._judge(network)
         check = Check(story.elapsed_s, self.num_timesteps, success, score)
         # A refined run is meant to end otherwise than it was in between, so its last network is the one to keep.

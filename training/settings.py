@@ -123,6 +123,19 @@ class Refinement:
 
 
 @dataclass(frozen=True)
+class SpecialistPlan:
+    """A second network, which takes over where dead valves leave no pose to hold (`training.specialist`)."""
+
+    training: str  # its own settings: a file of `configs/training`
+    share: float  # of the run that it learns for, before the other begins [-]
+
+    def __post_init__(self) -> None:
+        """Refuse to leave nothing to one of them."""
+        if not 0.0 < self.share < 1.0:
+            raise ValueError("'share' must lie between 0 and 1.")
+
+
+@dataclass(frozen=True)
 class StopAtSuccess:
     """Ends a run early, once it has learned its task."""
 
@@ -150,6 +163,7 @@ class TrainingSettings:
     curriculum: Curriculum | None = None
     refinement: Refinement | None = None  # of ppo and recurrent_ppo
     stop_at_success: StopAtSuccess | None = None
+    specialist: SpecialistPlan | None = None
     told: bool = False  # whether the network is told pushes and dead valves, of robots with on/off valves
     wrench: bool = (
         False  # whether it asks for a wrench that on/off valves are then chosen for, not for single valves
@@ -163,6 +177,10 @@ class TrainingSettings:
         algorithm = self.algorithm
         if isinstance(algorithm, Ppo) and algorithm.lessons and not algorithm.fast:
             raise ValueError("'lessons' are for the fast PPO.")
+        if self.specialist and (not self.told or isinstance(algorithm, RecurrentPpo)):
+            raise ValueError(
+                "'specialist' needs 'told', to know when its time has come, and a network without memory."
+            )
         if self.mirror and isinstance(algorithm, RecurrentPpo):
             raise ValueError("'mirror' is for networks without memory: what they remember has a side, too.")
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:

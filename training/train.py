@@ -39,6 +39,7 @@ from training.run_folder import (
 )
 from training.session import Limits, RunIsOver, Session, Story
 from training.settings import OffPolicy, TrainingSettings, write_training_settings
+from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
 
 
@@ -53,6 +54,23 @@ def check_seed(seed: int) -> None:
         raise ConfigError(f"seed {seed} must not be negative, nor {kept}, which are kept for judging.")
 
 
+def begin_run(
+    robot: Robot,
+    task: Task,
+    settings: TrainingSettings,
+    *,
+    seed: int,
+    out: Path,
+    time_limit_s: float | None,
+    updates: int | None,
+) -> None:
+    """Write into a run folder what `fulmar train --resume` needs to know; arguments as of `train`."""
+    out.mkdir(parents=True, exist_ok=True)
+    write_training_settings(settings, out / SETTINGS_FILE)
+    asked = {"robot": robot.name, "task": task.name, "seed": seed}
+    write_start(out, asked | {"time_limit_s": time_limit_s, "updates": updates})
+
+
 def train(
     robot: Robot,
     task: Task,
@@ -65,6 +83,7 @@ def train(
     resume: bool = False,
     command: str = "",
     git_revision: str = "",
+    specialist: Specialist | None = None,
     watcher: Watcher | None = None,
     curves: KVWriter | None = None,
 ) -> dict[str, Any]:
@@ -81,6 +100,7 @@ def train(
         resume: Go on from the checkpoint in `out`, exactly.
         command: Command line that started this, for the record.
         git_revision: Commit of the code, for the record.
+        specialist: Who takes over where too many valves are dead.
         watcher: Whom to tell how it goes; a progress bar by default.
         curves: Where curves go beside TensorBoard.
 
@@ -114,10 +134,7 @@ def train(
         learner, more = load_checkpoint(out / CHECKPOINT_FILE, settings.algorithm, worlds)
         story = more["story"]
     else:
-        out.mkdir(parents=True, exist_ok=True)
-        write_training_settings(settings, out / SETTINGS_FILE)
-        asked = {"robot": robot.name, "task": task.name, "seed": seed}
-        write_start(out, asked | {"time_limit_s": time_limit_s, "updates": updates})
+        begin_run(robot, task, settings, seed=seed, out=out, time_limit_s=time_limit_s, updates=updates)
         env = VecNormalize(worlds, norm_reward=False, gamma=settings.algorithm.gamma)
         learner = build_learner(settings.algorithm, env, seed=seed)
     _log_to(learner, out / TENSORBOARD_FOLDER, curves)
@@ -129,6 +146,7 @@ def train(
             limits=Limits(time_limit_s, updates),
             worlds=worlds,
             command_scale=robot.actuators.scale,
+            specialist=specialist,
             watcher=watcher or LearningBar(),
             checkpoint=out / CHECKPOINT_FILE,
             asked_to_stop=interrupt.is_set,

@@ -22,6 +22,7 @@ from fulmar_core.disturbances.scenario import (
 )
 from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.errors import UnknownNameError
+from fulmar_core.holding import stranding_losses
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 
@@ -85,6 +86,11 @@ ENTRIES = {
     "actuation.failure_chance": (
         replace(STILL, actuation=Actuation(failures=1)),
         {"actuation": Actuation(failures=1, failure_chance=0.9)},
+        {"alive"},
+    ),
+    "actuation.stranding": (
+        replace(STILL, actuation=Actuation(failures=2)),
+        {"actuation": Actuation(failures=2, failure_chance=1.0, stranding=True)},
         {"alive"},
     ),
     "sensing.noise": (SEEING, {"sensing": Sensing(noise=2.0)}, {"noise"}),
@@ -245,6 +251,28 @@ def test_no_more_actuators_fail_than_may_and_each_candidate_with_its_chance(most
     assert failed.mean() == pytest.approx(0.5 * most, abs=4 * np.sqrt(most * 0.25 / COUNT) + 1e-12)
     if most:  # any of them
         np.testing.assert_allclose(1.0 - alive.mean(axis=1), most * 0.5 / 8, atol=0.035)
+
+
+def test_what_strands_a_robot_fails_together_each_set_as_often_and_with_the_chance_of_one():
+    stranding = Actuation(failures=2, failure_chance=0.75, stranding=True)
+    alive = worlds(replace(STILL, actuation=stranding)).alive.T
+    sets, counts = np.unique(alive, axis=0, return_counts=True)
+    lost = {tuple(np.flatnonzero(row < 0.5)): count for row, count in zip(sets, counts, strict=True)}
+    assert lost.pop(()) == pytest.approx(0.25 * COUNT, rel=0.15)
+    assert set(lost) == set(stranding_losses(PLATFORM, 2))
+    for count in lost.values():
+        assert count == pytest.approx(0.75 * COUNT / len(lost), rel=0.35)
+
+
+def test_robots_that_nothing_strands_lose_whatever_may_fail():
+    loses = Actuation(failures=1, failure_chance=1.0)
+    plain, asked = (replace(STILL, actuation=each) for each in (loses, replace(loses, stranding=True)))
+    np.testing.assert_array_equal(worlds(asked, BOAT).alive, worlds(plain, BOAT).alive)
+
+
+def test_to_be_stranded_something_has_to_fail():
+    with pytest.raises(ValueError, match="needs 'failures'"):
+        Actuation(stranding=True)
 
 
 def test_a_robot_with_fewer_actuators_than_may_fail_can_lose_all():

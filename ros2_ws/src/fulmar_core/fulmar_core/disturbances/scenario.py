@@ -6,12 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.arrays import array_namespace
 from fulmar_core.config import load_config
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.holding import stranding_losses
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
@@ -108,6 +111,8 @@ class Actuation:
     opening_delay_s: Range = (0.0, 0.0)  # by which closed valves open late; closing does not wait [s]
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
+    # Only of such as leave no pose to hold, all at once, where a robot has thrusters that can be lost like that.
+    stranding: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""
@@ -117,6 +122,8 @@ class Actuation:
             raise ValueError("'gain' must be [low, high] with low <= high, 'failure_chance' at most 1.")
         if not 0.0 <= self.opening_delay_s[0] <= self.opening_delay_s[1]:
             raise ValueError("'opening_delay_s' must be [low, high] with 0 <= low <= high.")
+        if self.stranding and not self.failures:
+            raise ValueError("'stranding' needs 'failures', the number of those that are lost together.")
         if not 0.0 <= self.least_noise <= 1.0:
             raise ValueError("'least_noise' must lie in [0, 1].")
 
@@ -198,6 +205,8 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     bearing = draws.uniform(-math.pi, math.pi)
     offset = uncertain * draws.uniform(0.0, spans.center_of_mass)
     xp = array_namespace(mass)
+    faults, sensing = scenario.actuation, scenario.sensing
+    together = stranding_losses(robot, faults.failures) if faults.stranding else ()
     force, torque = robot.performance.force, robot.performance.torque
     push, wave, kick = scenario.push, scenario.wave, scenario.kick
     size = strength * force * push.force * draws.uniform(push.least, 1.0)
@@ -209,7 +218,6 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     phases = draws.uniform(-math.pi, math.pi, 2)
     kick_size, kick_period = draws.uniform(0.0, 1.0), draws.uniform(*kick.every_s)
     kick_direction = draws.uniform(-math.pi, math.pi)
-    faults, sensing = scenario.actuation, scenario.sensing
     gain_share, lottery = draws.uniform(0.0, 1.0, count), draws.uniform(0.0, 1.0, count)
     chances = draws.uniform(0.0, 1.0, count)
     delay, noise = draws.uniform(0.0, 1.0), draws.uniform(faults.least_noise, 1.0)
@@ -238,7 +246,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
         com_y=robot.body.center_of_mass[1] + offset * xp.sin(bearing),
         drag=drag,
         gain=gain.T,
-        alive=_survivors(lottery, chances, faults, strength),
+        alive=_survivors(lottery, chances, faults, strength, together),
         action_noise=zero + strength * faults.noise * noise,
         action_delay=strength * faults.delay_s * delay,
         opening_delay=strength * valves * opening_delay,
@@ -274,12 +282,23 @@ def _around(nominal: float, span: Range, strength: float, draws: Draws) -> Array
     return nominal + strength * (drawn - nominal)
 
 
-def _survivors(lottery: Array, chances: Array, faults: Actuation, strength: float) -> Array:
+def _survivors(
+    lottery: Array, chances: Array, faults: Actuation, strength: float, together: tuple[tuple[int, ...], ...]
+) -> Array:
     """1 for actuators that work, 0 for those that failed, shape (n, worlds).
 
-    The actuators with the smallest lots are the candidates, each fails with its own chance.
+    The actuators with the smallest lots are the candidates, each fails with its own chance; where some are to fail
+    `together`, the first lot says which, and they share the first chance.
     """
     xp = array_namespace(lottery)
-    ranks = xp.argsort(xp.argsort(lottery, axis=1), axis=1)
-    fails = (ranks < faults.failures) & (chances < strength * faults.failure_chance)
+    chance = strength * faults.failure_chance
+    if together:
+        table = np.zeros((len(together), lottery.shape[1]), dtype=bool)
+        for row, lost in zip(table, together, strict=True):
+            row[list(lost)] = True
+        which = xp.astype(lottery[:, 0] * len(together), xp.int64)
+        fails = xp.asarray(table)[which] & (chances[:, :1] < chance)
+    else:
+        ranks = xp.argsort(xp.argsort(lottery, axis=1), axis=1)
+        fails = (ranks < faults.failures) & (chances < chance)
     return 1.0 - xp.astype(fails, lottery.dtype).T

@@ -1,93 +1,14 @@
-"""Whether a pose can be held: a linear programme over the share of time that each valve is open.
-
-Over many control steps, valves that open and close give any mean wrench that shares of time can make: shares d_i >= 0,
-with a common pressure line Σ d_i <= 1, since n open valves give 1/n each. A pose can be held where the mean wrench
-cancels the push from outside with something left in every direction: without that, an error once made stays.
-"""
+"""Which episodes have a goal pose that can be held."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.disturbances.outside import outside_wrench
 from fulmar_core.episode import Episode
-from fulmar_core.errors import ConfigError
-from fulmar_core.planar import at_rest, to_body
+from fulmar_core.holding import LEAST_MARGIN, hold_margin
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import Robot
-
-LEAST_MARGIN = 1e-6  # of the robot's own force and torque: rounding of the solver lies below [-]
-HEADINGS = 72  # that are tried where any will do
-
-
-def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: float, heading: float) -> float:
-    """How much is left in every direction when the push is cancelled.
-
-    Args:
-        robot: A planar robot with thrusters.
-        working: Share of its thrust that each valve gives, shape (n,) [-].
-        force: Push from outside along the world's x and y, shape (2,) [N].
-        torque: Same [N·m].
-        heading: Of the body [rad].
-
-    Returns:
-        The largest share of the robot's own force (`performance`) along either body axis, and of its own torque, either
-        way, that can be made on top of what cancels the push; negative where that is too strong [-].
-
-    Raises:
-        ConfigError: The robot has no thrusters.
-    """
-    # At import this would cost every node most of a second.
-    from scipy.optimize import linprog
-
-    valves = _valves(robot)
-    scale = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
-    wrench = (valves.thrust * valves.wrench_per_newton[:, [0, 1, 5]] * np.asarray(working)[:, None] / scale).T
-    push = np.array([*to_body(np.asarray(heading), force[0], force[1]), torque]) / scale
-    count, ways = wrench.shape[1], np.vstack((np.eye(3), -np.eye(3)))
-    # One set of shares for each of the six ways, and one margin for all: W d_k - margin·way_k = -push.
-    equal = np.zeros((18, 6 * count + 1))
-    for k, way in enumerate(ways):
-        equal[3 * k : 3 * k + 3, k * count : (k + 1) * count] = wrench
-        equal[3 * k : 3 * k + 3, -1] = -way
-    at_most = np.hstack((np.kron(np.eye(6), np.ones((1, count))), np.zeros((6, 1))))
-    goal = np.zeros(6 * count + 1)
-    goal[-1] = -1.0
-    found = linprog(
-        goal,
-        A_ub=at_most if valves.shared_pressure else None,
-        b_ub=np.ones(6) if valves.shared_pressure else None,
-        A_eq=equal,
-        b_eq=np.tile(-push, 6),
-        bounds=[(0.0, 1.0)] * (6 * count) + [(None, None)],
-    )
-    return float(found.x[-1]) if found.x is not None else -np.inf
-
-
-def can_hold(
-    robot: Robot,
-    lost: tuple[int, ...] = (),
-    force: tuple[float, float] = (0.0, 0.0),
-    torque: float = 0.0,
-    heading: float | None = None,
-) -> bool:
-    """Whether a pose can be held without some thrusters.
-
-    Args:
-        robot: A planar robot with thrusters.
-        lost: Numbers of those that stay closed, from 0.
-        force: Push from outside along the world's x and y [N].
-        torque: Same [N·m].
-        heading: Of the pose; None: any will do [rad].
-
-    Raises:
-        ConfigError: The robot has no thrusters.
-    """
-    working = np.ones(len(_valves(robot).nozzles))
-    working[list(lost)] = 0.0
-    tried = np.arange(HEADINGS) * 2.0 * np.pi / HEADINGS if heading is None else np.array([heading])
-    push = np.asarray(force, dtype=float)
-    return any(hold_margin(robot, working, push, torque, float(yaw)) > LEAST_MARGIN for yaw in tried)
 
 
 def can_hold_episodes(robot: Robot, drawn: Episode) -> np.ndarray:
@@ -120,9 +41,3 @@ def can_hold_episodes(robot: Robot, drawn: Episode) -> np.ndarray:
             )
         able[i] = known[key]
     return able
-
-
-def _valves(robot: Robot) -> Thrusters:
-    if not isinstance(robot.actuators, Thrusters):
-        raise ConfigError(f"'{robot.name}' has no thrusters, so that there are no shares of time to choose.")
-    return robot.actuators

@@ -1,0 +1,174 @@
+"""Two networks as one: a specialist takes over where dead valves leave no pose to hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import onnxruntime
+import pytest
+import torch
+
+from fulmar_core.controllers.told import told_terms
+from fulmar_core.errors import ConfigError
+from fulmar_core.holding import stranding_losses
+from fulmar_core.observation import Observer
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from policy_server.policy import Policy
+from training import jobs, specialist
+from training.export import export
+from training.jobs import Job, learn
+from training.network import load_network
+from training.policies import ShippedPolicy, recipe
+from training.progress import ProgressFile
+from training.run_folder import NETWORK_FILE, SPECIALIST_FOLDER, read_run_record
+from training.settings import SpecialistPlan, load_training_settings
+from training.specialist import specialist_settings
+
+ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
+NAMES = Observer(ROBOT, TASK).names + told_terms(ROBOT)
+STRANDED, MORE, ABLE = (0, 5), (0, 5, 6), (0, 1)
+
+
+@pytest.fixture(scope="module")
+def settings():
+    """Those of the policy that ships, and of its specialist, cut to what takes a moment."""
+    found = load_training_settings(ROBOT, TASK)
+    assert found.specialist is not None
+    return cut(found)
+
+
+def cut(settings):
+    ppo = replace(settings.algorithm, steps=16, minibatch=128, epochs=1, hidden=(16,), lessons=1)
+    return replace(settings, algorithm=ppo, worlds=32, evaluate_every_s=1e6)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    load = specialist.load_training_settings
+    monkeypatch.setattr(specialist, "load_training_settings", lambda *given: cut(load(*given)))
+
+
+def job_in(folder, settings, **limits):
+    return Job("both", ROBOT.name, TASK.name, 1, settings, folder, **limits)
+
+
+def learned(folder, settings, **limits):
+    folder.mkdir(parents=True, exist_ok=True)
+    return learn(job_in(folder, settings, **limits), ProgressFile(folder / "progress.json"))
+
+
+@pytest.fixture
+def run(tmp_path, settings, quick):
+    learned(tmp_path / "run", settings, updates=6)
+    return tmp_path / "run"
+
+
+def seen(*lost):
+    """Observations of robots that know what they have lost."""
+    rows = np.random.default_rng(3).normal(size=(len(lost), len(NAMES))).astype(np.float32)
+    rows[:, -8:] = 1.0
+    for row, valves in zip(rows, lost, strict=True):
+        row[[-8 + valve for valve in valves]] = 0.0
+    return rows
+
+
+def test_the_specialist_acts_where_a_stranding_set_of_valves_is_dead_and_nowhere_else(run):
+    both, alone = load_network(run / NETWORK_FILE), load_network(run / SPECIALIST_FOLDER / NETWORK_FILE)
+    general = load_network(run / NETWORK_FILE)
+    general.specialist = None
+    rows = seen(STRANDED, MORE, ABLE, (3,), ())
+    raw, special, ordinary = (network.infer(rows)[1] for network in (both, alone, general))
+    np.testing.assert_array_equal(raw[:2], special[:2])
+    np.testing.assert_array_equal(raw[2:], ordinary[2:])
+    assert (np.abs(special - ordinary).max(axis=1) > 1e-4).all()  # else this would show nothing
+
+
+def test_it_takes_over_at_every_set_that_strands_the_robot(run):
+    losses = load_network(run / NETWORK_FILE).losses.numpy()
+    assert {tuple(np.flatnonzero(row)) for row in losses} == set(stranding_losses(ROBOT, 2))
+
+
+def test_the_exported_bundle_hands_over_as_the_network_does(run, tmp_path):
+    passport = export(run, tmp_path / "bundle")
+    assert passport.training["specialist"]["updates"] == 2
+    rows = seen(STRANDED, MORE, ABLE)
+    session = onnxruntime.InferenceSession(tmp_path / "bundle" / "policy.onnx")
+    logits = session.run(["logits"], {"observation": rows})[0]
+    np.testing.assert_allclose(logits, load_network(run / NETWORK_FILE).infer(rows)[1], atol=1e-4)
+
+
+def test_golden_vectors_prove_the_specialist_too(run, tmp_path):
+    export(run, tmp_path / "bundle")
+    Policy(tmp_path / "bundle", ROBOT, TASK)  # checks them
+    dead = np.load(tmp_path / "bundle" / "golden.npz")["observations"][:, -8:] < 0.5
+    told = {tuple(np.flatnonzero(row)) for row in dead}
+    assert told > set(stranding_losses(ROBOT, 2))
+    assert () in told
+
+
+def test_both_share_the_updates_of_the_run(run):
+    record = read_run_record(run)
+    assert (record["specialist"]["updates"], record["updates"]) == (2, 4)
+    assert read_run_record(run / SPECIALIST_FOLDER)["settings"]["scenario"] == "drift_stranded"
+
+
+def test_both_share_its_time(tmp_path, settings, quick, monkeypatch):
+    given = []
+
+    def note(job, *_):
+        given.append(job.time_limit_s)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(jobs, "_train", note)
+    with pytest.raises(KeyboardInterrupt):
+        learned(tmp_path, settings, time_limit_s=100.0)
+    assert given == [pytest.approx(100.0 * settings.specialist.share)]
+
+
+def test_a_run_that_was_broken_off_goes_on_to_the_same_two_networks(
+    tmp_path, settings, quick, run, monkeypatch
+):
+    train, broken = jobs._train, tmp_path / "broken"
+
+    def breaks_off(job, *given):
+        if job.out == broken:
+            raise KeyboardInterrupt
+        return train(job, *given)
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(jobs, "_train", breaks_off)
+        learned(broken, settings, updates=6)
+    learned(broken, settings, updates=6)
+    ours, theirs = (load_network(folder / NETWORK_FILE).state_dict() for folder in (broken, run))
+    assert all(torch.equal(ours[name], theirs[name]) for name in theirs)
+
+
+def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
+    policy = ShippedPolicy(ROBOT.name, TASK.name, seed=1, updates=6, success=0.9)
+    first = recipe(policy, settings)
+    load = specialist.load_training_settings
+    monkeypatch.setattr(specialist, "load_training_settings", lambda *given: replace(load(*given), worlds=64))
+    assert recipe(policy, settings) != first
+
+
+@pytest.mark.parametrize(
+    ("change", "said"), [({"scenario": "drift_two_lost"}, "'stranding: true'"), ({"told": False}, "'told'")]
+)
+def test_specialists_that_could_not_take_over_are_refused(settings, monkeypatch, change, said):
+    load = specialist.load_training_settings
+    monkeypatch.setattr(specialist, "load_training_settings", lambda *given: replace(load(*given), **change))
+    with pytest.raises(ConfigError, match=said):
+        specialist_settings(settings, ROBOT, TASK)
+
+
+def test_who_is_not_told_what_is_dead_cannot_hand_over(settings):
+    with pytest.raises(ValueError, match="needs 'told'"):
+        replace(settings, told=False)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0, -0.2])
+def test_both_need_a_part_of_the_run(share):
+    with pytest.raises(ValueError, match="between 0 and 1"):
+        SpecialistPlan("any", share)
