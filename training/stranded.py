@@ -27,7 +27,7 @@ class Stranded:
 
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> Stranded | None:
-        """All that a scenario can lead to; None where the task asks for the same whatever is lost."""
+        """All that a scenario can lead to; None where the task asks for the same whatever may be lost."""
         if not isinstance(task, GoToPose) or task.stranded_weights is None:
             return None
         every = (1 << len(robot.actuators.names)) - 1
@@ -37,6 +37,8 @@ class Stranded:
             for lost in stranding_losses(robot, count)
         )
         codes = [every - sum(1 << valve for valve in lost) for lost in losses]
+        if not codes:
+            return None
         return cls(replace(task, reward_weights=task.stranded_weights), np.array(codes, dtype=int))
 
     def among(self, alive: np.ndarray) -> np.ndarray:
