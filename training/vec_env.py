@@ -15,14 +15,12 @@ from fulmar_core.controllers.told import told_terms
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
-from fulmar_core.goal import Goal
 from fulmar_core.learning_step import learning_step
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror
 from fulmar_core.tasks import Task
-from training.stranded import Stranded
+from training.stranded import asked_for
 from training.told_truth import ToldTruth
 
 
@@ -69,12 +67,12 @@ class BatchVecEnv(VecEnv):
             gas: What a valve costs in that choice, as a multiple.
             mirror: Goals on the right are shown, and answered, as on the left (`fulmar_core.symmetry`).
         """
+        task = asked_for(task, scenario)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
         self._judged = robot  # with what its actuators cost now
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
-        self._stranded = Stranded.of(robot, task, scenario)
         self.choice = WrenchChoice.of(robot, gas) if wrench else None
         self.mirror = Mirror.of(robot, task) if mirror else None
         self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
@@ -186,10 +184,16 @@ class BatchVecEnv(VecEnv):
         simulation = self.simulation
         before, goal, previous = simulation.truth, simulation.goal, simulation.command
         simulation.step(self._actions * self._scale)
-        reward, ended_early = self._judge(self.task, slice(None), before, goal, previous)
-        if self._stranded is not None:
-            worlds = self._stranded.among(simulation.world.alive)
-            reward[worlds] = self._judge(self._stranded.task, worlds, before, goal, previous)[0]
+        reward, ended_early = learning_step(
+            self._judged,
+            self.task,
+            before=before,
+            after=simulation.truth,
+            goal=goal,
+            ended=simulation.goal,
+            previous=previous,
+            command=simulation.command,
+        )
         self._age += 1
         timed_out = (self._age >= self._horizon) & ~ended_early
         done = ended_early | timed_out
@@ -209,22 +213,6 @@ class BatchVecEnv(VecEnv):
             observations = observations.copy(order="K")  # the last ones are still in the infos
             observations[ended] = self._observed(ended)
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
-
-    def _judge(
-        self, task: Task, worlds: Any, before: PlanarState, goal: Goal, previous: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Reward of the step that was done, and whether it ended the episode, in some worlds."""
-        simulation = self.simulation
-        return learning_step(
-            self._judged,
-            task,
-            before=before[worlds],
-            after=simulation.truth[worlds],
-            goal=goal[worlds],
-            ended=simulation.goal[worlds],
-            previous=previous[worlds],
-            command=simulation.command[worlds],
-        )
 
     def _observed(self, worlds: np.ndarray) -> np.ndarray:
         observations = np.asarray(self.simulation.observe(worlds))
