@@ -102,17 +102,22 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
     if calibration is not None and calibration != (job.out / CALIBRATION_FILE).absolute():
         (job.out / CALIBRATION_FILE).write_bytes(calibration.read_bytes())
     robot, task = job.settings.learner_of(load_robot(job.robot)), load_task(job.task)
-    specialist, learned = None, {}
-    if settings := specialist_settings(job.settings, robot, task):
+    settings = specialist_settings(job.settings, robot, task)
+    if settings is None:
+        record = _train(job, robot, task, watcher)
+    else:
         begin_run(
-            robot, task, job.settings,
-            seed=job.seed, out=job.out, time_limit_s=job.time_limit_s, updates=job.updates,
-        )  # fmt: skip
-        first, job = _shared(job, settings)
+            robot,
+            task,
+            job.settings,
+            seed=job.seed,
+            out=job.out,
+            time_limit_s=job.time_limit_s,
+            updates=job.updates,
+        )
+        first, rest = _shared(job, settings)
         learned = _finished(first) or _train(first, robot, task, watcher)
-        specialist = load_specialist(first.out, robot, settings)
-    record = _train(job, robot, task, watcher, specialist)
-    if learned:
+        record = _train(rest, robot, task, watcher, load_specialist(first.out, robot, settings))
         record["specialist"] = {
             key: learned[key] for key in ("steps", "updates", "wall_s", "best", "settings")
         }

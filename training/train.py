@@ -33,6 +33,7 @@ from training.run_folder import (
     CHECKPOINT_FILE,
     NETWORK_FILE,
     SETTINGS_FILE,
+    START_FILE,
     TENSORBOARD_FOLDER,
     write_run_record,
     write_start,
@@ -64,7 +65,12 @@ def begin_run(
     time_limit_s: float | None,
     updates: int | None,
 ) -> None:
-    """Write into a run folder what `fulmar train --resume` needs to know; arguments as of `train`."""
+    """Write into a run folder what `fulmar train --resume` needs to know; arguments as of `train`.
+
+    Where it is written already, it stays: `train` may be asked for a part of what the whole run was asked for.
+    """
+    if (out / START_FILE).is_file():
+        return
     out.mkdir(parents=True, exist_ok=True)
     write_training_settings(settings, out / SETTINGS_FILE)
     asked = {"robot": robot.name, "task": task.name, "seed": seed}

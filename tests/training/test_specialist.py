@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import onnxruntime
 import pytest
-import torch
 
 from fulmar_core.controllers.told import told_terms
 from fulmar_core.errors import ConfigError
@@ -22,7 +21,7 @@ from training.jobs import Job, learn
 from training.network import load_network
 from training.policies import ShippedPolicy, recipe
 from training.progress import ProgressFile
-from training.run_folder import NETWORK_FILE, SPECIALIST_FOLDER, read_run_record
+from training.run_folder import NETWORK_FILE, SPECIALIST_FOLDER, read_run_record, read_start
 from training.settings import SpecialistPlan, load_training_settings
 from training.specialist import specialist_settings
 
@@ -127,22 +126,28 @@ def test_both_share_its_time(tmp_path, settings, quick, monkeypatch):
     assert given == [pytest.approx(100.0 * settings.specialist.share)]
 
 
-def test_a_run_that_was_broken_off_goes_on_to_the_same_two_networks(
-    tmp_path, settings, quick, run, monkeypatch
+@pytest.mark.parametrize("part", ["specialist", "the other"])
+def test_a_run_that_was_broken_off_goes_on_to_what_was_asked_for(
+    tmp_path, settings, quick, run, monkeypatch, part
 ):
-    train, broken = jobs._train, tmp_path / "broken"
+    broken = tmp_path / "broken"
+    train = jobs.train
 
-    def breaks_off(job, *given):
-        if job.out == broken:
+    def breaks_off(*given, out, **more):
+        if (out.name == SPECIALIST_FOLDER) == (part == "specialist"):
+            train(*given, out=out, **more | {"updates": 1})
+            for name in ("run.json", NETWORK_FILE):
+                (out / name).unlink()
             raise KeyboardInterrupt
-        return train(job, *given)
+        return train(*given, out=out, **more)
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(jobs, "_train", breaks_off)
+        patch.setattr(jobs, "train", breaks_off)
         learned(broken, settings, updates=6)
-    learned(broken, settings, updates=6)
-    ours, theirs = (load_network(folder / NETWORK_FILE).state_dict() for folder in (broken, run))
-    assert all(torch.equal(ours[name], theirs[name]) for name in theirs)
+    assert read_start(broken)["updates"] == 6
+    learned(broken, settings, updates=read_start(broken)["updates"])
+    assert read_run_record(broken)["updates"] == 4
+    assert read_run_record(broken)["specialist"]["updates"] == 2
 
 
 def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):

@@ -194,12 +194,12 @@ def _one(job: Job, *, as_json: bool) -> None:
     from training.progress import LearningBar
 
     record = learn(job, LearningBar())
-    console.print(f"learned from {record['steps']:,} steps in {record['wall_s']:.0f} s; judging in MuJoCo")
+    parts = [record, record.get("specialist", {"steps": 0, "wall_s": 0.0})]
+    steps, wall_s = (sum(part[key] for part in parts) for key in ("steps", "wall_s"))
+    console.print(f"learned from {steps:,} steps in {wall_s:.0f} s; judging in MuJoCo")
     figures = judge_in_mujoco(job.out, episodes=job.episodes)
     if as_json:
-        print_json(
-            {"run": str(job.out), "steps": record["steps"], "wall_s": record["wall_s"], "mujoco": figures}
-        )
+        print_json({"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures})
         return
     output.print(
         f"success {figures['success_rate']:.3f} of {job.episodes} episodes in MuJoCo; run folder {job.out}\n"
