@@ -41,6 +41,7 @@ class PoseReward:
     approach: float  # times metres come nearer
     turn: float  # times radians come nearer
     fine: float = 0.0  # times exp(-d / 0.03 m - |e| / 0.03 rad): asks for a centimetre and a degree at once
+    turned: float = 0.0  # times (1 - tanh((|e| - 0.08 rad) / 0.02 rad)) / 2: within 4°, as benchmarks count it
     aligned: float = 0.0  # times exp(-|e| / 0.03 rad), wherever the robot is
     centred: float = 0.0  # times exp(-d / 0.03 m), wherever it looks
 
@@ -119,6 +120,7 @@ class GoToPose:
             + w.approach * (old.position - d)
             + w.turn * (xp.abs(old.heading) - e)
             + w.fine * xp.exp(-d / 0.03 - e / 0.03)
+            + w.turned * 0.5 * (1.0 - xp.tanh((e - 0.08) / 0.02))
             + w.aligned * xp.exp(-e / 0.03)
             + w.centred * xp.exp(-d / 0.03)
         )
