@@ -41,7 +41,7 @@ class PoseReward:
     approach: float  # times metres come nearer
     turn: float  # times radians come nearer
     fine: float = 0.0  # times exp(-d / 0.03 m - |e| / 0.03 rad): asks for a centimetre and a degree at once
-    turned: float = 0.0  # times (1 - tanh((|e| - 0.08 rad) / 0.02 rad)) / 2: within 4°, as benchmarks count it
+    turned: float = 0.0  # times (1 - tanh((|e| - 0.08 rad) / 0.02 rad)) / 2: asks for what counts as turned
     aligned: float = 0.0  # times exp(-|e| / 0.03 rad), wherever the robot is
     centred: float = 0.0  # times exp(-d / 0.03 m), wherever it looks
 
