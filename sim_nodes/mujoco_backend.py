@@ -111,7 +111,8 @@ class MujocoBackend:
         """True state and reading of the inertial unit."""
         # mj_step leaves the sensors as they were before its last integration step.
         mujoco.mj_forward(self.model, self.data)
-        read = {name: np.array(self.data.sensordata[at]) for name, at in self._at.items()}
+        every = np.array(self.data.sensordata)
+        read = {name: every[at] for name, at in self._at.items()}
         position = read["position"]
         position[2] -= self._scene.machine.rest_height
         w, x, y, z = read["attitude"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.counter_rng import uniform_from, words, world_keys
-from fulmar_core.disturbances.outside import outside_wrench
+from fulmar_core.disturbances.outside import is_constant, outside_wrench
 from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of
@@ -59,6 +59,7 @@ class OneWorld:
         response = self._robot.actuators.response
         self.latest_s = float(response.delay_s + response.opening_delay_s + late)
         self.outside = tuple(np.zeros(1) for _ in range(3))
+        self._constant_push = is_constant(self.world)
         self._blurred = bool(self.world.velocity_noise[0] or self.world.yaw_rate_noise[0])
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
         self._ticks = 0
@@ -90,9 +91,8 @@ class OneWorld:
         if ticks > 1 or changed or self._left <= 0:
             self._command = np.array(command, dtype=float)
             self.actuation.begin(self._command[:, None], self.world, self._noise())
-            span = (ticks if ticks > 1 else nominal) * self._robot.timing.physics_dt
-            time_s = np.array([self._ticks * self._robot.timing.physics_dt])
-            self.outside = outside_wrench(_batch_of_one(planar_of(truth)), self.world, time_s, span)
+            if not (self._constant_push and self._begun):
+                self.outside = self._push(truth, ticks if ticks > 1 else nominal)
             self._begun += 1
             self._left = nominal
         self._left -= ticks
@@ -101,6 +101,12 @@ class OneWorld:
     def measure(self, truth: RigidBodyState) -> RigidBodyState:
         """What the odometry reports now; called once for each `begin`, at its end."""
         return self._measure(truth)
+
+    def _push(self, truth: RigidBodyState, ticks: int) -> tuple[np.ndarray, ...]:
+        dt = self._robot.timing.physics_dt
+        return outside_wrench(
+            planar_of(truth)[None], self.world, np.array([self._ticks * dt]), ticks * dt
+        )
 
     def _noise(self) -> np.ndarray | None:
         if not self.world.action_noise[0]:
@@ -126,12 +132,8 @@ class OneWorld:
         true = planar_of(truth)
         steps = np.array([self._measured])
         self._measured += 1
-        batch = self._odometer.measure(_batch_of_one(true), self.world, self._numbers, self._repeats, steps)
+        batch = self._odometer.measure(true[None], self.world, self._numbers, self._repeats, steps)
         return _tilted(batch[0], truth, true)
-
-
-def _batch_of_one(state: PlanarState) -> PlanarState:
-    return PlanarState(*(np.reshape(getattr(state, name), (1,)) for name in PlanarState.__slots__))
 
 
 def _tilted(measured: PlanarState, truth: RigidBodyState, true: PlanarState) -> RigidBodyState:

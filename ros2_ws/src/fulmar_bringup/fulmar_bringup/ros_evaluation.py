@@ -37,7 +37,7 @@ from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
-from fulmar_ros.runtime import SWITCH_INTERVAL_S, end_with_parent, spinning
+from fulmar_ros.runtime import SWITCH_INTERVAL_S, end_with_parent, settle_memory, spinning
 from sim_nodes.sim_node import make_backend
 
 Progress = Callable[[int], None]
@@ -194,6 +194,7 @@ def _roll_out_share(plan: RunPlan, numbers: range, domain: int, index: int) -> T
             if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise RunFailed("the plant could not be configured")
             with spinning(plant, overseer.fail):
+                settle_memory()
                 return _episodes(plan, plant, overseer, group, numbers, progress)
     finally:
         group.stop_all()

@@ -50,7 +50,8 @@ class Observer:
             share = shares(previous_command, self._scale)
             columns += [share[..., i] for i in range(share.shape[-1])]
         # Stacked in front and turned about: each column is written in one piece.
-        return xp.moveaxis(xp.stack(columns, axis=0), 0, -1)
+        stacked = xp.stack(columns, axis=0)
+        return stacked.T if len(shape) == 1 else xp.moveaxis(stacked, 0, -1)
 
 
 def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> Array:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from array_api_compat import array_namespace
+from fulmar_core.arrays import array_namespace
 
 Array = Any  # an array of NumPy, torch or any other library that follows the array API
 
@@ -35,7 +35,7 @@ def _turn(quat_xyzw: Array, vector: Array, w: Array) -> Array:
 
     The inverse rotation is the same with -w, since q and -q are one rotation.
     """
-    xp = array_namespace(quat_xyzw, vector)
+    xp = array_namespace(quat_xyzw)
     x, y, z = quat_xyzw[..., 0], quat_xyzw[..., 1], quat_xyzw[..., 2]
     a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
@@ -46,7 +46,7 @@ def _turn(quat_xyzw: Array, vector: Array, w: Array) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product over the last axis, shapes (..., 3)."""
-    xp = array_namespace(a, b)
+    xp = array_namespace(a)
     a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
     b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
     return xp.stack((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0), axis=-1)
@@ -54,7 +54,7 @@ def cross(a: Array, b: Array) -> Array:
 
 def multiply(p_xyzw: Array, q_xyzw: Array) -> Array:
     """Hamilton product p ⊗ q, shapes (..., 4)."""
-    xp = array_namespace(p_xyzw, q_xyzw)
+    xp = array_namespace(p_xyzw)
     px, py, pz, pw = (p_xyzw[..., i] for i in range(4))
     qx, qy, qz, qw = (q_xyzw[..., i] for i in range(4))
     return xp.stack(

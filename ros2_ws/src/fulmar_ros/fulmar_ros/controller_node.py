@@ -84,7 +84,7 @@ class ControllerNode(LifecycleNode):
             propose=lambda candidate: self._succession.propose(candidate),
             warn=self.get_logger().warning,
         )
-        self._acted = 0  # control steps
+        self._acted = 0  # control steps since the activation
         self._anew = False  # the controller forgets what was before, at its next step
         self._newest: Measurement | None = None
         self.mission = Mission(self.robot, self.task, streamed=self.settings.goals_streamed)
@@ -147,7 +147,7 @@ class ControllerNode(LifecycleNode):
             self._newest = None
             self._input_gate.forget()
             self._flags = dataclasses.replace(
-                self._flags, activated=True, last_input_ns=None, input_problem="", outside="", active_s=0.0
+                self._flags, activated=True, last_input_ns=None, input_problem="", outside=""
             )
             self._acted = 0
         self._beat.renew()
@@ -210,7 +210,8 @@ class ControllerNode(LifecycleNode):
             self.mission.drop()
             self._follow_mission()
             self._flags = dataclasses.replace(self._flags, outside=self._outside())
-        self._flags = dataclasses.replace(self._flags, estop=stopped)
+        active_s = self._acted * self._control_ns / 1e9
+        self._flags = dataclasses.replace(self._flags, estop=stopped, active_s=active_s)
         return arbitrate(self._flags, now)
 
     def _on_estop(self, message: Bool) -> None:
@@ -361,7 +362,6 @@ class ControllerNode(LifecycleNode):
             self.wires.publish_reasoning(observation, action, stamp)
             self._judge(problem)
             self._acted += 1
-            self._set(active_s=self._acted * self._control_ns / 1e9)
         if not informer.listens:  # only for others: the command does not wait for it
             health = self._watch(measurement, before, informer)
         if health is not None:

@@ -109,9 +109,7 @@ class Thrusters:
         """
         if not self.shared_pressure:
             return self.thrust * command
-        xp = array_namespace(command)
-        count = xp.sum(command, axis=-1, keepdims=True)
-        return self.thrust * command / xp.maximum(count, xp.ones_like(count))
+        return self.thrust * command / clip(command.sum(-1)[..., None], 1.0, None)
 
     def wrench_in_body(self, command: Array) -> tuple[Array, Array]:
         """Total force and torque of a command.

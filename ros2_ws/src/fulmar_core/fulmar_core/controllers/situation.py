@@ -74,34 +74,30 @@ class Watch:
         raw = raw_situation(reader, observation)
         u, v, r = raw.motion
         yaw = -raw.turn if self._sees_pose or self._heading is None else self._heading
-        (x, y), (vx, vy) = _turned((-raw.goal[0], -raw.goal[1]), yaw), _turned((u, v), yaw)
+        (x, y), (vx, vy) = _turned(yaw, (-raw.goal[0], -raw.goal[1]), (u, v))
         command = (
             self._command
             if self._command is not None
             else np.broadcast_to(self._closed, (*shape, len(self._closed)))
         )
         health = self._estimator.see(PlanarState(x, y, yaw, vx, vy, r), command, self._dt)
-        x, y, yaw, vx, vy, r = np.moveaxis(health.motion, -1, 0)
+        x, y, yaw, vx, vy, r = (health.motion[..., i] for i in range(6))
         self._heading = yaw + self._dt * r
-        goal, turn = raw.goal, raw.turn
-        if self._sees_pose:
-            goal = _turned((-x, -y), -yaw)
-            turn = np.asarray(wrapped(-yaw))
-        push = _turned((health.push[..., 0], health.push[..., 1]), -yaw)
-        return Situation(
-            goal,
-            turn,
-            (*_turned((vx, vy), -yaw), r),
-            np.stack((*push, health.push[..., 2]), axis=-1),
-            health.alive,
-        )
+        force = (health.push[..., 0], health.push[..., 1])
+        goal, velocity, force = _turned(-yaw, (-x, -y), (vx, vy), force)
+        turn = np.asarray(wrapped(-yaw))
+        if not self._sees_pose:
+            goal, turn = raw.goal, raw.turn
+        push = health.push.copy()
+        push[..., 0], push[..., 1] = force
+        return Situation(goal, turn, (*velocity, r), push, health.alive)
 
     def acts(self, command: np.ndarray) -> None:
         """Hear what is commanded until the next observation, shape (..., n)."""
         self._command = command
 
 
-def _turned(vector: Vector, angle: np.ndarray) -> Vector:
-    """A vector turned counterclockwise."""
+def _turned(angle: np.ndarray, *vectors: Vector) -> list[Vector]:
+    """Vectors turned counterclockwise by one angle."""
     c, s = np.cos(angle), np.sin(angle)
-    return c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]
+    return [(c * x - s * y, s * x + c * y) for x, y in vectors]

@@ -49,11 +49,8 @@ class Told:
         """Take observations, shape (rows, n), and append `told_terms`; another number of rows begins anew."""
         situation = self._watch.look(np.asarray(observations, dtype=float))
         assert situation.alive is not None
-        seen = observations
-        if self._estimates_pose:
-            terms = self._task.observe(*_seen_from_goal(situation))
-            seen = np.column_stack((*terms, observations[:, len(terms) :]))
-        return np.column_stack((seen, situation.push, situation.alive))
+        terms = self._task.observe(*_seen_from_goal(situation)) if self._estimates_pose else ()
+        return np.column_stack((*terms, observations[:, len(terms) :], situation.push, situation.alive))
 
     def acts(self, commands: np.ndarray) -> None:
         """Hear what is commanded until the next observations, shape (rows, valves)."""

@@ -37,6 +37,12 @@ def outside_wrench(
     )
 
 
+def is_constant(world: World) -> bool:
+    """Whether every world is pushed in the same way wherever its body is, at any time; of NumPy arrays."""
+    changing = (world.wave_force, world.wave_torque, world.kick, world.tether_stiffness)
+    return not any(part.any() for part in changing)
+
+
 def _tether(state: PlanarState, world: World) -> tuple[Array, Array, Array]:
     """Pull of an air line that hangs from above, as a pendulum's: in proportion to how far its lower end is aside.
 

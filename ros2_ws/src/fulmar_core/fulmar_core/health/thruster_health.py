@@ -151,10 +151,12 @@ class ThrusterHealth:
     def _believed(self) -> Health:
         assert self._state is not None
         best = np.argmax(self._chance, axis=-1)
+        rows = self._state.reshape(-1, *self._state.shape[-2:])
+        motion = rows[np.arange(best.size), best.ravel(), :6]
         return Health(
             self._chance @ self._alive,
             self._alive[best],
-            np.take_along_axis(self._state, best[..., None, None], axis=-2)[..., 0, :6],
+            motion.reshape(*best.shape, 6),
             (self._chance[..., None, :] @ self._state[..., 6:])[..., 0, :],
         )
 

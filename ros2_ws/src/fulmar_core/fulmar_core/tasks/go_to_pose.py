@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.planar import PlanarState
+from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.terms import (
@@ -87,12 +87,13 @@ class GoToPose:
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `TaskProtocol.observe`."""
-        x, y = goal_terms(state, goal.current)
+        target = goal.current
+        x, y = goal_terms(state, target)
         fine = fine_terms(x, y, saturation=self.fine_distance)
         motion = motion_terms(state)
-        terms: tuple[Array, ...] = (x, y, *heading_terms(state, goal.current), *motion, *fine)
+        terms: tuple[Array, ...] = (x, y, *heading_terms(state, target), *motion, *fine)
         if self.fine_heading_deg:
-            error = self.errors(state, goal).heading
+            error = wrapped(target[..., 2] - state.yaw)
             terms += (clip(error / math.radians(self.fine_heading_deg), -1.0, 1.0),)
         if self.fine_speed:
             terms += tuple(clip(speed / self.fine_speed, -1.0, 1.0) for speed in motion[:2])
