@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.fulmar_bringup.bag_commands import POLICY
 from tests.fulmar_bringup.synthetic_run import CALM, Plan, write_run
 
 
@@ -39,3 +40,9 @@ def copy_of(tmp_path) -> Callable[[Path], Path]:
         return Path(shutil.copytree(bag, tmp_path / bag.name))
 
     return copy
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    """A copy of a reference bag, to be changed or damaged."""
+    return Path(shutil.copytree(POLICY, tmp_path / "bag"))

@@ -10,9 +10,12 @@ from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.enums import StoragePlugin
 
 from fulmar_bringup.bags.contents import open_bag
+from fulmar_bringup.bags.decode import messages, stamp_of
 from fulmar_bringup.bags.difference import differing
+from fulmar_core.topics import ODOMETRY
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
+from tests.fulmar_bringup.bag_commands import LQR, POLICY, answer, ask
 
 SCAN, PATH = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Path"
 
@@ -105,3 +108,34 @@ def test_bags_without_a_message_are_not_called_the_same(tmp_path):
     one, other = bag_of(tmp_path / "one", SCAN), bag_of(tmp_path / "other", SCAN)
     found = difference(one, other)
     assert (found["compared"], found["same"]) == (0, False)
+
+
+def test_a_bag_is_the_same_as_itself_and_differs_from_another():
+    assert answer("diff", POLICY, POLICY)["same"]
+    assert ask("diff", POLICY, POLICY).exit_code == 0
+    found = answer("diff", POLICY, LQR)
+    assert not found["same"]
+    assert found["provenance"]["controller"] == ["policy", "lqr"]
+    assert ask("diff", POLICY, LQR).exit_code == 1
+
+
+def test_a_diff_names_the_field_and_the_time_of_the_first_difference(copy, tmp_path):
+    bag = open_bag(copy)
+    topic = bag.of(ODOMETRY)
+    (log, message) = messages(topic)[7]
+    message.pose.pose.position.x += 0.25
+    out = BagWriter(tmp_path / "changed", run_info=bag.info)
+    for each in bag.topics.values():
+        out.add_topic(each.name, each.type, "stream")
+    for each in bag.topics.values():
+        for index, data in enumerate(each.data):
+            changed = type_store().serialize_cdr(message, each.type) if each is topic and index == 7 else data
+            out.write(each.name, bytes(changed), log_ns=each.log_ns[index])
+    out.close()
+    found = answer("diff", copy, tmp_path / "changed")
+    (field,) = [f for t in found["topics"] if t["topic"] == "odom" for f in t["fields"]]
+    assert field["name"] == "pose.pose.position.x"
+    assert field["first_stamp_s"] == pytest.approx(stamp_of(message) / 1e9)
+    assert field["found"] - field["recorded"] == pytest.approx(0.25)
+    assert log == topic.log_ns[7]
+    assert answer("diff", copy, tmp_path / "changed", "--tolerance", "0.3")["same"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,14 +11,14 @@ from rosbags.rosbag2.enums import StoragePlugin
 from typer.testing import CliRunner
 
 from fulmar_bringup.bags.contents import open_bag
+from fulmar_bringup.bags.decode import joint_vectors, odometries
 from fulmar_bringup.cli import app
 from fulmar_core.errors import BagError
-from fulmar_core.topics import ACTION, COMMAND, OBSERVATION
+from fulmar_core.topics import ACTION, COMMAND, OBSERVATION, ODOMETRY
 from fulmar_ros.bag_writer import BagWriter
+from tests.fulmar_bringup.bag_commands import BAGS, POLICY, answer, ask
 from tests.fulmar_bringup.foreign_bag import write_foreign
 from tests.fulmar_bringup.test_bag_diff import SCAN, bag_of, scan
-
-POLICY = Path(__file__).resolve().parents[1] / "replay" / "bags" / "floating_platform_go_to_pose_policy"
 
 
 def export(bag, *words):
@@ -83,3 +83,42 @@ def test_a_bag_of_others_is_no_dataset_and_no_option_is_named_that_there_is_not(
     told = str(export(bag, "--to", "lerobot", "--out", tmp_path / "set").exception)
     assert "others recorded it" in told
     assert "--robot" not in told
+
+
+def test_tables_hold_every_number(tmp_path):
+    answer("export", POLICY, "--to", "csv", "--out", tmp_path / "csv")
+    with (tmp_path / "csv" / "floating_platform.odom.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    seen = odometries(open_bag(POLICY).of(ODOMETRY))
+    assert [float(row["pose.pose.position.x"]) for row in rows] == seen.pose[:, 0].tolist()
+    answer("export", POLICY, "--to", "npz", "--out", tmp_path / "bag.npz")
+    arrays = np.load(tmp_path / "bag.npz", allow_pickle=False)
+    np.testing.assert_array_equal(arrays["floating_platform/odom/pose.pose.position.x"], seen.pose[:, 0])
+    np.testing.assert_array_equal(arrays["floating_platform/odom/stamp_ns"], seen.stamp_ns)
+
+
+def test_a_dataset_holds_an_episode_for_each_bag_and_a_frame_for_each_step(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    answer("export", POLICY, POLICY, "--to", "lerobot", "--out", tmp_path / "set")
+    info = json.loads((tmp_path / "set/meta/info.json").read_text())
+    assert info["codebase_version"] == "v2.1"
+    assert (info["total_episodes"], info["total_frames"], info["fps"]) == (2, 200, 5)
+    path = info["data_path"].format(episode_chunk=0, episode_index=1)
+    table = parquet.read_table(tmp_path / "set" / path)
+    assert set(table.column_names) == set(info["features"])
+    recorded = joint_vectors(open_bag(POLICY).of(ACTION), "effort").values
+    np.testing.assert_array_equal(np.array(table["action"].to_pylist()), recorded)
+    assert table["index"].to_pylist() == list(range(100, 200))
+    assert table["next.done"].to_pylist() == [False] * 99 + [True]
+    lines = (tmp_path / "set/meta/episodes.jsonl").read_text().splitlines()
+    assert [json.loads(line)["length"] for line in lines] == [100, 100]
+    refused = ask(
+        "export",
+        POLICY,
+        BAGS / "turtlebot2_go_to_position_policy",
+        "--to",
+        "lerobot",
+        "--out",
+        tmp_path / "mixed",
+    )
+    assert "another kind" in str(refused.exception)

@@ -1,21 +1,29 @@
-"""Single nodes with their neighbour, each in a ROS domain of its own."""
+"""Single nodes with their neighbour, and recorders with what they hear, each in a ROS domain of its own."""
 
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from fulmar_core.topics import DIAGNOSTICS
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from policy_server.lqr_node import make_lqr
 from sim_nodes.sim_node import make_backend
 from tests.conftest import RosDomain
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, until
+from tests.ros.recorder import Recorder
 
 
 @pytest.fixture
@@ -59,3 +67,48 @@ def stream(neighbour: Neighbour, controller: ControllerNode) -> Iterator[Stream]
     until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
     yield odometry
     odometry.stop()
+
+
+@pytest.fixture
+def record(ros_domain, tmp_path) -> Iterator[object]:
+    """Starts recorders, each a process; none outlives its test."""
+    started = []
+
+    def start(*parameters: str, directory: Path | None = None) -> Recorder:
+        started.append(Recorder(directory or tmp_path / "bag", ros_domain.env, *parameters))
+        return started[-1]
+
+    yield start
+    for recorder in started:
+        recorder.process.kill()
+        recorder.process.communicate()
+
+
+@pytest.fixture
+def node(ros_domain) -> Iterator[Node]:
+    """Who talks to the recorder, and hears it."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=ros_domain.id)
+    made = rclpy.create_node("talker", namespace=NAMESPACE, context=context)
+    yield made
+    made.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+@pytest.fixture
+def healths(node) -> Iterator[list[DiagnosticStatus]]:
+    """What the recorder said about itself, newest last."""
+    heard: list[DiagnosticStatus] = []
+    node.create_subscription(
+        DiagnosticArray,
+        DIAGNOSTICS.name,
+        lambda message: heard.extend(message.status),
+        subscriber_qos(DIAGNOSTICS),
+    )
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    yield heard
+    executor.shutdown()
+    thread.join()

@@ -1,4 +1,4 @@
-"""Driver nodes on emulated devices: whole runs, dead drivers, the bearing, and adapters to other stacks."""
+"""Driver nodes on emulated devices: whole runs, dead drivers and the bearing."""
 
 from __future__ import annotations
 
@@ -15,12 +15,9 @@ from queue import SimpleQueue
 import numpy as np
 import psutil
 import pytest
-from geometry_msgs.msg import Twist
 from mcap.reader import make_reader
-from nav_msgs.msg import Odometry
-from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from fulmar_bringup.domains import reserved_domains
@@ -28,22 +25,13 @@ from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import RunPlan, emulator_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.system import default_hardware
-from fulmar_core.backend import Sample
-from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.topics import AIR_BEARING, DEVICE_STATE, ODOMETRY
-from fulmar_ros.message_reader import stamp_ns
-from fulmar_ros.plant_wires import PlantWires
+from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
-from fulmar_ros.runtime import spinning
-from hardware_drivers.adapter_node import AdapterNode
-from hardware_drivers.driver_node import DriverNode
 from hardware_drivers.settings import load_hardware
 from sim_nodes.emulators.valves import ValveBank
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import Neighbour, until
-from tests.states import planar_state
 
 pytestmark = pytest.mark.real_time
 
@@ -263,151 +251,6 @@ def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp
             attached = {attachment.name for attachment in reader.iter_attachments()}
         assert {f"/{robot}/odom", f"/{robot}/actuators/state", f"/{robot}/emulator/actuators"} <= topics
         assert "hardware.yaml" in attached
-
-
-@pytest.fixture
-def heard(neighbour: Neighbour):
-    """Starts a node in this process, and keeps what comes on a topic of another stack."""
-    messages: list = []
-
-    def listen(kind: type, topic: str) -> list:
-        neighbour.node.create_subscription(kind, topic, messages.append, 10)
-        return messages
-
-    return listen
-
-
-def running(make, namespace: str, *parameters: str, request_exit=lambda _code: None):
-    arguments = ["--ros-args", "-r", f"__ns:=/{namespace}"]
-    arguments += [word for parameter in parameters for word in ("-p", parameter)]
-    node = make(request_exit, cli_args=arguments)
-    return node, spinning(node, lambda error: pytest.fail(repr(error)))
-
-
-def test_our_commands_reach_the_lab_s_valve_node_and_silence_closes_its_valves(neighbour, heard) -> None:
-    """Entry i after the bearing is thruster ORDER[i]; the node beyond has no watchdog, ours stands before it."""
-    messages = heard(Int16MultiArray, "/spacer_floating_platform/valves/input")
-    node, spin = running(DriverNode, "floating_platform", "hardware:=zero_g_lab_valve_node")
-    with spin:
-        first = [1.0] + [0.0] * 7
-        until(lambda: neighbour.command(first) or (bool(messages) and any(messages[-1].data[1:])))
-        assert messages[-1].data.tolist() == [1, 0, 0, 0, 0, 1, 0, 0, 0]
-        until(lambda: not any(messages[-1].data[1:]))
-        assert messages[-1].data[0] == 1
-        node.stop()
-        until(lambda: messages[-1].data.tolist() == [0] * 9)  # it is let down
-
-
-@pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)
-def test_our_commands_reach_a_base_that_takes_plain_twists(neighbour, heard) -> None:
-    messages = heard(Twist, "/commands/velocity")
-    node, spin = running(DriverNode, "turtlebot2", "robot:=turtlebot2", "hardware:=turtlebot2_kobuki_node")
-    with spin:
-        until(
-            lambda: (
-                neighbour.drive.publish(neighbour.twist(0.3, -0.4))
-                or (bool(messages) and (messages[-1].linear.x, messages[-1].angular.z) == (0.3, -0.4))
-            )
-        )
-        until(lambda: messages[-1].linear.x == 0.0)
-        node.stop()
-
-
-@pytest.mark.parametrize("neighbour", ["kingfisher"], indirect=True)
-def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> None:
-    messages = heard(Float32MultiArray, "/action")
-    node, spin = running(DriverNode, "kingfisher", "robot:=kingfisher", "hardware:=kingfisher_action")
-    with spin:
-        until(
-            lambda: (
-                neighbour.command([0.5, -1.0]) or (bool(messages) and list(messages[-1].data) == [0.5, -1.0])
-            )
-        )
-        until(lambda: not any(messages[-1].data))
-        node.stop()
-
-
-@pytest.mark.parametrize(
-    ("data", "commanded"),
-    [
-        ([1, 1, 0, 0, 0, 1, 0, 0, 0], [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
-        ([1, 2, 0, 0, 0, 0, 0, 0, 0], None),
-        ([1] * 8, None),
-    ],
-)
-def test_the_lab_s_controllers_command_our_valves_through_the_adapter(neighbour, data, commanded) -> None:
-    _node, spin = running(AdapterNode, "floating_platform", "hardware:=zero_g_lab_valve_node")
-    publisher = neighbour.node.create_publisher(Int16MultiArray, "/spacer_floating_platform/valves/input", 1)
-    good = Int16MultiArray(data=[1] + [0] * 8)
-    with spin:
-        until(lambda: publisher.publish(good) or bool(neighbour.commands))
-        neighbour.commands.clear()
-        for _ in range(10):
-            publisher.publish(Int16MultiArray(data=data))
-            time.sleep(0.02)
-        found = [command for command in neighbour.commands if command.any()]
-        assert all(command.tolist() == commanded for command in found)
-        assert bool(found) is (commanded is not None)
-
-
-def test_an_adapter_that_hears_our_own_driver_passes_nothing_on_and_ends(neighbour) -> None:
-    """Both of one hardware file: what the driver publishes would come back as a command and feed its watchdog."""
-    ended: list[int] = []
-    file = "hardware:=zero_g_lab_valve_node"
-    node, spin = running(DriverNode, "floating_platform", file)
-    _adapter, spin_adapter = running(AdapterNode, "floating_platform", file, request_exit=ended.append)
-    with spin, spin_adapter:
-        until(lambda: bool(ended))
-        assert set(ended) == {2}
-        first = [1.0] + [0.0] * 7
-        until(lambda: neighbour.command(first) or bool(neighbour.applied and neighbour.applied[-1].any()))
-        until(lambda: not neighbour.applied[-1].any())
-        node.stop()
-
-
-@pytest.mark.parametrize("neighbour", ["kingfisher"], indirect=True)
-@pytest.mark.parametrize(
-    ("data", "taken"), [([0.5, -0.25], True), ([0.5], False), ([float("nan"), 0.0], False)]
-)
-def test_roboran_s_boats_command_ours_through_the_adapter(neighbour, data, taken) -> None:
-    _node, spin = running(AdapterNode, "kingfisher", "hardware:=kingfisher_action")
-    publisher = neighbour.node.create_publisher(Float32MultiArray, "/action", 1)
-    with spin:
-        until(lambda: publisher.publish(Float32MultiArray(data=[0.0, 0.0])) or bool(neighbour.commands))
-        for _ in range(10):
-            publisher.publish(Float32MultiArray(data=data))
-            time.sleep(0.02)
-        assert any(command.any() for command in neighbour.commands) is taken
-
-
-def test_odometry_goes_on_when_somebody_sets_the_clock_back(neighbour) -> None:
-    """By an hour: dropping what lies behind the newest stamp would keep a robot blind for as long.
-
-    What comes twice, or a little late, is still dropped.
-    """
-    stamps: list[int] = []
-    neighbour.node.create_subscription(
-        Odometry,
-        ODOMETRY.name,
-        lambda message: stamps.append(stamp_ns(message.header.stamp)),
-        subscriber_qos(ODOMETRY, reliable=True, depth=50),
-    )
-    node = LifecycleNode("plant", namespace=f"/{neighbour.robot.name}")
-    guard = ActuatorGuard(neighbour.robot.actuators, Watchdog(200_000_000))
-    wires = PlantWires(node, neighbour.robot, guard, simulated=False)
-    now, hour = 1_700_000_000_000_000_000, 3_600_000_000_000
-    sent = [now, now, now + 20_000_000, now + 10_000_000, now - hour, now - hour, now - hour + 20_000_000]
-    try:
-        until(lambda: wires.subscribers() > 0)
-        time.sleep(0.3)
-        for stamp in sent:
-            wires.publish_sample(Sample(planar_state(0.0, 0.0, 0.0), None, None, stamp_ns=stamp), 0)
-        until(lambda: len(stamps) >= 4)
-        time.sleep(0.1)
-    finally:
-        wires.destroy(node)
-        node.destroy_node()
-    assert stamps == [now, now + 20_000_000, now - hour, now - hour + 20_000_000]
 
 
 def test_a_driver_whose_device_is_not_there_says_what_to_do(ros_domain: RosDomain, tmp_path) -> None:

@@ -8,17 +8,25 @@ import time
 import numpy as np
 import pytest
 from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from fulmar_core.backend import Sample
-from fulmar_core.topics import COMMAND, SIMULATION_START_NS
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.watchdog import Watchdog
+from fulmar_core.topics import COMMAND, ODOMETRY, SIMULATION_START_NS
 from fulmar_ros.convert import VectorWriter
+from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.plant_wires import PlantWires
+from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from sim_nodes.mock_backend import MockBackend
 from sim_nodes.sim_node import make_backend
 from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
+from tests.states import planar_state
 
 pytestmark = pytest.mark.real_time
 
@@ -178,3 +186,33 @@ def test_silence_after_the_last_tick_is_no_trip(neighbour: Neighbour) -> None:
             time.sleep(0.02)
         assert node.guard.watchdog.trips == 0
         node.stop()
+
+
+def test_odometry_goes_on_when_somebody_sets_the_clock_back(neighbour) -> None:
+    """By an hour: dropping what lies behind the newest stamp would keep a robot blind for as long.
+
+    What comes twice, or a little late, is still dropped.
+    """
+    stamps: list[int] = []
+    neighbour.node.create_subscription(
+        Odometry,
+        ODOMETRY.name,
+        lambda message: stamps.append(stamp_ns(message.header.stamp)),
+        subscriber_qos(ODOMETRY, reliable=True, depth=50),
+    )
+    node = LifecycleNode("plant", namespace=f"/{neighbour.robot.name}")
+    guard = ActuatorGuard(neighbour.robot.actuators, Watchdog(200_000_000))
+    wires = PlantWires(node, neighbour.robot, guard, simulated=False)
+    now, hour = 1_700_000_000_000_000_000, 3_600_000_000_000
+    sent = [now, now, now + 20_000_000, now + 10_000_000, now - hour, now - hour, now - hour + 20_000_000]
+    try:
+        until(lambda: wires.subscribers() > 0)
+        time.sleep(0.3)
+        for stamp in sent:
+            wires.publish_sample(Sample(planar_state(0.0, 0.0, 0.0), None, None, stamp_ns=stamp), 0)
+        until(lambda: len(stamps) >= 4)
+        time.sleep(0.1)
+    finally:
+        wires.destroy(node)
+        node.destroy_node()
+    assert stamps == [now, now + 20_000_000, now - hour, now - hour + 20_000_000]

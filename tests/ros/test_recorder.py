@@ -1,4 +1,4 @@
-"""The recorder as a process of its own: what it keeps, and how it ends."""
+"""The recorder as a process of its own: what it keeps, what it says, and how it ends."""
 
 from __future__ import annotations
 
@@ -10,109 +10,25 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from importlib.metadata import version
-from pathlib import Path
 
 import psutil
 import pytest
-import rclpy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
-from std_msgs.msg import Bool, String
+from std_msgs.msg import String
 
 from fulmar_core.errors import LockstepError
-from fulmar_core.topics import DIAGNOSTICS, ESTOP, METADATA, ODOMETRY
+from fulmar_core.topics import METADATA
 from fulmar_ros.patience import publish_patiently
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import publisher_qos
+from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 
 pytestmark = pytest.mark.real_time
-
-ROBOT = "/floating_platform"
-
-
-class Recorder:
-    """A recorder process, its output, and a publisher that it hears."""
-
-    def __init__(self, directory: Path, env: dict[str, str], *parameters: str) -> None:
-        options = [f"directory:={directory}", *parameters]
-        command = [sys.executable, "-m", "fulmar_ros.recorder_node", "--ros-args", "-r", f"__ns:={ROBOT}"]
-        command += [word for option in options for word in ("-p", option)]
-        self.directory = directory
-        self.process = subprocess.Popen(
-            command, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-
-    def wait_until_recording(self, words: str = "recording to") -> None:
-        assert self.process.stdout.readline() == f"{words} {self.directory}\n"
-
-    def end(self, number: signal.Signals) -> tuple[int, str, str]:
-        self.process.send_signal(number)
-        out, err = self.process.communicate(timeout=20)
-        return self.process.returncode, out, err
-
-    def file(self) -> Path:
-        return next(self.directory.glob("*.mcap"))
-
-    def stamps_by_rosbags(self) -> list[int]:
-        with AnyReader([self.directory]) as reader:
-            connections = [c for c in reader.connections if c.topic == f"{ROBOT}/odom"]
-            messages = reader.messages(connections=connections)
-            return [reader.deserialize(raw, c.msgtype).header.stamp.sec for c, _, raw in messages]
-
-    def stamps_by_mcap(self) -> list[int]:
-        with self.file().open("rb") as stream:
-            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-            messages = reader.iter_decoded_messages(topics=[f"{ROBOT}/odom"])
-            return [message.header.stamp.sec for *_, message in messages]
-
-
-@pytest.fixture
-def record(ros_domain, tmp_path) -> Iterator[object]:
-    started = []
-
-    def start(*parameters: str, directory: Path | None = None) -> Recorder:
-        started.append(Recorder(directory or tmp_path / "bag", ros_domain.env, *parameters))
-        return started[-1]
-
-    yield start
-    for recorder in started:
-        recorder.process.kill()
-        recorder.process.communicate()
-
-
-@pytest.fixture
-def node(ros_domain) -> Iterator[rclpy.node.Node]:
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=ros_domain.id)
-    made = rclpy.create_node("talker", namespace=ROBOT, context=context)
-    yield made
-    made.destroy_node()
-    rclpy.shutdown(context=context)
-
-
-def odometry(node, *, lockstep: bool = False):
-    publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY, lockstep=lockstep))
-    deadline = time.monotonic() + 10.0
-    while not publisher.get_subscription_count():
-        assert time.monotonic() < deadline, "the recorder never subscribed to the odometry"
-        time.sleep(0.01)
-    time.sleep(0.3)  # a publisher knows of a match a moment before the subscriber does
-    return publisher
-
-
-def publish(publisher, stamps, period_s: float = 0.002) -> None:
-    message = Odometry()
-    for stamp in stamps:
-        message.header.stamp.sec = stamp
-        publisher.publish(message)
-        time.sleep(period_s)
 
 
 def test_a_stopped_recorder_has_kept_every_message(record, node):
@@ -263,34 +179,8 @@ def test_broken_run_information_is_refused_with_one_line(record):
     assert "run_info" in err
 
 
-@pytest.fixture
-def healths(node) -> Iterator[list[DiagnosticStatus]]:
-    """What the recorder said about itself, newest last."""
-    heard: list[DiagnosticStatus] = []
-    node.create_subscription(
-        DiagnosticArray,
-        DIAGNOSTICS.name,
-        lambda message: heard.extend(message.status),
-        subscriber_qos(DIAGNOSTICS),
-    )
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    yield heard
-    executor.shutdown()
-    thread.join()
-
-
 def values(status: DiagnosticStatus) -> dict[str, str]:
     return {pair.key: pair.value for pair in status.values}
-
-
-def wait_for(true, timeout_s: float = 20.0) -> None:
-    until = time.monotonic() + timeout_s
-    while not true():
-        assert time.monotonic() < until
-        time.sleep(0.02)
 
 
 def test_a_full_disk_ends_in_exit_code_1_with_all_before_it_kept(record, node, healths):
@@ -346,70 +236,6 @@ def test_a_recorder_splits_by_time(record, node):
     assert recorder.end(signal.SIGINT)[0] == 0
     assert len(list(recorder.directory.glob("*.mcap"))) > 2
     assert recorder.stamps_by_rosbags() == list(range(200))
-
-
-def test_a_ring_without_a_fault_leaves_nothing(record, node):
-    recorder = record("mode:=ring")
-    recorder.wait_until_recording("keeping 30 s for")
-    publish(odometry(node), range(100))
-    code, out, err = recorder.end(signal.SIGINT)
-    assert (code, err) == (0, "")
-    assert "no fault in" in out
-    assert not recorder.directory.exists()
-
-
-def test_a_ring_writes_the_goal_and_what_was_before_and_after_a_fault(record, node):
-    recorder = record("mode:=ring", "before_fault_s:=0.5", "after_fault_s:=0.3")
-    recorder.wait_until_recording("keeping 0.5 s for")
-    metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
-    stop = node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
-    publisher = odometry(node)
-    metadata.publish(String(data="who"))
-    publish(publisher, range(100), period_s=0.01)
-    stop.publish(Bool(data=True))
-    publish(publisher, range(100, 200), period_s=0.01)
-    assert recorder.end(signal.SIGINT)[0] == 0
-    stamps = recorder.stamps_by_rosbags()
-    assert stamps == list(range(stamps[0], stamps[-1] + 1))
-    assert stamps[0] >= 25, "half a second before the stop, and not the beginning"
-    assert 100 < stamps[-1] < 190, "a third of a second after it, and not the end"
-    with AnyReader([recorder.directory]) as reader:
-        held = [c.topic for c, _, _ in reader.messages() if c.topic == f"{ROBOT}/{METADATA.name}"]
-    assert len(held) == 1
-
-
-def test_a_ring_on_a_full_disk_writes_its_fault_when_there_is_room(record, node, healths):
-    recorder = record("mode:=ring", "before_fault_s:=5.0", "after_fault_s:=0.3")
-    recorder.wait_until_recording("keeping 5 s for")
-    stop = node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
-    publisher = odometry(node)
-    limit = recorder.process.pid, resource.RLIMIT_FSIZE
-    resource.prlimit(*limit, (0, resource.RLIM_INFINITY))
-    publish(publisher, range(10))
-    stop.publish(Bool(data=True))
-    wait_for(lambda: healths and "cannot write a bag here" in healths[-1].message)
-    assert healths[-1].level == DiagnosticStatus.ERROR
-    resource.prlimit(*limit, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-    wait_for(lambda: list(recorder.directory.glob("*.mcap")))
-    assert recorder.end(signal.SIGINT)[0] == 0
-    assert recorder.stamps_by_rosbags() == list(range(10))
-
-
-def test_a_ring_that_never_got_room_ends_in_exit_code_1_with_a_reason(record, node):
-    recorder = record("mode:=ring")
-    recorder.wait_until_recording("keeping 30 s for")
-    publisher = node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
-    resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
-    while not publisher.get_subscription_count():
-        time.sleep(0.01)
-    time.sleep(0.3)  # a publisher knows of a match a moment before the subscriber does
-    publisher.publish(Bool(data=True))
-    time.sleep(0.5)
-    code, _, err = recorder.end(signal.SIGINT)
-    assert code == 1
-    assert "cannot write a bag here" in err
-    assert "messages are not in the bag" in err
-    assert "Traceback" not in err
 
 
 def test_an_unknown_mode_is_refused_with_one_line(record):
