@@ -104,9 +104,7 @@ class OneWorld:
 
     def _push(self, truth: RigidBodyState, ticks: int) -> tuple[np.ndarray, ...]:
         dt = self._robot.timing.physics_dt
-        return outside_wrench(
-            planar_of(truth)[None], self.world, np.array([self._ticks * dt]), ticks * dt
-        )
+        return outside_wrench(planar_of(truth)[None], self.world, np.array([self._ticks * dt]), ticks * dt)
 
     def _noise(self) -> np.ndarray | None:
         if not self.world.action_noise[0]:

@@ -150,7 +150,7 @@ def test_a_place_that_jumps_is_told_and_the_controller_begins_anew(neighbour: Ne
         odometry.spoil = jump
         until(lambda: told(neighbour, "epoch") == "1")
         until(lambda: len(resets) == begun + 1)
-        until(lambda: node.mission.complete and neighbour.commands[-1].any())
+        until(lambda: node.inputs.mission.complete and neighbour.commands[-1].any())
 
 
 def test_a_stamp_that_goes_back_is_refused(stream: Stream) -> None:

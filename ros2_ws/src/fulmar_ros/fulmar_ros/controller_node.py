@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import threading
 import time
 from collections.abc import Callable
@@ -21,21 +20,19 @@ from fulmar_core.exit_codes import FAILED
 from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
 from fulmar_core.robot import load_robot
-from fulmar_core.safety.arbiter import Decision, Mode, arbitrate
-from fulmar_core.safety.area import outside
+from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.command_gate import command_problem
-from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
 from fulmar_ros.actuator_watch import ActuatorWatch
 from fulmar_ros.control_beat import ControlBeat
+from fulmar_ros.controller_inputs import ControllerInputs
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.message_reader import block_of, goal_of, measurement_of, obstacles_of, stamp_ns
-from fulmar_ros.mission import Mission
+from fulmar_ros.message_reader import measurement_of
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -72,22 +69,14 @@ class ControllerNode(LifecycleNode):
         self.robot = load_robot(self.settings.robot)
         self.task = load_task(self.settings.task)
         self._make_controller, self._request_exit = make_controller, request_exit
-        self._lock = threading.Lock()
         self._speaking = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
-        self._flags = self.settings.flags(self.robot)
-        self._estop = EstopWatch(required=self.settings.estop)
-        self._input_gate = self.settings.input_gate(self.robot)
-        self._epoch = self._acted_epoch = 0  # of the newest usable measurement, and of the last control step
+        self.inputs = ControllerInputs(self.robot, self.task, self.settings)
         self._swap = PolicySwap(
             self._load if learned else None,
             propose=lambda candidate: self._succession.propose(candidate),
             warn=self.get_logger().warning,
         )
-        self._acted = 0  # control steps since the activation
-        self._anew = False  # the controller forgets what was before, at its next step
-        self._newest: Measurement | None = None
-        self.mission = Mission(self.robot, self.task, streamed=self.settings.goals_streamed)
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
@@ -96,7 +85,9 @@ class ControllerNode(LifecycleNode):
         self._beat = ControlBeat(
             1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
         )
-        self._status = ControllerStatus(self.mission, self._swap, goals_streamed=self.settings.goals_streamed)
+        self._status = ControllerStatus(
+            self.inputs.mission, self._swap, goals_streamed=self.settings.goals_streamed
+        )
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
@@ -129,7 +120,7 @@ class ControllerNode(LifecycleNode):
         self.wires.publish_metadata(self._succession.current.metadata)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._tell_idle_status)
-        self._set(configured=True, latched_fault="")
+        self.inputs.set(configured=True, latched_fault="")
         return DONE
 
     @property
@@ -143,13 +134,7 @@ class ControllerNode(LifecycleNode):
             self._refusal = "the controller still hangs in the step that it was in when it was deactivated"
             self.get_logger().error(f"not activated: {self._refusal}")
             return REFUSED
-        with self._lock:
-            self._newest = None
-            self._input_gate.forget()
-            self._flags = dataclasses.replace(
-                self._flags, activated=True, last_input_ns=None, input_problem="", outside=""
-            )
-            self._acted = 0
+        self.inputs.activate()
         self._beat.renew()
         settle_memory()
         if not self.settings.lockstep:
@@ -171,53 +156,30 @@ class ControllerNode(LifecycleNode):
 
     def stop(self) -> None:
         """Last words before the process ends: the safe command, several times, and the figures of the run."""
-        if self._flags.configured:
+        if self.inputs.flags.configured:
             self._fall_silent()
             self._status.repeat()
-            self._tell_status(self._decide())
+            self._tell_status(self.inputs.decide())
 
     def _fall_silent(self) -> None:
-        self._set(activated=False)
+        self.inputs.set(activated=False)
         self._beat.halt()
+        newest = self.inputs.newest
         with self._speaking:
             for _ in range(SAFE_REPEATS):
-                self.wires.publish_safe(self._newest.stamp_ns if self._newest else 0)
+                self.wires.publish_safe(newest.stamp_ns if newest else 0)
         self.wires.flush()
 
     def _dismantle(self) -> None:
-        if self._flags.configured:
+        if self.inputs.flags.configured:
             self._fall_silent()
-            self._set(configured=False)
+            self.inputs.set(configured=False)
             self.destroy_timer(self._status_timer)
             self.wires.destroy(self)
 
-    def _set(self, **changes: object) -> None:
-        with self._lock:
-            self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
-
-    def _decide(self) -> Decision:
-        with self._lock:
-            return self._arbitrate()
-
-    def _arbitrate(self) -> Decision:
-        """The decision for now; call with the lock held.
-
-        An e-stop takes the goal away: after it, nothing moves by itself.
-        """
-        now = time.monotonic_ns()
-        stopped = self._estop.reason(now)
-        if stopped and self._estop.heard:
-            self.mission.drop()
-            self._follow_mission()
-            self._flags = dataclasses.replace(self._flags, outside=self._outside())
-        active_s = self._acted * self._control_ns / 1e9
-        self._flags = dataclasses.replace(self._flags, estop=stopped, active_s=active_s)
-        return arbitrate(self._flags, now)
-
     def _on_estop(self, message: Bool) -> None:
-        with self._lock:
-            self._estop.hear(bool(message.data), time.monotonic_ns())
-        self._tell_status(self._decide())
+        self.inputs.hear_estop(message)
+        self._tell_status(self.inputs.decide())
 
     def _on_swap(self, message: String) -> None:
         self._swap.ask(message.data)
@@ -239,45 +201,22 @@ class ControllerNode(LifecycleNode):
         self.wires.publish_metadata(self._succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
-        goal, problem = goal_of(message)
-        if goal is None:
+        if problem := self.inputs.take_goal(message):
             self.get_logger().warning(f"goal refused: {problem}")
             return
-        with self._lock:
-            if self._estop.heard and self._estop.reason(time.monotonic_ns()):
-                self.get_logger().warning("goal refused: the e-stop holds. Reset it first.")
-                return
-            if self.mission.give(goal, stamp_ns(message.header.stamp)):
-                self._anew = True  # not here: the controller may be acting, in another thread
-                if (
-                    not self.settings.goals_streamed
-                ):  # somebody has looked: he who left may go on, if he is back
-                    self._flags = dataclasses.replace(self._flags, outside=self._outside())
-            self._follow_mission()
-            if self.settings.lockstep:
-                self._input_gate.forget()
-        self._tell_status(self._decide())
+        self._tell_status(self.inputs.decide())
         self._go_on()
 
     def _on_obstacles(self, message: MarkerArray) -> None:
-        discs, problem = obstacles_of(message)
-        if discs is None:
+        if problem := self.inputs.take_obstacles(message):
             self.get_logger().warning(f"obstacles refused: {problem}")
             return
-        with self._lock:
-            stamp = stamp_ns(message.markers[0].header.stamp) if message.markers else 0
-            self.mission.see_obstacles(discs, stamp)
-            self._follow_mission()
-        self._tell_status(self._decide())
+        self._tell_status(self.inputs.decide())
 
     def _on_block(self, message: PoseStamped) -> None:
-        place, problem = block_of(message)
-        if place is None:
+        if problem := self.inputs.take_block(message):
             self.get_logger().warning(f"place of the block refused: {problem}")
             return
-        with self._lock:
-            self.mission.see_block(place, stamp_ns(message.header.stamp))
-            self._follow_mission()
         self._go_on()
 
     def _go_on(self) -> None:
@@ -286,55 +225,31 @@ class ControllerNode(LifecycleNode):
         if late is not None:
             self._on_odometry(late)
 
-    def _follow_mission(self) -> None:
-        """Tell the arbiter what the mission says; call with the lock held."""
-        distance = self.mission.distance(self._newest.state) if self._newest else float("inf")
-        lacking = self.mission.lacking
-        self._flags = dataclasses.replace(
-            self._flags, has_goal=not lacking, lacking=lacking, goal_distance=distance
-        )
-
     def _on_odometry(self, message: Odometry) -> None:
         if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
             return  # the plant asks again
         measurement = measurement_of(message)
-        if self.settings.lockstep and self.mission.lacks_something_of(measurement.stamp_ns):
+        if self.settings.lockstep and self.inputs.mission.lacks_something_of(measurement.stamp_ns):
             self._late = message
             return
         if self.settings.lockstep and measurement.stamp_ns == self._answered_ns:
             self.wires.publish_command(self._answer, self._answered_ns)  # the answer got lost
             return
-        with self._lock:
-            problem = self._input_gate.problem(measurement) or ""
-            changes: dict[str, object] = {"input_problem": problem}
-            if not problem:
-                if not self.settings.lockstep:
-                    self._beat.follow(measurement.stamp_ns)
-                self._newest, self._epoch = measurement, self._input_gate.epoch
-                changes["last_input_ns"] = time.monotonic_ns()
-                self.mission.turn_to(measurement.stamp_ns)
-                changes["lacking"] = self.mission.lacking
-                changes["has_goal"] = not changes["lacking"]
-                changes["goal_distance"] = self.mission.distance(measurement.state)
-                changes["outside"] = self._flags.outside or self._outside()
-            self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]
-        self._beat.wake()
+        usable = self.inputs.take(measurement)
         if self.settings.lockstep:
             self._control(measurement)
-
-    def _outside(self) -> str:
-        """How the robot is outside its area right now; empty if it is not, or if nobody knows."""
-        if self._newest is None:
-            return ""
-        return outside(*self._newest.state.position_in_world[:2].tolist(), self.settings.area)
+            return
+        if usable:
+            self._beat.follow(measurement.stamp_ns)
+        self._beat.wake()
 
     def _step(self) -> None:
         """One beat of the clock."""
         limit = self.settings.overruns_to_stop
         if limit and self._beat.deadlines.late_in_a_row >= limit:
-            self._set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
+            self.inputs.set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
         self.wires.forget_command()
-        self._control(self._newest)
+        self._control(self.inputs.newest)
 
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
@@ -342,8 +257,8 @@ class ControllerNode(LifecycleNode):
         stamp = measurement.stamp_ns if measurement else 0
         command, action = self.robot.actuators.safe_command, None
         try:
-            with self._lock:
-                decision = self._arbitrate()
+            with self.inputs.lock:
+                decision = self.inputs.arbitrate()
                 self._begin_anew()
                 observation = self._observe(measurement) if decision.may_act and measurement else None
             before, informer = self._answer, self._succession.current.informer
@@ -361,7 +276,7 @@ class ControllerNode(LifecycleNode):
         if observation is not None and action is not None:
             self.wires.publish_reasoning(observation, action, stamp)
             self._judge(problem)
-            self._acted += 1
+            self.inputs.acted += 1
         if not informer.listens:  # only for others: the command does not wait for it
             health = self._watch(measurement, before, informer)
         if health is not None:
@@ -374,18 +289,17 @@ class ControllerNode(LifecycleNode):
         What a controller that hung comes up with after all must not follow the safe command of the end.
         """
         with self._speaking:
-            if self._flags.activated:
+            if self.inputs.flags.activated:
                 publish()
-            return self._flags.activated
+            return self.inputs.flags.activated
 
     def _begin_anew(self) -> None:
         """Let the controller forget what was before a new goal or a jump; call with the lock held."""
-        jumped = self._epoch != self._acted_epoch
+        jumped, anew = self.inputs.news()
         if jumped:
             self._actuators.forget()  # no motion of the body was behind it
-        if jumped or self._anew:
+        if jumped or anew:
             self.controller.reset()
-        self._anew, self._acted_epoch = False, self._epoch
 
     def _watch(
         self, measurement: Measurement | None, command: np.ndarray, informer: Informer
@@ -399,7 +313,7 @@ class ControllerNode(LifecycleNode):
         if measurement.stamp_ns - self._answered_ns > self._pause_ns:
             self._answer = self.robot.actuators.safe_command
             self.controller.reset()
-        return self.mission.observe(measurement.state, measurement.stamp_ns, self._answer)
+        return self.inputs.mission.observe(measurement.state, measurement.stamp_ns, self._answer)
 
     def _act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:
         """The command, the controller's action that it is made of, and why it is the safe one instead."""
@@ -418,7 +332,7 @@ class ControllerNode(LifecycleNode):
         before = self._succession.current
         fault = self._succession.judge(problem)
         if fault:
-            self._set(latched_fault=fault)
+            self.inputs.set(latched_fault=fault)
         elif self._succession.current is not before:
             self._announce()
 
@@ -432,18 +346,18 @@ class ControllerNode(LifecycleNode):
             self._announce()
         else:
             self._fail(reason)
-        self._tell_status(self._decide())
+        self._tell_status(self.inputs.decide())
 
     def _fail(self, reason: str) -> None:
         """Latch a fault and end the process; its last words are what is safe."""
         self.get_logger().error(reason)
-        self._set(latched_fault=reason)
+        self.inputs.set(latched_fault=reason)
         self._request_exit(FAILED)
 
     def _tell_idle_status(self) -> None:
         """Where no control step does it."""
-        if self.settings.lockstep or not self._flags.activated or self._flags.latched_fault:
-            self._tell_status(self._decide())
+        if self.settings.lockstep or not self.inputs.flags.activated or self.inputs.flags.latched_fault:
+            self._tell_status(self.inputs.decide())
 
     def _tell_status(self, decision: Decision) -> None:
         self._status.tell(
@@ -451,6 +365,6 @@ class ControllerNode(LifecycleNode):
             decision,
             self._succession,
             self._beat.deadlines,
-            epoch=self._input_gate.epoch,
-            last_input_ns=self._flags.last_input_ns,
+            epoch=self.inputs.epoch,
+            last_input_ns=self.inputs.flags.last_input_ns,
         )
