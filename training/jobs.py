@@ -106,15 +106,7 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
     if settings is None:
         record = _train(job, robot, task, watcher)
     else:
-        begin_run(
-            robot,
-            task,
-            job.settings,
-            seed=job.seed,
-            out=job.out,
-            time_limit_s=job.time_limit_s,
-            updates=job.updates,
-        )
+        begin_run(robot, task, job.settings, **_asked_for(job))
         first, rest = _shared(job, settings)
         learned = _finished(first) or _train(first, robot, task, watcher)
         record = _train(rest, robot, task, watcher, load_specialist(first.out, robot, settings))
@@ -134,10 +126,7 @@ def _train(
         robot,
         task,
         job.settings,
-        seed=job.seed,
-        out=job.out,
-        time_limit_s=job.time_limit_s,
-        updates=job.updates,
+        **_asked_for(job),
         resume=(job.out / CHECKPOINT_FILE).is_file(),
         command=job.command,
         git_revision=job.git_revision,
@@ -145,6 +134,10 @@ def _train(
         watcher=watcher,
         curves=_curves(job),
     )
+
+
+def _asked_for(job: Job) -> dict[str, Any]:
+    return {"seed": job.seed, "out": job.out, "time_limit_s": job.time_limit_s, "updates": job.updates}
 
 
 def _shared(job: Job, settings: TrainingSettings) -> tuple[Job, Job]:

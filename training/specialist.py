@@ -60,6 +60,13 @@ def load_specialist(run: Path, robot: Robot, settings: TrainingSettings) -> Spec
         run: Its own run folder.
         robot: The robot.
         settings: How it learned.
+
+    Returns:
+        Its network, and every set of dead valves that it takes over at.
+
+    Raises:
+        ConfigError: Its scenario is not there.
+        FileNotFoundError: The run has left no network.
     """
     valves = len(robot.actuators.names)
     lost = stranding_losses(robot, load_scenario(settings.scenario).actuation.failures)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fulmar_core.counter_rng import WORLD, Draws
-from fulmar_core.disturbances.outside import outside_wrench
+from fulmar_core.disturbances.outside import is_constant, outside_wrench
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
+from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 
@@ -68,3 +69,16 @@ def test_a_kick_lasts_one_control_step_and_comes_once_a_period_but_not_at_the_st
     when = np.flatnonzero(np.array(kicks)[:, 1] > 0.0) * DT
     np.testing.assert_allclose(when, np.ceil(np.arange(1, 5) * 4.3 / DT) * DT, atol=1e-9)
     assert max(kick[1] for kick in kicks) == 0.5
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_whatever_makes_a_push_change_is_known_to_do_so(field):
+    """A push that counts as constant is reckoned once in an episode."""
+    moved = {"wave_number": 1.0, "kick_period": 3.0, "tether_x": 0.1, field: 1.7}
+    pushes = [
+        felt(*place, time_s=time_s, **moved)
+        for place in ((0.3, 0.2), (1.1, 2.0))
+        for time_s in (0.0, 3.1, 5.2)
+    ]
+    world = replace(CALM, **{name: np.array([value]) for name, value in moved.items()})
+    assert is_constant(world) == all(push == pushes[0] for push in pushes)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import signal
+from dataclasses import fields, replace
 
 import numpy as np
 import onnxruntime
 import pytest
 
 from fulmar_core.controllers.told import told_terms
+from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.holding import stranding_losses
 from fulmar_core.observation import Observer
@@ -22,7 +24,7 @@ from training.network import load_network
 from training.policies import ShippedPolicy, recipe
 from training.progress import ProgressFile
 from training.run_folder import NETWORK_FILE, SPECIALIST_FOLDER, read_run_record, read_start
-from training.settings import SpecialistPlan, load_training_settings
+from training.settings import OnPolicy, RecurrentPpo, SpecialistPlan, load_training_settings
 from training.specialist import specialist_settings
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
@@ -126,28 +128,41 @@ def test_both_share_its_time(tmp_path, settings, quick, monkeypatch):
     assert given == [pytest.approx(100.0 * settings.specialist.share)]
 
 
-@pytest.mark.parametrize("part", ["specialist", "the other"])
-def test_a_run_that_was_broken_off_goes_on_to_what_was_asked_for(
-    tmp_path, settings, quick, run, monkeypatch, part
+class Impatient:
+    """Presses Ctrl-C after the first update of one part of a run."""
+
+    def __init__(self, part):
+        self.parts_left = part
+
+    def begin(self):
+        self.parts_left -= 1
+
+    def advance(self, share, elapsed_s, steps):
+        if not self.parts_left:
+            signal.raise_signal(signal.SIGINT)
+
+    def verdict(self, elapsed_s, success): ...
+
+    def end(self): ...
+
+
+@pytest.mark.parametrize("part", [1, 2], ids=["the specialist", "the other"])
+def test_a_run_that_was_broken_off_ends_with_the_very_networks_of_one_that_was_not(
+    tmp_path, settings, quick, run, part
 ):
     broken = tmp_path / "broken"
-    train = jobs.train
-
-    def breaks_off(*given, out, **more):
-        if (out.name == SPECIALIST_FOLDER) == (part == "specialist"):
-            train(*given, out=out, **more | {"updates": 1})
-            for name in ("run.json", NETWORK_FILE):
-                (out / name).unlink()
-            raise KeyboardInterrupt
-        return train(*given, out=out, **more)
-
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(jobs, "train", breaks_off)
-        learned(broken, settings, updates=6)
+    broken.mkdir()
+    with pytest.raises(KeyboardInterrupt):
+        learn(job_in(broken, settings, updates=6), Impatient(part))
+    assert (broken / SPECIALIST_FOLDER / NETWORK_FILE).is_file()
+    assert (broken / NETWORK_FILE).is_file() == (part == 2)
     assert read_start(broken)["updates"] == 6
     learned(broken, settings, updates=read_start(broken)["updates"])
-    assert read_run_record(broken)["updates"] == 4
-    assert read_run_record(broken)["specialist"]["updates"] == 2
+    record = read_run_record(broken)
+    assert (record["specialist"]["updates"], record["updates"]) == (2, 4)
+    for row in seen(STRANDED, ABLE):
+        raw, whole = (load_network(each / NETWORK_FILE).infer(row[None])[1] for each in (broken, run))
+        np.testing.assert_array_equal(raw, whole)
 
 
 def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
@@ -159,7 +174,12 @@ def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"), [({"scenario": "drift_two_lost"}, "'stranding: true'"), ({"told": False}, "'told'")]
+    ("change", "said"),
+    [
+        ({"scenario": "drift_two_lost"}, "'stranding: true'"),
+        ({"told": False}, "'told'"),
+        ({"specialist": SpecialistPlan("drift_stranded", 0.5)}, "and no specialist"),
+    ],
 )
 def test_specialists_that_could_not_take_over_are_refused(settings, monkeypatch, change, said):
     load = specialist.load_training_settings
@@ -171,6 +191,19 @@ def test_specialists_that_could_not_take_over_are_refused(settings, monkeypatch,
 def test_who_is_not_told_what_is_dead_cannot_hand_over(settings):
     with pytest.raises(ValueError, match="needs 'told'"):
         replace(settings, told=False)
+
+
+def test_a_network_with_memory_cannot_hand_over(settings):
+    shared = {field.name: getattr(settings.algorithm, field.name) for field in fields(OnPolicy)}
+    with pytest.raises(ValueError, match="network without memory"):
+        replace(settings, algorithm=RecurrentPpo(**shared, memory=8))
+
+
+def test_both_are_measured_alike():
+    """The network that hands over would else be told of a loss by an estimate that the other has never met."""
+    main = load_training_settings(ROBOT, TASK)
+    own = specialist_settings(main, ROBOT, TASK)
+    assert load_scenario(own.scenario).sensing == load_scenario(main.scenario).sensing
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0, -0.2])

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from fulmar_core.feasibility.approach import approach_bound
-from fulmar_core.feasibility.hold import can_hold_episodes
+from fulmar_core.feasibility.episodes import can_hold_episodes
 from fulmar_core.holding import can_hold, hold_margin
 
 __all__ = ["approach_bound", "can_hold", "can_hold_episodes", "hold_margin"]
