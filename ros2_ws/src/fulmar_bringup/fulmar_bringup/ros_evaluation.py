@@ -181,6 +181,7 @@ def _roll_out_share(plan: RunPlan, numbers: range, domain: int, index: int) -> T
     """Run some of the episodes with one pair of processes."""
     os.environ["ROS_DOMAIN_ID"] = str(domain)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    settle_memory()  # before the plant, which would else be kept for ever
 
     def progress(steps: int) -> None:
         _counts[index].value = steps
@@ -194,7 +195,6 @@ def _roll_out_share(plan: RunPlan, numbers: range, domain: int, index: int) -> T
             if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise RunFailed("the plant could not be configured")
             with spinning(plant, overseer.fail):
-                settle_memory()
                 return _episodes(plan, plant, overseer, group, numbers, progress)
     finally:
         group.stop_all()
