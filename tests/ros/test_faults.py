@@ -37,6 +37,7 @@ pytestmark = pytest.mark.real_time
 FAR = ("--start", "4,0,0", "--goal", "0,0,0")  # valves stay open for seconds
 WATCHDOG_S, TICK_S = 0.4, 0.02
 UNDER_WAY = 400  # messages in the bag
+UNDER_WAY_S = 1.5  # from the start of the processes of an evaluation until they step
 
 
 def start_run(domain: RosDomain, folder: Path, *more: str) -> psutil.Popen:
@@ -243,7 +244,7 @@ def test_an_evaluation_that_is_told_to_stop_leaves_nobody_behind(
     """Two workers with a controller each, in the middle of their shares."""
     run = start_evaluation(ros_domain, tmp_path)
     children = wait_for_children(run, 5)  # with Python's own tracker of shared memory
-    time.sleep(3.0)  # under way
+    time.sleep(UNDER_WAY_S)
     run.send_signal(number)
     _, err = run.communicate(timeout=10.0)
     assert nothing_left(children)
@@ -257,7 +258,7 @@ def test_the_first_failure_of_an_evaluation_ends_it(ros_domain: RosDomain, tmp_p
     """The other share is not waited for."""
     run = start_evaluation(ros_domain, tmp_path)
     children = wait_for_children(run, 5)
-    time.sleep(3.0)
+    time.sleep(UNDER_WAY_S)
     child_running(run, "policy_server.lqr_node").kill()
     _, err = run.communicate(timeout=15.0)  # a plant waits 5 s for an answer
     assert run.returncode == 1
