@@ -81,6 +81,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         code = app(prog_name="fulmar", standalone_mode=False)
+        sys.stdout.flush()  # here, where it is known what to do if nobody reads it
     except (ConfigError, BundleError, BagError) as error:
         sys.exit(_complain(str(error), BAD_USAGE))
     except FulmarError as error:
@@ -90,7 +91,8 @@ def main() -> None:
     except (typer.Abort, KeyboardInterrupt):
         code = INTERRUPTED
     except BrokenPipeError:  # whoever read our output has had enough, as in `fulmar list | head -1`
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - Python flushes it once more at its own end
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())  # what is left over is flushed again at Python's own end
         sys.exit(FAILED)
     except OSError as error:  # a folder that cannot be written, a full disk
         sys.exit(_complain(f"{error.filename or 'the system'}: {error.strerror or error}.", FAILED))
