@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.counter_rng import uniform_from, words, world_keys
-from fulmar_core.disturbances.outside import is_constant, outside_wrench
+from fulmar_core.disturbances.outside import push_is_constant, outside_wrench
 from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of
@@ -59,7 +59,7 @@ class OneWorld:
         response = self._robot.actuators.response
         self.latest_s = float(response.delay_s + response.opening_delay_s + late)
         self.outside = tuple(np.zeros(1) for _ in range(3))
-        self._constant_push = is_constant(self.world)
+        self._constant_push = push_is_constant(self.world)
         self._blurred = bool(self.world.velocity_noise[0] or self.world.yaw_rate_noise[0])
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
         self._ticks = 0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.counter_rng import WORLD, Draws
-from fulmar_core.disturbances.outside import is_constant, outside_wrench
+from fulmar_core.disturbances.outside import push_is_constant, outside_wrench
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
 from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.planar import PlanarState
@@ -81,4 +81,4 @@ def test_whatever_makes_a_push_change_is_known_to_do_so(field):
         for time_s in (0.0, 3.1, 5.2)
     ]
     world = replace(CALM, **{name: np.array([value]) for name, value in moved.items()})
-    assert is_constant(world) == all(push == pushes[0] for push in pushes)
+    assert push_is_constant(world) == all(push == pushes[0] for push in pushes)

@@ -25,7 +25,9 @@ from fulmar_ros.mission import Mission
 class ControllerInputs:
     """Where every message to a controller ends, and what a control step begins with.
 
-    Messages and control steps come from different threads. Methods take the lock themselves unless they say otherwise.
+    Messages and control steps come from different threads. Public methods take the lock
+    themselves unless they say otherwise; private ones are called with it held. What `take_...` returns says why something
+    was not taken, and is empty if it was.
 
     Attributes:
         lock: Held while several things are looked at together.
@@ -101,7 +103,7 @@ class ControllerInputs:
             self._estop.hear(bool(message.data), time.monotonic_ns())
 
     def take_goal(self, message: GoalMessage) -> str:
-        """Take a goal, or say why not."""
+        """Take a goal; none while a heard e-stop holds."""
         goal, problem = goal_of(message)
         if goal is None:
             return problem
@@ -119,7 +121,7 @@ class ControllerInputs:
         return ""
 
     def take_obstacles(self, message: MarkerArray) -> str:
-        """Take all obstacles, or say why not."""
+        """Take all obstacles that there are, in place of those known so far."""
         discs, problem = obstacles_of(message)
         if discs is None:
             return problem
@@ -130,7 +132,7 @@ class ControllerInputs:
         return ""
 
     def take_block(self, message: PoseStamped) -> str:
-        """Take the place of the block, or say why not."""
+        """Take the place of the block."""
         place, problem = block_of(message)
         if place is None:
             return problem

@@ -37,7 +37,7 @@ def outside_wrench(
     )
 
 
-def is_constant(world: World) -> bool:
+def push_is_constant(world: World) -> bool:
     """Whether every world is pushed in the same way wherever its body is, at any time; of NumPy arrays."""
     changing = (world.wave_force, world.wave_torque, world.kick, world.tether_stiffness)
     return not any(part.any() for part in changing)
