@@ -25,9 +25,9 @@ from fulmar_ros.mission import Mission
 class ControllerInputs:
     """Where every message to a controller ends, and what a control step begins with.
 
-    Messages and control steps come from different threads. Public methods take the lock
-    themselves unless they say otherwise; private ones are called with it held. What `take_...` returns says why something
-    was not taken, and is empty if it was.
+    Messages and control steps come from different threads. Public methods take the lock themselves unless they say
+    otherwise; private ones are called with it held. What `take_...` returns says why something was not taken, and is
+    empty if it was; of odometry, `take` says whether it was.
 
     Attributes:
         lock: Held while several things are looked at together.
