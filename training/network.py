@@ -128,15 +128,15 @@ class DeployedNetwork(nn.Module):
     def _mirrored(
         self, rows: torch.Tensor, observation: torch.Tensor, kind: Literal["seen", "done"]
     ) -> torch.Tensor:
-        """Rows of what is seen or done, left for right where the goal is on the right."""
+        """Rows of what is seen or done, in the mirror image where the goal asks for it."""
         if self.plan.side is None:
             return rows
         matrix = self.mirror_seen if kind == "seen" else self.mirror_done
-        right = observation[:, self.plan.side : self.plan.side + 1] < 0.0
-        return torch.where(right, rows @ matrix, rows)
+        mirrored = observation[:, self.plan.side : self.plan.side + 1] < 0.0
+        return torch.where(mirrored, rows @ matrix, rows)
 
     def take_mirror(self, mirror: Mirror) -> None:
-        """Take over what left for right means."""
+        """Take over what the mirror image is."""
         self.mirror_seen.copy_(torch.as_tensor(mirror.seen))
         self.mirror_done.copy_(torch.as_tensor(mirror.done))
 

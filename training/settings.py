@@ -13,6 +13,7 @@ from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot
+from fulmar_core.symmetry import Symmetry
 from fulmar_core.tasks import Task
 
 
@@ -168,7 +169,8 @@ class TrainingSettings:
     wrench: bool = (
         False  # whether it asks for a wrench that on/off valves are then chosen for, not for single valves
     )
-    mirror: bool = False  # goals on the right are shown, and answered, as on the left
+    # Goals on the right are shown, and answered, as on the left; or, by `ends`, those behind as those ahead.
+    mirror: Symmetry | None = None
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 

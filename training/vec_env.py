@@ -18,7 +18,7 @@ from fulmar_core.episode import episode_steps
 from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.symmetry import Mirror
+from fulmar_core.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task
 from training.stranded import asked_for
 from training.told_truth import ToldTruth
@@ -48,7 +48,7 @@ class BatchVecEnv(VecEnv):
         told: bool = False,
         wrench: bool = False,
         gas: float = 1.0,
-        mirror: bool = False,
+        mirror: Symmetry | None = None,
     ) -> None:
         """Build the worlds.
 
@@ -65,7 +65,8 @@ class BatchVecEnv(VecEnv):
             told: Observations also tell pushes and dead valves (`fulmar_core.controllers.told`).
             wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
             gas: What a valve costs in that choice, as a multiple.
-            mirror: Goals on the right are shown, and answered, as on the left (`fulmar_core.symmetry`).
+            mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
+                (`fulmar_core.symmetry`).
         """
         task = asked_for(task, scenario)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
@@ -74,7 +75,7 @@ class BatchVecEnv(VecEnv):
         self._judged = robot  # with what its actuators cost now
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
         self.choice = WrenchChoice.of(robot, gas) if wrench else None
-        self.mirror = Mirror.of(robot, task) if mirror else None
+        self.mirror = Mirror.of(robot, task, mirror) if mirror else None
         self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
@@ -159,12 +160,12 @@ class BatchVecEnv(VecEnv):
         return self._shown(observations, np.arange(self.num_envs))
 
     def _shown(self, observations: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Goals on the right as on the left, where that was asked for; which they were is remembered."""
+        """The mirror image of some goals, where that was asked for; of which is remembered."""
         if self.mirror is None:
             return observations
-        right = observations[:, self.mirror.side] < 0.0
-        self._mirrored[worlds] = right
-        return np.where(right[:, None], observations @ self.mirror.seen, observations)
+        mirrored = observations[:, self.mirror.side] < 0.0
+        self._mirrored[worlds] = mirrored
+        return np.where(mirrored[:, None], observations @ self.mirror.seen, observations)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
