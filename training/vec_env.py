@@ -19,7 +19,7 @@ from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import Task, fitted
 from training.stranded import asked_for
 from training.told_truth import ToldTruth
 
@@ -68,7 +68,7 @@ class BatchVecEnv(VecEnv):
             mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
                 (`fulmar_core.symmetry`).
         """
-        task = asked_for(task, scenario)
+        task = fitted(asked_for(task, scenario), robot)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered

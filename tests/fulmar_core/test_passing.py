@@ -13,7 +13,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.references.race_corners import draw_corners
 from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import fitted, load_task
 from fulmar_core.tasks.passing import PassingTask
 from fulmar_core.tasks.race_gates import crossings
 from fulmar_core.tasks.race_track import RaceTrack
@@ -87,6 +87,26 @@ def test_a_judge_counts_by_the_tolerance_and_a_controller_by_its_reach():
     judge = Judge(POSITIONS, square(), 0.1)
     assert judge.see(body(0.18)).done.tolist() == [1.0]
     assert POSITIONS.advance(square(), body(0.18), 0.0).done.tolist() == [0.0]
+
+
+def knowing_its_place(std):
+    odometry = replace(BASE.sensors.odometry, position=replace(BASE.sensors.odometry.position, std=std))
+    return replace(BASE, sensors=replace(BASE.sensors, odometry=odometry))
+
+
+@pytest.mark.parametrize("name", NAMES[:4])
+@pytest.mark.parametrize(("std", "reach"), [(0.0, 0.2), (0.002, 0.194), (0.01, 0.17), (0.05, 0.17)])
+def test_who_knows_its_place_better_takes_more_for_reached(name, std, reach):
+    assert fitted(TASKS[name], knowing_its_place(std)).reach == pytest.approx(reach)
+
+
+def test_everyone_keeps_as_far_off_the_posts_of_gates():
+    assert fitted(GATES, knowing_its_place(0.0)) == GATES
+
+
+def test_tasks_without_a_reach_are_the_same_for_everyone():
+    task = load_task("go_to_pose")
+    assert fitted(task, BASE) is task
 
 
 @WITH_HEADINGS

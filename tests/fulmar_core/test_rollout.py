@@ -66,6 +66,33 @@ class Counted(MockBackend):
         super().close()
 
 
+class Still(Habit):
+    """Stands, and keeps what it sees."""
+
+    def reset(self):
+        self.seen = []
+
+    def act(self, observation):
+        self.seen.append(observation)
+        return np.zeros((len(observation), len(self._scale)))
+
+
+@pytest.mark.parametrize("through", ["batch", "backends"])
+def test_a_waypoint_is_reached_as_near_as_the_robot_can_tell(through):
+    base, course = load_robot("turtlebot2"), load_task("go_through_positions")
+    near = 2 * (course.reach + 0.02,)
+    task = replace(course, start_distance=near, episode_s=0.3)
+    controller = Still(base, task)
+    given = {"task": task, "scenario": IDEAL, "episodes": 4, "seed": 3}
+    if through == "batch":
+        roll_out_in_batch(controller, base, **given)
+    else:
+        roll_out_in_backends(controller, lambda: MockBackend(base), **given)
+    distance = np.array(controller.seen)[..., task.observation_names.index("goal_distance")]
+    np.testing.assert_allclose(distance[0], near[0], atol=1e-3)
+    assert np.all(distance[-1] > 0.5), "the next one is shown"
+
+
 @pytest.mark.parametrize("way_to_fail", [{}, {"fail_at_step": 3}, {"fail_at_number": 2}], ids=str)
 def test_every_backend_is_closed_whatever_happens(monkeypatch, way_to_fail):
     monkeypatch.setattr(Counted, "open", 0)

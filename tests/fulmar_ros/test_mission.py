@@ -55,6 +55,14 @@ def test_obstacles_and_goal_from_the_wires_are_observed_as_those_of_the_batch(nu
     np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
 
 
+def test_a_waypoint_is_reached_as_near_as_the_robot_can_tell():
+    told, reach = mission("go_through_positions"), load_task("go_through_positions").reach
+    told.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), 1)
+    told.observe(at(1.0), S, STILL)
+    told.observe(at(reach + 0.02), 2 * S, STILL)
+    assert told.done == 1
+
+
 def test_the_block_of_each_state_is_waited_for():
     told = mission("push_block")
     told.give(goal_at((1.0, 0.0, 0.0)), 1)

@@ -9,6 +9,8 @@ import pytest
 from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
 from training.vec_env import BatchVecEnv
 
 WORLDS = 16
@@ -164,3 +166,12 @@ def test_dearer_commands_cost_their_multiple(build):
     full = np.ones((WORLDS, 8), dtype=np.int8)
     less = plain.step(full)[1] - dear.step(full)[1]
     np.testing.assert_allclose(less, 2.0 * 0.08 * 8, rtol=1e-4)
+
+
+def test_a_waypoint_pays_where_the_robot_takes_it_for_reached(build):
+    course = load_task("go_through_positions")
+    near = 2 * (course.reach + 0.02,)
+    env = build(task=replace(course, start_distance=near), robot=load_robot("turtlebot2"))
+    env.reset()
+    rewards = env.step(np.zeros((WORLDS, 2), dtype=np.float32))[1]
+    assert np.all(rewards > 0.9 * course.reward_weights.reached)

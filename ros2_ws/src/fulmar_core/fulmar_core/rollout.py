@@ -18,7 +18,7 @@ from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import Task, fitted
 
 SIDE_BY_SIDE = 256  # simulators alive at once
 WORLDS = 2048  # of a batch at once: nearly as fast as more, and their record stays below some 200 MB
@@ -142,6 +142,7 @@ def _side_by_side(
     progress: Progress,
 ) -> Trajectories:
     robot = backends[0].robot
+    task = fitted(task, robot)
     substeps = robot.timing.substeps(controller.control_hz)
     control_dt = substeps * robot.timing.physics_dt
     drawn = draw_episodes(robot, task, scenario, seed=seed, numbers=np.asarray(numbers))

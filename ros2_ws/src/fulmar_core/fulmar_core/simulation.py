@@ -21,7 +21,7 @@ from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import Task, fitted
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.upcoming import UpcomingEpisodes
 
@@ -80,7 +80,7 @@ class BatchSimulation:
             device: Where its arrays live, for torch.
             dtype: Floating type; the library's float32 by default.
         """
-        self.robot, self.task, self.scenario, self.seed = robot, task, scenario, seed
+        self.robot, self.task, self.scenario, self.seed = robot, fitted(task, robot), scenario, seed
         self.worlds, self.training, self._strength = worlds, training, strength
         self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)

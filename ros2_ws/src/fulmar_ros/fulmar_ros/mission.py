@@ -12,7 +12,7 @@ from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.schedule import Schedule
 from fulmar_core.state import RigidBodyState
-from fulmar_core.tasks import Task, sees_obstacles
+from fulmar_core.tasks import Task, fitted, sees_obstacles
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.push_block import PushBlock
 
@@ -30,7 +30,7 @@ class Mission:
             task: What it shall do.
             streamed: Goals come with each odometry, stamped as it is, mostly the same again.
         """
-        self._robot, self._task, self._streamed = robot, task, streamed
+        self._robot, self._task, self._streamed = robot, fitted(task, robot), streamed
         self._observer = Observer(robot, task)
         self._goal: Goal | None = None
         # Velocities may be told ahead of their time; a place counts from when it comes, whoever's clock stamped it.

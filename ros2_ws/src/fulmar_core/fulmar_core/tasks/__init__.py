@@ -10,11 +10,13 @@ from typing import cast
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
+from fulmar_core.robot import Robot
 from fulmar_core.tasks.go_through_poses import GoThroughPoses
 from fulmar_core.tasks.go_through_positions import GoThroughPositions
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.passing import PassingTask
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.tasks.race_gates import RaceGates
 from fulmar_core.tasks.race_waypoints import RaceWaypoints
@@ -54,6 +56,11 @@ def load_task(name: str) -> Task:
             f"{path}: 'name' is '{task.name}', the file's own name is '{name}'. Make them equal."
         )
     return task
+
+
+def fitted(task: Task, robot: Robot) -> Task:
+    """A task as a robot does it: how near it has to come depends on how well it knows its place."""
+    return task.fitted(robot) if isinstance(task, PassingTask) else task
 
 
 def sees_obstacles(task: Task) -> bool:

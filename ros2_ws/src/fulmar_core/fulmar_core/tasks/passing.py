@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from fulmar_core.tasks.waypoints import headings_along
 PLACE_TERMS = ("direction_x_in_body", "direction_y_in_body", "distance")
 TURN_TERMS = ("cos_heading_error", "sin_heading_error")
 IN_ORDER = ("goal", "next_goal", "goal_after_next")
+_SURE = 3.0  # standard deviations of the positioning that a reach stays within the tolerance
 
 
 def path_terms(seen: int, *, heading: bool) -> tuple[str, ...]:
@@ -73,7 +74,8 @@ class PassingTask(ABC):
     start_cone_deg: float = (
         180.0  # how far from straight behind the first target; 180: on any side of it [deg]
     )
-    reach: float  # a controller takes a target for reached within this, less than the tolerance [m]
+    # A controller takes a target for reached within this, less than the tolerance; the least that robots do [m].
+    reach: float
     tolerance: Tolerance  # within which a judge does
     required: int  # targets that make an episode a success
     reward_weights: WaypointReward
@@ -89,6 +91,11 @@ class PassingTask(ABC):
             raise ValueError("'reach' must be greater than 0 and at most the tolerance of the position.")
         if not 0.0 <= self.start_cone_deg <= 180.0:
             raise ValueError("'start_cone_deg' must lie in [0, 180].")
+
+    def fitted(self, robot: Robot) -> Self:
+        """The task as a robot does it: who knows its place better may take more for reached."""
+        reach = self.tolerance.position - _SURE * robot.sensors.odometry.position.std
+        return replace(self, reach=max(self.reach, reach))
 
     @abstractmethod
     def places(self, draws: Draws) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -43,6 +43,10 @@ class RaceGates(PassingTask):
     heads: ClassVar[bool] = True
     seen: ClassVar[int] = 3
     observation_names: ClassVar[tuple[str, ...]] = path_terms(3, heading=True)
+
+    def fitted(self, robot: Robot) -> Self:
+        """As it is: its reach keeps robots off posts."""
+        return self
 
     def places(self, draws: Draws) -> np.ndarray:
         """Draw where the targets are, shape (worlds, k, 2) [m]."""
