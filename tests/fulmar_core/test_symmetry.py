@@ -24,15 +24,15 @@ PAIRS = [
     ("jetbot", "go_to_position", "ends"),
 ]
 WORLDS = 32
-LEFT_FOR_RIGHT = np.array([1.0, -1.0, -1.0])
-FRONT_FOR_BACK = np.array([-1.0, -1.0, 1.0])
+# What becomes of x, y and yaw, and of their rates, in the mirror image.
+IMAGE = {"sides": np.array([1.0, -1.0, -1.0]), "ends": np.array([-1.0, -1.0, 1.0])}
 
 
 @pytest.mark.parametrize(("robot", "task", "alike"), PAIRS)
 def test_a_mirrored_situation_is_seen_as_the_mirror_says(robot, task, alike):
     the_robot, the_task = load_robot(robot), load_task(task)
     rng = np.random.default_rng(5)
-    x, y, yaw, vx, vy, r = rng.uniform(-1.0, 1.0, (6, WORLDS))
+    pose, velocity = rng.uniform(-1.0, 1.0, (2, 3, WORLDS))
     targets = rng.uniform(-2.0, 2.0, (WORLDS, 3, 3))
     scale = np.asarray(the_robot.actuators.scale)
     shares = rng.uniform(-1.0, 1.0, (WORLDS, len(scale)))
@@ -41,51 +41,41 @@ def test_a_mirrored_situation_is_seen_as_the_mirror_says(robot, task, alike):
     def goal(points):
         return Goal(points, np.zeros(WORLDS, dtype=int), np.zeros((WORLDS, 0, 3)), np.zeros((WORLDS, 2)))
 
-    seen = observer(PlanarState(x, y, yaw, vx, vy, r), goal(targets), shares * scale)
+    sign = IMAGE[alike]
+    seen = observer(PlanarState(*pose, *velocity), goal(targets), shares * scale)
     image = observer(
-        PlanarState(x, -y, -yaw, vx, -vy, -r) if alike == "sides" else PlanarState(-x, -y, yaw, -vx, -vy, r),
-        goal(targets * (LEFT_FOR_RIGHT if alike == "sides" else FRONT_FOR_BACK)),
+        PlanarState(*(sign[:, None] * pose), *(sign[:, None] * velocity)),
+        goal(targets * sign),
         shares @ mirror.done * scale,
     )
     np.testing.assert_allclose(seen @ mirror.seen, image, atol=1e-6)
 
 
-def driven(robot, mirror, share):
-    """Where a command, and its mirror image, drive a robot from rest: x, y and yaw, shapes (2,)."""
+@pytest.mark.parametrize(
+    ("robot", "alike"),
+    [
+        *((robot, "sides") for robot in ("kingfisher", "turtlebot2", "leatherback")),
+        ("turtlebot2", "ends"),
+        ("jetbot", "ends"),
+    ],
+)
+def test_mirrored_commands_drive_the_mirrored_way(robot, alike):
+    the_robot, task = load_robot(robot), load_task("go_to_position")
+    mirror = Mirror.of(the_robot, task, alike)
     simulation = BatchSimulation(
-        robot,
-        load_task("go_to_position"),
-        load_scenario("nominal"),
-        worlds=2,
-        seed=1,
-        training=False,
-        strength=1.0,
+        the_robot, task, load_scenario("nominal"), worlds=2, seed=1, training=False, strength=1.0
     )
+    state = simulation.truth
     for name in ("x", "y", "yaw", "vx", "vy", "yaw_rate"):
-        getattr(simulation.truth, name)[:] = 0.0
-    shares = np.stack((share, share @ mirror.done))
+        getattr(state, name)[:] = 0.0
+    share = np.array([[0.9, 0.4], [0.0, 0.0]])
+    share[1] = share[0] @ mirror.done
     for _ in range(20):
-        simulation.step(shares * np.asarray(robot.actuators.scale))
-    return [np.asarray(getattr(simulation.truth, name)) for name in ("x", "y", "yaw")]
-
-
-@pytest.mark.parametrize("robot", ["kingfisher", "turtlebot2", "leatherback"])
-def test_mirrored_commands_drive_the_mirrored_way(robot):
-    the_robot = load_robot(robot)
-    mirror = Mirror.of(the_robot, load_task("go_to_position"), "sides")
-    x, y, yaw = driven(the_robot, mirror, np.array([0.9, 0.4]))
-    assert abs(yaw[0]) > 0.05
-    np.testing.assert_allclose((x[1], -y[1], -yaw[1]), (x[0], y[0], yaw[0]), atol=1e-6)
-
-
-@pytest.mark.parametrize("robot", ["turtlebot2", "jetbot"])
-def test_turned_commands_drive_astern_as_their_image_drives_ahead(robot):
-    the_robot = load_robot(robot)
-    mirror = Mirror.of(the_robot, load_task("go_to_position"), "ends")
-    x, y, yaw = driven(the_robot, mirror, np.array([0.9, 0.4]))
-    assert np.hypot(x[0], y[0]) > 0.02
-    assert abs(yaw[0]) > 0.05
-    np.testing.assert_allclose((-x[1], -y[1], yaw[1]), (x[0], y[0], yaw[0]), atol=1e-6)
+        simulation.step(share * np.asarray(the_robot.actuators.scale))
+    pose, image = np.stack([getattr(simulation.truth, name) for name in ("x", "y", "yaw")], axis=1)
+    assert np.hypot(pose[0], pose[1]) > 0.02
+    assert abs(pose[2]) > 0.05
+    np.testing.assert_allclose(image * IMAGE[alike], pose, atol=1e-6)
 
 
 def test_a_robot_whose_sides_differ_is_refused():

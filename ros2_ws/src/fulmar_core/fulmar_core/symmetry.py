@@ -47,7 +47,7 @@ class Mirror:
             alike: What is exchanged: its sides, or its ends.
 
         Raises:
-            ConfigError: The two sides, or ends, of the robot differ, or they do at the task.
+            ConfigError: The two sides, or ends, of the robot differ, or they do at the task, or its goal lies at none.
         """
         names = Observer(robot, task).names
         telling, flipped = (SIDES, _SIDEWAYS) if alike == "sides" else (ENDS, _TURNED)

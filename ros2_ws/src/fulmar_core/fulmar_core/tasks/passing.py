@@ -74,8 +74,7 @@ class PassingTask(ABC):
     start_cone_deg: float = (
         180.0  # how far from straight behind the first target; 180: on any side of it [deg]
     )
-    # A controller takes a target for reached within this, less than the tolerance; the least that robots do [m].
-    reach: float
+    reach: float  # within which a controller takes a target for reached; `fitted` may widen it [m]
     tolerance: Tolerance  # within which a judge does
     required: int  # targets that make an episode a success
     reward_weights: WaypointReward
@@ -93,7 +92,14 @@ class PassingTask(ABC):
             raise ValueError("'start_cone_deg' must lie in [0, 180].")
 
     def fitted(self, robot: Robot) -> Self:
-        """The task as a robot does it: who knows its place better may take more for reached."""
+        """The task as a robot does it: who knows its place better may take more for reached.
+
+        Args:
+            robot: Its odometry says how well it knows its place.
+
+        Returns:
+            The task with a reach from its own up to the tolerance [m].
+        """
         reach = self.tolerance.position - _SURE * robot.sensors.odometry.position.std
         return replace(self, reach=max(self.reach, reach))
 
