@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import array_api_compat
+import numpy as np
 
 _NAMESPACES: dict[type, Any] = {}  # of each kind of array that was met
 
@@ -15,6 +16,11 @@ def array_namespace(array: Any) -> Any:
     if kind not in _NAMESPACES:
         _NAMESPACES[kind] = array_api_compat.array_namespace(array)
     return _NAMESPACES[kind]
+
+
+def is_numpy(array: Any) -> bool:
+    """Whether an array or number is NumPy's."""
+    return isinstance(array, (np.ndarray, np.generic))
 
 
 def clip(x: Any, low: Any, high: Any) -> Any:

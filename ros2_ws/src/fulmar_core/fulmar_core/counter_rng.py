@@ -11,9 +11,9 @@ import math
 from typing import Any
 
 import numpy as np
-from array_api_compat import device, is_numpy_array
+from array_api_compat import device
 
-from fulmar_core.arrays import array_namespace
+from fulmar_core.arrays import array_namespace, is_numpy
 from fulmar_core.rotation import Array
 
 START, NOISE, WORLD = 0, 1, 2  # streams that do not disturb one another
@@ -39,11 +39,15 @@ def world_keys(seed: int, numbers: Array, repeats: Array, stream: int) -> Keys:
         Keys for `words`.
     """
     n, r = _counter(numbers), _counter(repeats)
-    keys = []
-    for odd in (GOLDEN, OTHER):
-        start = _mix_number(_mix_number((seed & MASK) ^ odd) ^ (seed >> 32 & MASK) ^ (stream * odd & MASK))
-        keys.append(_mix(_low(_mix(_low(n * odd + start)) + r * GOLDEN)))
-    return keys[0], keys[1]
+    odds = GOLDEN, OTHER
+    starts = [
+        _mix_number(_mix_number((seed & MASK) ^ odd) ^ (seed >> 32 & MASK) ^ (stream * odd & MASK))
+        for odd in odds
+    ]
+    xp = array_namespace(n)
+    odd, start = (xp.asarray(both, dtype=n.dtype, device=device(n))[:, None] for both in (odds, starts))
+    first, second = _mix(_low(_mix(_low(n * odd + start)) + r * GOLDEN))
+    return first, second
 
 
 def words(keys: Keys, counter: Array | int, count: int) -> Array:
@@ -144,7 +148,7 @@ class Draws:
 
 def _counter(values: Array) -> Array:
     """Integers as words: 32-bit where the library can compute with them, else the low half of 64."""
-    if is_numpy_array(values):
+    if is_numpy(values):
         return np.asarray(values).astype(np.uint32)
     xp = array_namespace(values)
     return xp.astype(values, xp.int64) & MASK
@@ -163,7 +167,7 @@ def _mix(x: Array) -> Array:
 
 def _low(x: Array) -> Array:
     """The low half of words; those of 32 bits have no other."""
-    return x if is_numpy_array(x) else x & MASK
+    return x if is_numpy(x) else x & MASK
 
 
 def _mix_number(x: int) -> int:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from array_api_compat import device, is_numpy_array
+from array_api_compat import device
 
-from fulmar_core.arrays import array_namespace, sum_of
+from fulmar_core.arrays import array_namespace, is_numpy, sum_of
 from fulmar_core.goal import Goal
 from fulmar_core.observation import shares
 from fulmar_core.planar import PlanarState
@@ -70,6 +70,6 @@ def _cost(robot: Robot, previous: Array, command: Array) -> Array:
 
 def _sum(rows: Array) -> Array:
     """Sum of each row, shape (worlds,)."""
-    if not is_numpy_array(rows):
+    if not is_numpy(rows):
         return array_namespace(rows).sum(rows, axis=1)
     return sum_of([rows[:, i] for i in range(rows.shape[1])])

@@ -16,17 +16,24 @@ from fulmar_core.robot import Robot, Rolling
 from fulmar_core.rotation import Array
 
 
-def actuation_of(robot: Robot, safe: Array) -> ActuationState:
+def actuation_of(robot: Robot, safe: Array, *, opens_late: bool = True) -> ActuationState:
     """The actuators of a robot in their safe state.
 
     Args:
         robot: The robot.
         safe: Its safe command in every world, shape (n, worlds).
+        opens_late: As of `may_open_late`.
     """
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
         response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
-    return ActuationState(response, binary=robot.actuators.binary, scale=robot.actuators.scale, safe=safe)
+    return ActuationState(
+        response,
+        binary=robot.actuators.binary,
+        scale=robot.actuators.scale,
+        safe=safe,
+        opens_late=opens_late,
+    )
 
 
 def longest_delay(robot: Robot, scenario: Scenario) -> float:
@@ -35,6 +42,11 @@ def longest_delay(robot: Robot, scenario: Scenario) -> float:
     response = robot.actuators.response
     own = response.delay_s + response.opening_delay_s
     return own + actuation.delay_s + actuation.opening_delay_s[1]
+
+
+def may_open_late(robot: Robot, scenario: Scenario) -> bool:
+    """Whether closed valves open later than open ones close in any world."""
+    return max(robot.actuators.response.opening_delay_s, scenario.actuation.opening_delay_s[1]) > 0.0
 
 
 def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:

@@ -15,7 +15,7 @@ from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.episode import Episode, draw_episodes
 from fulmar_core.goal import Goal
-from fulmar_core.motion import actuation_of, control_step, longest_delay, may_be_off_centre
+from fulmar_core.motion import actuation_of, control_step, longest_delay, may_be_off_centre, may_open_late
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
@@ -106,7 +106,7 @@ class BatchSimulation:
         )
         safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
         self._safe = self._real(safe)
-        self._actuation = actuation_of(robot, self._safe)
+        self._actuation = actuation_of(robot, self._safe, opens_late=may_open_late(robot, scenario))
         self.command: Array = self._safe.T
         self._upcoming = UpcomingEpisodes(self._draw, worlds)
         self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
@@ -224,7 +224,7 @@ class BatchSimulation:
         return (
             PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS)),
             Goal(*(self._real(getattr(drawn.goal, name)) for name in Goal.__slots__)),
-            World(*(self._real(getattr(drawn.world, name)) for name in FIELDS)),
+            World(*(self._real(getattr(drawn.world, name)) for name in FIELDS)).packed(),
         )
 
     def _repeats_now(self) -> np.ndarray:

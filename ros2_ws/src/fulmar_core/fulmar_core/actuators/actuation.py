@@ -14,7 +14,15 @@ from fulmar_core.rotation import Array
 class ActuationState:
     """What the actuators of a batch of worlds do now; actuators first, worlds last."""
 
-    def __init__(self, response: Response, *, binary: bool, scale: np.ndarray, safe: Array) -> None:
+    def __init__(
+        self,
+        response: Response,
+        *,
+        binary: bool,
+        scale: np.ndarray,
+        safe: Array,
+        opens_late: bool = True,
+    ) -> None:
         """Begin in the safe state.
 
         Args:
@@ -22,8 +30,9 @@ class ActuationState:
             binary: On/off actuators: errors act on what they do, not on the command.
             scale: Largest command of each actuator, shape (n,).
             safe: Safe command of every world, shape (n, worlds), of the floating type to compute in.
+            opens_late: Whether closed valves may open later than open ones close; saves the work where none does.
         """
-        self._response, self._binary = response, binary
+        self._response, self._binary, self._opens_late = response, binary, opens_late
         self._scale = array_namespace(safe).asarray(scale, dtype=safe.dtype, device=device(safe))[:, None]
         self._before, self._wanted, self.applied = safe, safe, safe
         self.gain = array_namespace(safe).ones_like(safe)
@@ -83,7 +92,8 @@ class ActuationState:
         now_s = self._since_s + 0.5 * dt
         if now_s < latest_s:
             assert self._late is not None and self._open_late is not None
-            target = xp.where(now_s < self._open_late, xp.minimum(self._before, target), target)
+            if self._opens_late:
+                target = xp.where(now_s < self._open_late, xp.minimum(self._before, target), target)
             target = xp.where(now_s < self._late, self._before, target)
         self._since_s += dt
         if self._slew is not None:
