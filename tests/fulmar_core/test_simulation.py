@@ -247,6 +247,18 @@ def test_late_commands_act_after_their_delay_and_not_before():
     np.testing.assert_allclose(late.truth.yaw_rate, prompt.truth.yaw_rate * share, rtol=1e-9)
 
 
+def test_valves_open_late_whether_the_robot_or_the_scenario_says_so():
+    own = replace(PLATFORM.actuators, response=replace(PLATFORM.actuators.response, opening_delay_s=0.06))
+    slow_robot = build(robot=replace(PLATFORM, actuators=own))
+    slow_scenario = build(replace(STILL, actuation=Actuation(opening_delay_s=(0.06, 0.06))))
+    for slow in (slow_robot, slow_scenario):
+        prompt = build()
+        for simulation in (slow, prompt):
+            simulation.step(np.eye(8)[[0] * 5])
+        share = 1.0 - 0.06 / slow.control_dt
+        np.testing.assert_allclose(slow.truth.yaw_rate, prompt.truth.yaw_rate * share, rtol=1e-5)
+
+
 def test_a_valve_that_failed_does_nothing_and_the_others_share_the_line():
     broken = build(replace(STILL, actuation=Actuation(failures=8, failure_chance=1.0)))
     broken.step(np.ones((5, 8)))

@@ -25,6 +25,7 @@ from fulmar_core.tasks.terms import (
     heading_terms,
     motion_terms,
     pose_errors,
+    weighted_sum,
 )
 
 
@@ -111,23 +112,20 @@ class GoToPose:
         xp = array_namespace(after.x)
         w = self.reward_weights
         d, e = new.position, xp.abs(new.heading)
-        return d * 0.0 + sum(
-            weight * of()
-            for weight, of in (
-                (w.position, lambda: xp.exp(-d / 0.25)),
-                (w.heading, lambda: xp.exp(-e / 0.25)),
-                (w.far, lambda: xp.exp(-d / 2.0)),
-                (w.joint, lambda: xp.exp(-d / 0.1 - e / 0.15)),
-                (w.joint_far, lambda: xp.exp(-d - e)),
-                (w.facing * 0.5, lambda: xp.exp(-d) * (1.0 + xp.cos(e))),
-                (w.approach, lambda: old.position - d),
-                (w.turn, lambda: xp.abs(old.heading) - e),
-                (w.fine, lambda: xp.exp(-d / 0.03 - e / 0.03)),
-                (w.turned * 0.5, lambda: 1.0 - xp.tanh((e - 0.08) / 0.02)),
-                (w.aligned, lambda: xp.exp(-e / 0.03)),
-                (w.centred, lambda: xp.exp(-d / 0.03)),
-            )
-            if weight  # what does not count need not be computed
+        return weighted_sum(
+            (w.position, lambda: xp.exp(-d / 0.25)),
+            (w.heading, lambda: xp.exp(-e / 0.25)),
+            (w.far, lambda: xp.exp(-d / 2.0)),
+            (w.joint, lambda: xp.exp(-d / 0.1 - e / 0.15)),
+            (w.joint_far, lambda: xp.exp(-d - e)),
+            (w.facing, lambda: xp.exp(-d) * 0.5 * (1.0 + xp.cos(e))),
+            (w.approach, lambda: old.position - d),
+            (w.turn, lambda: xp.abs(old.heading) - e),
+            (w.fine, lambda: xp.exp(-d / 0.03 - e / 0.03)),
+            (w.turned, lambda: 0.5 * (1.0 - xp.tanh((e - 0.08) / 0.02))),
+            (w.aligned, lambda: xp.exp(-e / 0.03)),
+            (w.centred, lambda: xp.exp(-d / 0.03)),
+            zero=xp.zeros_like(d),
         )
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:

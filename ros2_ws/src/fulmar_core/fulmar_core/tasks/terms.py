@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from fulmar_core.arrays import array_namespace, clip
@@ -130,3 +131,13 @@ def fine_terms(x: Array, y: Array, *, saturation: float) -> tuple[Array, Array, 
     distance = xp.sqrt(x * x + y * y)
     divisor = clip(distance, saturation, None)
     return x / divisor, y / divisor, distance
+
+
+def weighted_sum(*terms: tuple[float, Callable[[], Array]], zero: Array) -> Array:
+    """Sum of terms with their weights; those without weight are not computed.
+
+    Args:
+        terms: Weight and what computes the term, shape (...,).
+        zero: Of the same shape; what a sum of nothing is.
+    """
+    return sum((weight * term() for weight, term in terms if weight), start=zero)
