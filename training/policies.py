@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
+import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
@@ -131,6 +133,26 @@ def is_made(job: Job) -> bool:
     except BundleError:
         return False
     return passport.training.get("recipe") == job.recipe
+
+
+def set_aside(job: Job) -> Path | None:
+    """Put what a job has made out of its way, so that it is made anew; nothing is lost.
+
+    Returns:
+        Where its run folder, and its bundle in that, are now; None if there was nothing.
+    """
+    assert job.bundle is not None
+    if not (job.out.exists() or job.bundle.exists()):
+        return None
+    aside = next(
+        place for number in itertools.count(1) if not (place := Path(f"{job.out}.{number}")).exists()
+    )
+    if job.out.exists():
+        job.out.rename(aside)
+    aside.mkdir(parents=True, exist_ok=True)
+    if job.bundle.exists():
+        shutil.move(job.bundle, aside / "bundle")
+    return aside
 
 
 def make_policies(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -90,7 +91,9 @@ class Session(BaseCallback):
         self._checkpoint, self._asked_to_stop = checkpoint, asked_to_stop
         self._before_s = story.elapsed_s
         self._began = time.monotonic()
-        self._next_check = self.elapsed_s + settings.evaluate_every_s
+        # Of the run, not of the clock: which network is the best one must not hang on how fast the machine is.
+        self._check_every = settings.evaluate_every_s / (limits.time_s or settings.time_limit_s)
+        self._plan_check(limits.progress(story.elapsed_s, story.updates))
         self._next_checkpoint = self.elapsed_s + settings.checkpoint_every_s
         self._first = True  # what comes first is no update yet
         self._speeds: list[float] = []  # of each update [steps/s]
@@ -134,15 +137,19 @@ class Session(BaseCallback):
             self._worlds.set_effort(self._settings.effort(progress))
             self.model.ent_coef = self._settings.entropy(progress)  # type: ignore[attr-defined]
         over = progress >= 1.0 or self._asked_to_stop()
-        if over or story.elapsed_s >= self._next_check:
+        if over or progress >= self._next_check:
             self._check()
-            self._next_check = self.elapsed_s + self._settings.evaluate_every_s
+            self._plan_check(progress)
             over = over or self._learned()
         if over or self.elapsed_s >= self._next_checkpoint:
             self.save()
             self._next_checkpoint = self.elapsed_s + self._settings.checkpoint_every_s
         if over:
             raise RunIsOver
+
+    def _plan_check(self, progress: float) -> None:
+        """The next check comes at the next whole multiple of its share of the run."""
+        self._next_check = (math.floor(progress / self._check_every + 1e-9) + 1) * self._check_every
 
     def _check(self) -> None:
         story = self.story

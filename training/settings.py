@@ -158,7 +158,9 @@ class TrainingSettings:
     worlds: int  # simulated in one batch
     reward_scale: float
     time_limit_s: float  # wall-clock of the learning itself [s]
-    evaluate_every_s: float  # wall-clock between checks on held-out episodes [s]
+    # Between checks on held-out episodes, in runs of `time_limit_s`; in runs of so many updates the same share of the
+    # run, so that the same seed keeps the same network on any machine.
+    evaluate_every_s: float  # [s]
     checkpoint_every_s: float = 30.0  # wall-clock between checkpoints to resume from [s]
     threads: int = 1  # of PyTorch; a second one gains little and loses much on a shared machine
     curriculum: Curriculum | None = None

@@ -194,6 +194,18 @@ def test_policies_can_be_made_one_by_one_and_told_as_json(asked, passports, tmp_
     assert (line["policy"], line["made"], line["good"]) == ("kingfisher_go_to_pose", True, True)
 
 
+def test_anew_puts_the_asked_bundle_aside_and_leaves_the_others(asked, passports, tmp_path):
+    bundles, runs = tmp_path / "bundles", tmp_path / "runs"
+    for name in ("kingfisher_go_to_pose", "turtlebot2_go_to_pose"):
+        (bundles / name).mkdir(parents=True)
+        (bundles / name / "policy.onnx").write_text(name)
+    code, _ = call(policies, "kingfisher_go_to_pose", "--anew", "--out", bundles, "--runs", runs)
+    assert code == 0
+    (kept,) = runs.glob("*/bundle/policy.onnx")
+    assert kept.read_text() == "kingfisher_go_to_pose"
+    assert [folder.name for folder in bundles.iterdir()] == ["turtlebot2_go_to_pose"]
+
+
 def test_an_unknown_policy_is_told():
     with pytest.raises(ConfigError, match="has no policy 'kingfisher_go_to_post'"):
         call(policies, "kingfisher_go_to_post")

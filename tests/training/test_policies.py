@@ -18,6 +18,7 @@ from training.policies import (
     make_policies,
     policy_job,
     recipe,
+    set_aside,
 )
 from training.settings import load_training_settings
 
@@ -118,6 +119,21 @@ def test_a_policy_is_made_once_and_again_only_when_it_is_made_from_something_els
     (third,) = make_policies(table, [changed], executor, lambda *_: None)
     assert third["made"] is True
     assert executor.names == [ONE.name] * 2
+
+
+def test_a_policy_that_is_set_aside_is_kept_and_made_again_to_the_last_bit(small_job):
+    table, executor = PolicyTable(2, 2, (ONE,)), Here()
+    assert set_aside(small_job) is None
+    folders = []
+    for _ in range(2):
+        make_policies(table, [small_job], executor, lambda *_: None)
+        folders.append(set_aside(small_job))
+        assert not is_made(small_job)
+    make_policies(table, [small_job], executor, lambda *_: None)
+    assert executor.names == [ONE.name] * 3
+    bundles = [small_job.bundle, *(folder / "bundle" for folder in folders)]
+    assert len({(bundle / "policy.onnx").read_bytes() for bundle in bundles}) == 1
+    assert all((folder / "run.json").is_file() for folder in folders)
 
 
 def test_a_damaged_bundle_is_made_again(small_job):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 from dataclasses import replace
@@ -96,6 +97,24 @@ def test_another_seed_gives_other_weights(tmp_path, quick_judge):
         train(TURTLEBOT, TASK, settings, seed=seed, out=tmp_path / str(seed), updates=2)
     one, other = (weights(tmp_path / str(seed), settings)[0] for seed in (1, 2))
     assert not all(torch.equal(one[key], other[key]) for key in one)
+
+
+@pytest.mark.parametrize("second_s", [1e-6, 1e3])
+def test_how_fast_the_machine_is_does_not_change_when_a_run_of_updates_is_checked(
+    tmp_path, quick_judge, monkeypatch, second_s
+):
+    now = itertools.count()
+    monkeypatch.setattr("training.session.time.monotonic", lambda: second_s * next(now))
+    settings = replace(small("differential_drive"), evaluate_every_s=3.0, time_limit_s=10.0)
+    record = train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=10)
+    assert [check["steps"] for check in record["curve"]] == [3 * 128, 6 * 128, 9 * 128, 10 * 128]
+
+
+def test_a_resumed_run_is_checked_when_the_uninterrupted_one_is(tmp_path, quick_judge):
+    settings = replace(small("differential_drive"), evaluate_every_s=4.0, time_limit_s=10.0)
+    train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=5)
+    record = train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=10, resume=True)
+    assert [check["steps"] // 128 for check in record["curve"]] == [2, 4, 5, 8, 10]
 
 
 def test_a_number_of_updates_is_kept(tmp_path, quick_judge):

@@ -27,24 +27,29 @@ def policies(
     runs: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run folders.")] = Path(
         "runs/policies"
     ),
+    anew: Annotated[
+        bool,
+        typer.Option("--anew", help="Also those that are made; the old ones are kept beside their runs."),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make the shipped policies of configs/policies.yaml: train, judge in MuJoCo, export.
 
     A bundle that was made from the same robot, task, scenario, settings, seed and updates is left as it is; a run that
-    was broken off is resumed. So the command can be repeated until everything is there.
+    was broken off is resumed. So the command can be repeated until everything is there. The same seed and updates make
+    the same weights on the same kind of processor.
 
     Try:
 
     fulmar policies
 
-    fulmar policies kingfisher_go_to_pose
+    fulmar policies kingfisher_go_to_pose --anew
     """
     from fulmar_ros.provenance import git_revision
     from policy_server.shipped import policies_directory
     from training.executors import LocalExecutor
     from training.job_bars import JobBars
-    from training.policies import is_made, load_policy_table, make_policies, policy_job
+    from training.policies import is_made, load_policy_table, make_policies, policy_job, set_aside
 
     table = load_policy_table()
     known = [policy.name for policy in table.policies]
@@ -63,6 +68,9 @@ def policies(
         for policy in table.policies
         if not names or policy.name in names
     ]
+    for job in jobs if anew else []:
+        if aside := set_aside(job):
+            console.print(f"{job.name}: the old one is in {aside}", markup=False, soft_wrap=True)
     missing = [job for job in jobs if not is_made(job)]
     left = sum(job.updates or 0 for job in missing) / table.at_once
     console.print(
