@@ -7,6 +7,7 @@ numbers among 64 worlds and among 4,096. Each number is a 32-bit hash of its cou
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -39,15 +40,21 @@ def world_keys(seed: int, numbers: Array, repeats: Array, stream: int) -> Keys:
         Keys for `words`.
     """
     n, r = _counter(numbers), _counter(repeats)
+    odd, start = _beginnings(seed, stream, array_namespace(n), n.dtype, device(n))
+    first, second = _mix(_low(_mix(_low(n * odd + start)) + r * GOLDEN))
+    return first, second
+
+
+@functools.lru_cache(maxsize=64)
+def _beginnings(seed: int, stream: int, xp: Any, dtype: Any, where: Any) -> tuple[Array, Array]:
+    """What numbers of worlds are multiplied with, and what is added, for both keys, shapes (2, 1)."""
     odds = GOLDEN, OTHER
     starts = [
         _mix_number(_mix_number((seed & MASK) ^ odd) ^ (seed >> 32 & MASK) ^ (stream * odd & MASK))
         for odd in odds
     ]
-    xp = array_namespace(n)
-    odd, start = (xp.asarray(both, dtype=n.dtype, device=device(n))[:, None] for both in (odds, starts))
-    first, second = _mix(_low(_mix(_low(n * odd + start)) + r * GOLDEN))
-    return first, second
+    odd, start = (xp.asarray(both, dtype=dtype, device=where)[:, None] for both in (odds, starts))
+    return odd, start
 
 
 def words(keys: Keys, counter: Array | int, count: int) -> Array:
