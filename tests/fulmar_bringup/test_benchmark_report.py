@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -153,3 +154,24 @@ def test_a_task_that_nobody_did_has_no_pictures(findings, tmp_path):
     page = write_report(Findings(document, [pair], {pair: {}}), tmp_path)
     assert "no policy is shipped" in page.read_text()
     assert len(list((tmp_path / "pictures").iterdir())) == 1
+
+
+@pytest.mark.parametrize("picture", ["draw_courses", "draw_scenes_with_obstacles"])
+def test_ways_are_seen_whole_unless_they_lead_far_away(findings, picture):
+    from fulmar_bringup.benchmark.report import scene_picture
+    from fulmar_bringup.benchmark.report.view import views
+
+    task = "go_through_positions" if picture == "draw_courses" else "go_to_position_with_obstacles"
+    runs = views(findings, task)
+    near, far = (
+        replace(run.main, paths=run.main.paths + shift)
+        for run, shift in zip(runs[:2], (2.5, 60.0), strict=True)
+    )
+    runs = [replace(run, outcomes={"batch": main}) for run, main in zip(runs[:2], (near, far), strict=True)]
+    axes = getattr(scene_picture, picture)(runs).axes
+    for one in axes:
+        (left, right), (low, high) = one.get_xlim(), one.get_ylim()
+        ways = np.concatenate([line.get_xydata() for line in one.lines])
+        whole = np.all((ways > (left, low)) & (ways < (right, high)))
+        assert whole == (ways.max() < 30.0)
+        assert right - left < 25.0

@@ -14,6 +14,9 @@ from fulmar_bringup.report.style import ALARM, FAINT, INK, PAPER, quiet_grid
 
 OUTLINES = 7  # of the body along a way
 MARGIN = 0.8  # around what is shown [m]
+AWAY = (
+    3.0  # from what stands about that a way is followed; who is lost must not make everything else small [m]
+)
 
 
 def draw_scenes_with_obstacles(runs: Sequence[View]) -> Figure:
@@ -133,10 +136,12 @@ def _name(axes: Axes, place: np.ndarray, text: str) -> None:
 
 
 def _finish(axes: Axes, run: View, episode: int) -> None:
-    """Show what stands about; ways may lead out of the panel."""
+    """Show what stands about, and the way, unless it leads far away."""
     outcome = run.main
     there = outcome.obstacles[episode][outcome.obstacles[episode][:, 2] > 0.0, :2]
     places = np.concatenate((outcome.starts[episode, None, :2], outcome.targets[episode, :, :2], there))
+    way = outcome.paths[episode, :, :2].clip(places.min(axis=0) - AWAY, places.max(axis=0) + AWAY)
+    places = np.concatenate((places, way))
     low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
     half = 0.5 * float(np.max(high - low))
     middle = 0.5 * (low + high)
