@@ -170,14 +170,16 @@ class BatchSimulation:
             command: Anything finite, shape (worlds, n); limits and slew are applied here.
         """
         xp = self._xp
-        wanted = self.robot.actuators.limited(self._real(command))
+        # One actuator after the other in memory, worlds side by side: most of what follows goes actuator by actuator.
+        given = xp.asarray(command)
+        by_actuator = self._real(xp.stack([given[:, i] for i in range(given.shape[1])]))
+        wanted = self.robot.actuators.limited(by_actuator.T)
         self.command = slewed(wanted, self.command, self.robot, self.control_dt)
         noise = None
         if self._noisy:
             bits = words(self._noise_keys, self._steps, self.command.shape[1])
             noise = 2.0 * uniform_from(bits, self._dtype) - 1.0
-        by_actuator = xp.stack([self.command[:, i] for i in range(self.command.shape[1])])
-        self._actuation.begin(by_actuator, self.world, noise)
+        self._actuation.begin(self.command.T, self.world, noise)
         time_s = xp.astype(self._steps, self._dtype) * self.control_dt
         before = self.truth
         self.truth = control_step(

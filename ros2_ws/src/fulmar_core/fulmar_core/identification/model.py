@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
-from fulmar_core.disturbances.world import World
+from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.identification.windows import Windows
 from fulmar_core.robot import Robot
 
@@ -90,4 +90,4 @@ def nominal_world(robot: Robot, **instead: np.ndarray) -> World:
     """
     calm = Scenario("calm", sensor_noise=False, body="nominal")
     nominal = draw_world(robot, calm, Draws(0, np.zeros(1), np.zeros(1)))
-    return World(*(instead.get(field.name, getattr(nominal, field.name)) for field in fields(World)))
+    return World(*(instead.get(name, getattr(nominal, name)) for name in FIELDS))
