@@ -393,3 +393,24 @@ def test_limits_of_a_run_reach_its_plan(fulmar, monkeypatch, tmp_path):
     with pytest.raises(PlannedError):
         fulmar(*RUN, "--area=-2,2,-1,1", "--max-run-time", "60")
     assert (guards[0].area, guards[0].max_run_time_s) == ((-2.0, 2.0, -1.0, 1.0), 60.0)
+
+
+CATCHES_AN_INTERRUPT_OF_TEXT_THAT_RUNS_AS_CODE = """
+import os, signal
+from fulmar_bringup import cli
+
+def app(**_):
+    try:
+        exec("os.kill(os.getpid(), signal.SIGINT)\\nwhile True: pass")
+    except KeyboardInterrupt:
+        return 1
+
+cli.app = app
+cli.main()
+"""
+
+
+def test_a_ctrl_c_that_was_answered_does_not_end_the_process_by_a_signal_afterwards(tmp_path):
+    (tmp_path / "interrupted.py").write_text(CATCHES_AN_INTERRUPT_OF_TEXT_THAT_RUNS_AS_CODE)
+    ended = subprocess.run([sys.executable, "-m", "interrupted"], cwd=tmp_path, timeout=30.0, check=False)
+    assert ended.returncode == 1

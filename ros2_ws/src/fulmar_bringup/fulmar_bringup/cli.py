@@ -80,6 +80,16 @@ def main() -> None:
     # A shell starts its background jobs with Ctrl-C ignored, and so would everything that we start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
+        _run_and_exit(told)
+    finally:
+        # Python ends by SIGINT, whatever the exit code, once Ctrl-C has come while text was run as code, as it is for
+        # each dataclass that is imported, even if it was caught; running text again takes that back (CPython's
+        # pythonrun.c, `run_eval_code_obj`).
+        exec("")
+
+
+def _run_and_exit(told: list[str]) -> None:
+    try:
         code = app(prog_name="fulmar", standalone_mode=False)
         sys.stdout.flush()  # here, where it is known what to do if nobody reads it
     except (ConfigError, BundleError, BagError) as error:
