@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections import namedtuple
 from types import FrameType
 
 import typer
@@ -83,9 +84,9 @@ def main() -> None:
         _run_and_exit(told)
     finally:
         # Python ends by SIGINT, whatever the exit code, once Ctrl-C has come while text was run as code, as it is for
-        # each dataclass that is imported, even if it was caught; running text again takes that back (CPython's
-        # pythonrun.c, `run_eval_code_obj`).
-        exec("")
+        # each named tuple or dataclass that is imported, even if it was caught; running text again takes that back
+        # (CPython's pythonrun.c, `run_eval_code_obj`).
+        namedtuple("Answered", ())
 
 
 def _run_and_exit(told: list[str]) -> None:
