@@ -1,13 +1,15 @@
-"""Recorded runs to read, written once."""
+"""Recorded runs to read, written once, and the command line."""
 
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from fulmar_bringup import cli
 from tests.fulmar_bringup.bag_commands import POLICY
 from tests.fulmar_bringup.synthetic_run import CALM, Plan, write_run
 
@@ -46,3 +48,17 @@ def copy_of(tmp_path) -> Callable[[Path], Path]:
 def copy(tmp_path) -> Path:
     """A copy of a reference bag, to be changed or damaged."""
     return Path(shutil.copytree(POLICY, tmp_path / "bag"))
+
+
+@pytest.fixture
+def fulmar(monkeypatch, capsys):
+    """Run a command line in this process: exit code, standard output, standard error."""
+
+    def call(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fulmar", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        captured = capsys.readouterr()
+        return int(ended.value.code or 0), captured.out, captured.err
+
+    return call

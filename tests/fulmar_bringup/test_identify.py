@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import pytest
 
-from fulmar_bringup import cli
 from fulmar_core.calibration import load_calibration
 from fulmar_core.robot import load_robot
 
@@ -27,20 +25,6 @@ def judged(tmp_path_factory):
     return run_trial(
         Trial("floating_platform", 1, seed=2, duration_s=60.0, bags=home)
     ), home / "floating_platform_01"
-
-
-@pytest.fixture
-def fulmar(monkeypatch, capsys):
-    """Run a command line in this process: exit code, standard output, standard error."""
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["fulmar", *map(str, words)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(ended.value.code or 0), captured.out, captured.err
-
-    return call
 
 
 def test_estimates_from_bags_are_within_three_per_cent_of_a_truth_that_is_far_from_nominal(judged):

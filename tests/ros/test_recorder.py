@@ -6,6 +6,7 @@ import json
 import os
 import resource
 import signal
+import statistics
 import subprocess
 import sys
 import threading
@@ -125,10 +126,15 @@ def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
     recorder.wait_until_recording()
     publisher = odometry(node)
     recorder.process.send_signal(signal.SIGSTOP)
-    begin = time.monotonic()
-    for _ in range(6000):
-        publisher.publish(Odometry())
-    assert time.monotonic() - begin < 20.0  # the reader hangs for longer
+    rounds_s = []
+    for _ in range(3):
+        begin = time.monotonic()
+        for _ in range(6000):
+            publisher.publish(Odometry())
+        rounds_s.append(time.monotonic() - begin)
+    assert (
+        statistics.median(rounds_s) < 2.0
+    )  # who is held up is so each time; the machine's own pauses are not
 
 
 PUBLISHES_AND_ASKS = """
