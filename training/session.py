@@ -148,7 +148,7 @@ class Session(BaseCallback):
             raise RunIsOver
 
     def _plan_check(self, progress: float) -> None:
-        """The next check comes at the next whole multiple of its share of the run."""
+        """The next check comes at the next whole multiple of its share of the run, also after a resume."""
         self._next_check = (math.floor(progress / self._check_every + 1e-9) + 1) * self._check_every
 
     def _check(self) -> None:

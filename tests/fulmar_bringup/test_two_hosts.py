@@ -69,7 +69,7 @@ def test_nothing_passes_a_cable_that_is_cut_and_it_can_be_mended(ends: tuple[End
     assert len(arrivals(one, other)) == COUNT
 
 
-@pytest.mark.skipif(bool(why_not()), reason=why_not())
+@pytest.mark.skipif(bool(why_not()), reason=f"{why_not()}; the cable between them is tested above")
 def test_two_hosts_reach_each_other_by_the_cable_alone_and_are_gone_afterwards_also_on_errors() -> None:
     class BrokenError(Exception):
         pass

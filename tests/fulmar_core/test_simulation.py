@@ -148,6 +148,17 @@ def test_what_was_handed_out_before_a_step_and_a_reset_stays_as_it_was(scenario)
     np.testing.assert_array_equal(kept[2], copies["command"])
 
 
+@pytest.mark.parametrize("steps", [0, 2])
+def test_readings_and_commands_that_were_handed_out_outlast_a_reset(steps):
+    simulation = run(build(RANDOMISED), steps)
+    kept, command = simulation.measured, simulation.command
+    copies = everything(simulation)
+    simulation.reset([1, 3])
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(kept, name), copies[f"measured {name}"])
+    np.testing.assert_array_equal(command, copies["command"])
+
+
 @EACH_ROBOT
 @pytest.mark.parametrize("task", ["go_to_position", "track_velocities"])
 def test_a_task_that_begins_anew_again_and_again_stays_finite(robot, task):

@@ -128,8 +128,11 @@ def test_on_a_disk_of_256_kb_the_bag_stays_readable_and_goes_on_when_there_is_ro
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(disk)]
-    if subprocess.run(mount, check=False, capture_output=True).returncode:
-        pytest.skip("no file system may be mounted here")
+    mounted = subprocess.run(mount, check=False, capture_output=True, text=True)
+    if mounted.returncode:
+        pytest.skip(
+            f"no small disk may be mounted here; the tests above refuse writes instead: {mounted.stderr}"
+        )
     try:
         bag = BagWriter(disk / "bag", run_info=INFO)
         bag.add_topic(TOPIC, TYPE, "stream")

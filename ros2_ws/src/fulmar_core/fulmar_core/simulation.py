@@ -170,9 +170,9 @@ class BatchSimulation:
             command: Anything finite, shape (worlds, n); limits and slew are applied here.
         """
         xp = self._xp
+        given = self._real(command)
         # One actuator after the other in memory, worlds side by side: most of what follows goes actuator by actuator.
-        given = xp.asarray(command)
-        by_actuator = self._real(xp.stack([given[:, i] for i in range(given.shape[1])]))
+        by_actuator = xp.stack([given[:, i] for i in range(given.shape[1])])
         wanted = self.robot.actuators.limited(by_actuator.T)
         self.command = slewed(wanted, self.command, self.robot, self.control_dt)
         noise = None

@@ -29,7 +29,7 @@ def policies(
     ),
     anew: Annotated[
         bool,
-        typer.Option("--anew", help="Also those that are made; the old ones are kept beside their runs."),
+        typer.Option("--anew", help="From the beginning, also what is made; it is kept beside its run."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -130,8 +130,8 @@ class Odometer:
         lost = uniform_from(bits[6], columns.dtype) < (world.dropout if self._noisy else 0.0)
         if self._every > 1:
             lost = lost | (steps % self._every != 0)
-        # An array of its own: readings are handed out, what is still under way is not.
-        reading = xp.where(lost & (steps != 0), reading if self._held is None else self._held, reading)
+        if self._held is not None:
+            reading = xp.where(lost & (steps != 0), self._held, reading)
         self._held = reading
         return PlanarState(*(reading[i] for i in range(6)))
 
@@ -148,7 +148,8 @@ class Odometer:
             every[only] = some
         errors = tuple(error[..., only] for error in _errors(world))
         reading = self._disturbed(columns, errors, words(keys, 0, self._words))
-        self._held = xp.asarray(self._held, copy=True)  # who was given these readings keeps them
+        # Who was given readings keeps them; what is still under way nobody was given.
+        self._held = xp.asarray(self._held, copy=True)
         for old in (self._held, *self._past):
             old[:, only] = reading
         return PlanarState(*(self._held[i] for i in range(6)))

@@ -14,9 +14,7 @@ from fulmar_bringup.report.style import ALARM, FAINT, INK, PAPER, quiet_grid
 
 OUTLINES = 7  # of the body along a way
 MARGIN = 0.8  # around what is shown [m]
-AWAY = (
-    3.0  # from what stands about that a way is followed; who is lost must not make everything else small [m]
-)
+AWAY = 3.0  # from what stands about that a way is followed: who is lost must not make all else small [m]
 
 
 def draw_scenes_with_obstacles(runs: Sequence[View]) -> Figure:
