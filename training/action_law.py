@@ -8,11 +8,13 @@ from typing import Protocol
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
-from torch.nn.functional import softplus
+from torch.nn.functional import log_softmax, one_hot, softplus
+
+from training.orders import KINDS
 
 
 class ActionLaw(Protocol):
-    """A distribution of actions, shaped by the network's outputs; both have shape (batch, m)."""
+    """A distribution of actions, shaped by the network's outputs, shapes (batch, m) and (batch, n)."""
 
     def sample(self, outputs: torch.Tensor) -> torch.Tensor:
         """Draw actions, shape (batch, m)."""
@@ -35,7 +37,7 @@ class ActionLaw(Protocol):
             of_entropy: Weight of the entropy.
 
         Returns:
-            With respect to the outputs, shape (batch, m); with respect to parameters of the law itself it is left
+            With respect to the outputs, shape (batch, n); with respect to parameters of the law itself it is left
             in their `grad`.
         """
 
@@ -64,6 +66,41 @@ class OnOff:
         if of_entropy:
             gradient -= of_entropy / len(outputs) * outputs * on * (1.0 - on)
         return gradient
+
+
+class Choice:
+    """Each actuator gets one of some orders, with probabilities from as many outputs, one actuator after another."""
+
+    def sample(self, outputs: torch.Tensor) -> torch.Tensor:
+        """Draw numbers of orders (the largest of logits with Gumbel noise is distributed so)."""
+        noise = -torch.empty_like(outputs).exponential_().log_()
+        return _by_actuator(outputs + noise).argmax(2).float()
+
+    def log_prob(self, outputs: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
+        """Sum over the actuators."""
+        logs = log_softmax(_by_actuator(outputs), 2)
+        return logs.gather(2, actions.long().unsqueeze(2)).sum((1, 2))
+
+    def entropy(self, outputs: torch.Tensor) -> torch.Tensor:
+        """Sum over the actuators, mean over the batch."""
+        logs = log_softmax(_by_actuator(outputs), 2)
+        return -(logs.exp() * logs).sum((1, 2)).mean()
+
+    def backward(
+        self, outputs: torch.Tensor, actions: torch.Tensor, weights: torch.Tensor, of_entropy: float
+    ) -> torch.Tensor:
+        """See `ActionLaw.backward`."""
+        logs = log_softmax(_by_actuator(outputs), 2)
+        chances = logs.exp()
+        gradient = (one_hot(actions.long(), KINDS) - chances).mul_(weights.view(-1, 1, 1))
+        if of_entropy:
+            mean = (chances * logs).sum(2, keepdim=True)
+            gradient -= of_entropy / len(outputs) * chances * (logs - mean)
+        return gradient.flatten(1)
+
+
+def _by_actuator(outputs: torch.Tensor) -> torch.Tensor:
+    return outputs.unflatten(1, (-1, KINDS))
 
 
 class Gaussian:
@@ -101,11 +138,13 @@ def action_law(policy: ActorCriticPolicy) -> ActionLaw:
     """The law that fits a policy's action space.
 
     Raises:
-        ValueError: Neither on/off nor a box.
+        ValueError: Neither on/off, orders nor a box.
     """
     space = policy.action_space
     if isinstance(space, spaces.MultiBinary):
         return OnOff()
+    if isinstance(space, spaces.MultiDiscrete):
+        return Choice()
     if isinstance(space, spaces.Box):
         return Gaussian(policy.log_std)
-    raise ValueError(f"actions must be MultiBinary or Box, not {type(space).__name__}")
+    raise ValueError(f"actions must be MultiBinary, MultiDiscrete or Box, not {type(space).__name__}")

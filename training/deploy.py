@@ -100,7 +100,8 @@ def _trained(learner: BaseAlgorithm, *, wrench: bool) -> _Trained:
     assert isinstance(learner, PPO | RecurrentPPO)
     layers = [*policy.mlp_extractor.policy_net, policy.action_net]
     on_off = isinstance(learner.action_space, spaces.MultiBinary)
-    decision: Decision = "choose" if wrench else "threshold" if on_off else "clamp"
+    orders = isinstance(learner.action_space, spaces.MultiDiscrete)
+    decision: Decision = "choose" if wrench else "threshold" if on_off else "order" if orders else "clamp"
     return _Trained(layers, decision, getattr(policy, "lstm_actor", None))
 
 

@@ -30,7 +30,7 @@ _COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
 
 
 class FastPPO(PPO):
-    """PPO for an `MlpPolicy` of separate tanh networks over MultiBinary or Box actions, on a CPU."""
+    """PPO for an `MlpPolicy` of separate tanh networks over MultiBinary, MultiDiscrete or Box actions, on a CPU."""
 
     def _setup_model(self) -> None:
         self.policy_kwargs = {

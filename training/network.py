@@ -20,8 +20,9 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.symmetry import Mirror
 from fulmar_core.tasks import Task
+from training.orders import KINDS, shares_asked
 
-Decision = Literal["threshold", "clamp", "squash", "choose"]
+Decision = Literal["threshold", "clamp", "squash", "choose", "order"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class NetworkPlan:
 
     inputs: int  # observation terms
     hidden: tuple[int, ...]  # sizes of the hidden layers
-    outputs: int  # of the last layer: actuators, or the terms of a wrench
+    outputs: int  # of the last layer: actuators, the terms of a wrench, or chances of each actuator's orders
     activation: Literal["tanh", "relu"]
     decision: Decision  # how raw outputs become shares of full command
     command_scale: tuple[float, ...]  # full command of each actuator, in its own unit
@@ -41,6 +42,11 @@ class NetworkPlan:
     side: int | None = None  # where this input is negative, it sees and answers the mirror image
     specialist: NetworkPlan | None = None  # of the network that takes over where too many valves are dead
     losses: int = 0  # sets of dead valves of which one is enough for that
+
+    @property
+    def answers(self) -> int:
+        """What becomes of the outputs: shares of full command, or the terms of a wrench."""
+        return self.outputs // KINDS if self.decision == "order" else self.outputs
 
     @property
     def on_off(self) -> bool:
@@ -77,7 +83,7 @@ class DeployedNetwork(nn.Module):
             self.register_buffer("choice_gas", torch.zeros(count))
         if plan.side is not None:
             self.register_buffer("mirror_seen", torch.eye(plan.inputs))
-            self.register_buffer("mirror_done", torch.eye(plan.outputs))
+            self.register_buffer("mirror_done", torch.eye(plan.answers))
         if plan.losses:
             self.register_buffer("losses", torch.ones(plan.losses, valves))
         self.specialist = DeployedNetwork(plan.specialist) if plan.specialist else None
@@ -108,7 +114,7 @@ class DeployedNetwork(nn.Module):
         seen = self._mirrored(observation, observation, "seen")
         features = torch.clamp((seen - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
         if memory is None:
-            raw = self._mirrored(self.layers(features), observation, "done")
+            raw = self._mirrored(self._ordered(self.layers(features), seen), observation, "done")
             raw = self._handed_over(self._appraised(raw, observation), observation)
             return self._decide(raw), raw
         memory = self._remember(features, memory)
@@ -160,6 +166,13 @@ class DeployedNetwork(nn.Module):
         dead = 1.0 - observation[:, -self.losses.shape[1] :]
         missing = self.losses.sum(dim=1) - dead @ self.losses.t()
         return torch.where(missing.amin(dim=1, keepdim=True) < 0.5, self.specialist(observation)[1], raw)
+
+    def _ordered(self, raw: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
+        """Shares of full command that the likeliest orders ask for, where the last layer chooses orders."""
+        if self.plan.decision != "order":
+            return raw
+        orders = raw.unflatten(1, (self.plan.answers, KINDS)).argmax(2).to(raw.dtype) - 1.0
+        return torch.as_tensor(shares_asked(orders, seen[:, -self.plan.answers :]))
 
     def _appraised(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
         """How much opening each valve is worth, where the last layer asks for a wrench; else what it put out."""

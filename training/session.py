@@ -109,6 +109,11 @@ class Session(BaseCallback):
         """Median speed of learning, checks and checkpoints apart [control steps/s]."""
         return float(np.median(self._speeds)) if self._speeds else 0.0
 
+    @property
+    def _steps(self) -> int:
+        """Control steps of all worlds so far."""
+        return self.num_timesteps * self._worlds.hold
+
     def _on_training_start(self) -> None:
         self._watcher.begin()
 
@@ -121,9 +126,9 @@ class Session(BaseCallback):
     def _on_rollout_start(self) -> None:
         if not self._first:
             began, steps = self._since
-            self._speeds.append((self.num_timesteps - steps) / (time.monotonic() - began))
+            self._speeds.append((self._steps - steps) / (time.monotonic() - began))
         self._between_updates()
-        self._since = time.monotonic(), self.num_timesteps
+        self._since = time.monotonic(), self._steps
 
     def _between_updates(self) -> None:
         story = self.story
@@ -131,7 +136,7 @@ class Session(BaseCallback):
         self._first = False
         story.elapsed_s = self.elapsed_s
         progress = self._limits.progress(story.elapsed_s, story.updates)
-        self._watcher.advance(progress, story.elapsed_s, self.num_timesteps)
+        self._watcher.advance(progress, story.elapsed_s, self._steps)
         self._worlds.set_strength(self._settings.strength(progress))
         if self._settings.refinement:
             self._worlds.set_effort(self._settings.effort(progress))
@@ -157,7 +162,7 @@ class Session(BaseCallback):
         assert normaliser is not None
         network = deployed_network(self.model, normaliser, self._command_scale, self._specialist)
         success, score = self._judge(network)
-        check = Check(story.elapsed_s, self.num_timesteps, success, score)
+        check = Check(story.elapsed_s, self._steps, success, score)
         # A refined run is meant to end otherwise than it was in between, so its last network is the one to keep.
         if story.best is None or score > story.best[0].score or self._settings.refinement:
             story.best = check, network  # at once, since a person may interrupt anywhere

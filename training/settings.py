@@ -21,7 +21,7 @@ from fulmar_core.tasks import Task
 class OnPolicy:
     """Hyper-parameters of PPO (Schulman et al., arXiv 1707.06347), in its own terms."""
 
-    steps: int  # control steps of each world between updates
+    steps: int  # actions of each world between updates
     minibatch: int
     epochs: int
     learning_rate: float  # to begin with
@@ -124,6 +124,18 @@ class Refinement:
 
 
 @dataclass(frozen=True)
+class Orders:
+    """Commands are learned as orders (`training.orders`): astern, as it is, or ahead, for actuators that slew."""
+
+    hold: int  # control steps that an order stands for while it learns; deployed, orders come at every step
+
+    def __post_init__(self) -> None:
+        """Refuse to hold nothing."""
+        if self.hold < 1:
+            raise ValueError("'hold' must be at least 1.")
+
+
+@dataclass(frozen=True)
 class SpecialistPlan:
     """A second network, which takes over where dead valves leave no pose to hold (`training.specialist`)."""
 
@@ -174,6 +186,7 @@ class TrainingSettings:
     # Goals on the right are shown, and answered, as on the left; or, by `ends`, those behind as those ahead.
     mirror: Symmetry | None = None
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
+    orders: Orders | None = None  # shares of full command without it
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
     def __post_init__(self) -> None:
@@ -187,6 +200,8 @@ class TrainingSettings:
             )
         if self.mirror and isinstance(algorithm, RecurrentPpo):
             raise ValueError("'mirror' is for networks without memory: what they remember has a side, too.")
+        if self.orders and (not isinstance(algorithm, Ppo) or algorithm.lessons or self.told or self.wrench):
+            raise ValueError("'orders' are for ppo, without 'lessons', 'told' and 'wrench'.")
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
             raise ValueError(
                 f"worlds · steps = {self.worlds * algorithm.steps} must be a multiple of 'minibatch'."

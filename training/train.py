@@ -134,6 +134,7 @@ def train(
         wrench=settings.wrench,
         gas=settings.gas,
         mirror=settings.mirror,
+        orders_held=settings.orders.hold if settings.orders else 0,
     )
     story = Story()
     if resume:
@@ -172,7 +173,7 @@ def train(
         "git_revision": git_revision,
         "control_hz": robot.timing.control_hz,
         "settings": asdict(settings),
-        "steps": learner.num_timesteps,
+        "steps": learner.num_timesteps * worlds.hold,
         "updates": story.updates,
         "wall_s": round(story.elapsed_s, 1),
         "steps_per_s": round(session.steps_per_s),

@@ -20,6 +20,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task, fitted
+from training.orders import KINDS, check_orders, shares_asked
 from training.stranded import asked_for
 from training.told_truth import ToldTruth
 
@@ -27,10 +28,13 @@ from training.told_truth import ToldTruth
 class BatchVecEnv(VecEnv):
     """Worlds that learn together; each begins again by itself when its episode is over.
 
-    Actions are on/off for valves that know only these, or the wrench that they should bring up, else shares of full
-    command in [-1, 1]. An episode ends when
-    the robot leaves the geofence or touches an obstacle (terminated), or its time is up (truncated: the value of the
-    last state still counts). First episodes have random lengths, so that resets spread out over time.
+    Actions are on/off for valves that know only these, or the wrench that they should bring up, or numbers of orders,
+    else shares of full command in [-1, 1]. An episode ends when the robot leaves the geofence or touches an obstacle
+    (terminated), or its time is up (truncated: the value of the last state still counts). First episodes have random
+    lengths, so that resets spread out over time.
+
+    Attributes:
+        hold: Control steps of one action; rewards of them are added up.
     """
 
     def __init__(
@@ -49,6 +53,7 @@ class BatchVecEnv(VecEnv):
         wrench: bool = False,
         gas: float = 1.0,
         mirror: Symmetry | None = None,
+        orders_held: int = 0,
     ) -> None:
         """Build the worlds.
 
@@ -67,6 +72,10 @@ class BatchVecEnv(VecEnv):
             gas: What a valve costs in that choice, as a multiple.
             mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
                 (`fulmar_core.symmetry`).
+            orders_held: Actions are orders (`training.orders`) that stand for so many control steps; 0: they are not.
+
+        Raises:
+            ConfigError: The robot cannot be mirrored so, or takes no orders.
         """
         task = fitted(asked_for(task, scenario), robot)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
@@ -76,6 +85,9 @@ class BatchVecEnv(VecEnv):
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
         self.choice = WrenchChoice.of(robot, gas) if wrench else None
         self.mirror = Mirror.of(robot, task, mirror) if mirror else None
+        if orders_held:
+            check_orders(robot)
+        self.takes_orders, self.hold = orders_held > 0, max(orders_held, 1)
         self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
         self.simulation = self._new_simulation(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
@@ -85,11 +97,13 @@ class BatchVecEnv(VecEnv):
         observation_space = gymnasium.spaces.Box(
             -np.inf, np.inf, (len(self.simulation.observer.names) + more,), np.float32
         )
-        action_space: gymnasium.Space[Any] = (
-            gymnasium.spaces.MultiBinary(count)
-            if robot.actuators.binary and not wrench
-            else gymnasium.spaces.Box(-1.0, 1.0, (WRENCH if wrench else count,), np.float32)
-        )
+        action_space: gymnasium.Space[Any]
+        if self.takes_orders:
+            action_space = gymnasium.spaces.MultiDiscrete([KINDS] * count)
+        elif robot.actuators.binary and not wrench:
+            action_space = gymnasium.spaces.MultiBinary(count)
+        else:
+            action_space = gymnasium.spaces.Box(-1.0, 1.0, (WRENCH if wrench else count,), np.float32)
         super().__init__(worlds, observation_space, action_space)
         self._age = np.zeros(worlds, dtype=int)
         self._actions = np.zeros((worlds, count), dtype=np.float32)
@@ -170,6 +184,8 @@ class BatchVecEnv(VecEnv):
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
         actions = np.asarray(actions, dtype=np.float32)
+        if self.takes_orders:
+            actions = actions - 1.0
         if self.mirror is not None:
             actions = np.where(self._mirrored[:, None], actions @ self.mirror.done, actions)
         self._actions = self._valves(self.choice, actions) if self.choice else actions
@@ -181,21 +197,13 @@ class BatchVecEnv(VecEnv):
         return chosen
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Move one control step; returns observations, rewards, dones and infos."""
+        """Move as long as an action stands, usually one control step; returns observations, rewards, dones and infos."""
         simulation = self.simulation
-        before, goal, previous = simulation.truth, simulation.goal, simulation.command
-        simulation.step(self._actions * self._scale)
-        reward, ended_early = learning_step(
-            self._judged,
-            self.task,
-            before=before,
-            after=simulation.truth,
-            goal=goal,
-            ended=simulation.goal,
-            previous=previous,
-            command=simulation.command,
-        )
-        self._age += 1
+        reward, ended_early = self._step()
+        for _ in range(self.hold - 1):
+            more, ended = self._step()
+            reward, ended_early = reward + more, ended_early | ended
+        self._age += self.hold
         timed_out = (self._age >= self._horizon) & ~ended_early
         done = ended_early | timed_out
         if self._told:
@@ -214,6 +222,26 @@ class BatchVecEnv(VecEnv):
             observations = observations.copy(order="K")  # the last ones are still in the infos
             observations[ended] = self._observed(ended)
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
+
+    def _step(self) -> tuple[Array, np.ndarray]:
+        """One control step; returns rewards and whether episodes ended before their time."""
+        simulation = self.simulation
+        before, goal, previous = simulation.truth, simulation.goal, simulation.command
+        shares = self._actions
+        if self.takes_orders:
+            shares = shares_asked(shares, previous / self._scale)
+        simulation.step(shares * self._scale)
+        reward, ended_early = learning_step(
+            self._judged,
+            self.task,
+            before=before,
+            after=simulation.truth,
+            goal=goal,
+            ended=simulation.goal,
+            previous=previous,
+            command=simulation.command,
+        )
+        return reward, np.asarray(ended_early)
 
     def _observed(self, worlds: np.ndarray) -> np.ndarray:
         observations = np.asarray(self.simulation.observe(worlds))
