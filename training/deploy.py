@@ -59,7 +59,7 @@ def deployed_network(
     plan = NetworkPlan(
         inputs=len(statistics.mean),
         hidden=tuple(layer.out_features for layer in trained.linear[:-1]),
-        outputs=trained.linear[-1].out_features,
+        outputs=int(trained.linear[-1].out_features),  # of orders it is a number of NumPy
         activation="relu" if any(isinstance(layer, nn.ReLU) for layer in trained.layers) else "tanh",
         decision=trained.decision,
         command_scale=tuple(float(value) for value in command_scale),

@@ -16,6 +16,7 @@ from training.fast_mlp import FastMlp, fast_precision
 from training.fast_ppo import FastPPO
 
 MULTI_BINARY, BOX = spaces.MultiBinary(3), spaces.Box(-1.0, 1.0, (2,))
+ORDERS = spaces.MultiDiscrete([3, 3])
 
 
 class Drift(gymnasium.Env):
@@ -65,11 +66,11 @@ def test_hidden_layers_of_another_kind_are_refused():
         FastMlp(nn.Sequential(nn.Linear(4, 4), nn.ReLU()), nn.Linear(4, 1), torch.float32)
 
 
-@pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
+@pytest.mark.parametrize("space", [MULTI_BINARY, ORDERS, BOX])
 @pytest.mark.parametrize("of_entropy", [0.0, 0.3])
 def test_gradients_of_the_action_laws_are_those_of_torch(space, of_entropy):
     policy = learner(FastPPO, space).policy
-    law, outputs = action_law(policy), torch.randn(16, *space.shape, requires_grad=True)
+    law, outputs = action_law(policy), torch.randn(16, policy.action_net.out_features, requires_grad=True)
     actions, weights = law.sample(outputs).detach(), torch.randn(16)
     own = [policy.log_std] if space is BOX else []
     value = (weights * law.log_prob(outputs, actions)).sum() + of_entropy * law.entropy(outputs)
@@ -80,7 +81,7 @@ def test_gradients_of_the_action_laws_are_those_of_torch(space, of_entropy):
         torch.testing.assert_close(ours, theirs, atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
+@pytest.mark.parametrize("space", [MULTI_BINARY, ORDERS, BOX])
 def test_values_and_log_probabilities_are_those_of_the_policy_class(space):
     fast = learner(FastPPO, space)
     observations = torch.randn(32, 4)
@@ -95,7 +96,7 @@ def test_values_and_log_probabilities_are_those_of_the_policy_class(space):
         torch.testing.assert_close(fast._law.entropy(outputs), entropy, atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
+@pytest.mark.parametrize("space", [MULTI_BINARY, ORDERS, BOX])
 def test_drawn_actions_are_spread_as_the_policy_class_draws_them(space):
     fast = learner(FastPPO, space)
     observations = torch.randn(1, 4).expand(20_000, 4)
@@ -105,7 +106,7 @@ def test_drawn_actions_are_spread_as_the_policy_class_draws_them(space):
     torch.testing.assert_close(ours.std(0), theirs.std(0), atol=0.04, rtol=0.0)
 
 
-@pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
+@pytest.mark.parametrize("space", [MULTI_BINARY, ORDERS, BOX])
 @pytest.mark.parametrize("ent_coef", [0.0, 0.01])
 def test_an_update_moves_the_weights_as_the_stock_update_does(space, ent_coef, monkeypatch):
     fast, stock = (learner(kind, space, ent_coef=ent_coef) for kind in (FastPPO, PPO))
@@ -129,7 +130,7 @@ def test_an_update_moves_the_weights_as_the_stock_update_does(space, ent_coef, m
         torch.testing.assert_close(ours, theirs, atol=2e-5, rtol=1e-3)
 
 
-@pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
+@pytest.mark.parametrize("space", [MULTI_BINARY, ORDERS, BOX])
 def test_a_rollout_gives_the_returns_that_the_stock_buffer_would(space):
     fast = learner(FastPPO, space, gae_lambda=1.0, gamma=0.9)
     _, callback = fast._setup_learn(100)
@@ -182,16 +183,17 @@ def test_a_loaded_learner_is_the_one_that_was_saved(tmp_path):
     assert again.num_timesteps == 256
 
 
-@pytest.mark.parametrize("space", [MULTI_BINARY, BOX])
+@pytest.mark.parametrize("space", [MULTI_BINARY, ORDERS, BOX])
 def test_it_learns(space):
     fast = learner(FastPPO, space, learning_rate=3e-3, precision=fast_precision())
     fast.learn(6_000)
     seen = np.random.default_rng(1).normal(size=(500, 4)).astype(np.float32)
     actions = fast.predict(seen, deterministic=True)[0]
     wanted = seen[:, : actions.shape[1]] > 0.0
-    assert (wanted == (actions > 0.0)).mean() > 0.8
+    middle = 1 if space is ORDERS else 0
+    assert (wanted == (actions > middle)).mean() > 0.8
 
 
 def test_other_actions_are_refused():
-    with pytest.raises(ValueError, match="MultiBinary or Box, not Discrete"):
+    with pytest.raises(ValueError, match="MultiBinary, MultiDiscrete or Box, not Discrete"):
         learner(FastPPO, spaces.Discrete(3))
