@@ -15,6 +15,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
+from training.coordinates import coordinate_terms
 from training.network import Decision, DeployedNetwork, NetworkPlan
 from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
@@ -55,9 +56,10 @@ def deployed_network(
     worlds = normaliser.unwrapped
     choice = worlds.choice if isinstance(worlds, BatchVecEnv) else None
     mirror = worlds.mirror if isinstance(worlds, BatchVecEnv) else None
+    places = worlds.places if isinstance(worlds, BatchVecEnv) else ()
     trained = _trained(learner, wrench=choice is not None)
     plan = NetworkPlan(
-        inputs=len(statistics.mean),
+        inputs=len(statistics.mean) - coordinate_terms(len(places)),
         hidden=tuple(layer.out_features for layer in trained.linear[:-1]),
         outputs=int(trained.linear[-1].out_features),  # of orders it is a number of NumPy
         activation="relu" if any(isinstance(layer, nn.ReLU) for layer in trained.layers) else "tanh",
@@ -68,6 +70,7 @@ def deployed_network(
         combinations=len(choice.commands) if choice else 0,
         knows_dead=choice is not None and worlds.told,
         side=mirror.side if mirror else None,
+        places=places,
         specialist=specialist.network.plan if specialist else None,
         losses=len(specialist.losses) if specialist else 0,
     )

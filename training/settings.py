@@ -186,6 +186,9 @@ class TrainingSettings:
     # Goals on the right are shown, and answered, as on the left; or, by `ends`, those behind as those ahead.
     mirror: Symmetry | None = None
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
+    coordinates: bool = (
+        False  # whether the network is shown the targets of a path by coordinates and legs too
+    )
     orders: Orders | None = None  # shares of full command without it
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
@@ -200,6 +203,8 @@ class TrainingSettings:
             )
         if self.mirror and isinstance(algorithm, RecurrentPpo):
             raise ValueError("'mirror' is for networks without memory: what they remember has a side, too.")
+        if self.coordinates and (isinstance(algorithm, RecurrentPpo) or self.told):
+            raise ValueError("'coordinates' are for networks without memory that are not 'told'.")
         if self.orders and (not isinstance(algorithm, Ppo) or algorithm.lessons or self.told or self.wrench):
             raise ValueError("'orders' are for ppo, without 'lessons', 'told' and 'wrench'.")
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:

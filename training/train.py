@@ -134,6 +134,7 @@ def train(
         wrench=settings.wrench,
         gas=settings.gas,
         mirror=settings.mirror,
+        coordinates=settings.coordinates,
         orders_held=settings.orders.hold if settings.orders else 0,
     )
     story = Story()

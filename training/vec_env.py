@@ -15,11 +15,13 @@ from fulmar_core.controllers.told import told_terms
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
+from fulmar_core.errors import ConfigError
 from fulmar_core.learning_step import learning_step
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task, fitted
+from training.coordinates import coordinate_terms, places_of, with_coordinates
 from training.orders import KINDS, check_orders, shares_asked
 from training.stranded import asked_for
 from training.told_truth import ToldTruth
@@ -53,6 +55,7 @@ class BatchVecEnv(VecEnv):
         wrench: bool = False,
         gas: float = 1.0,
         mirror: Symmetry | None = None,
+        coordinates: bool = False,
         orders_held: int = 0,
     ) -> None:
         """Build the worlds.
@@ -72,10 +75,11 @@ class BatchVecEnv(VecEnv):
             gas: What a valve costs in that choice, as a multiple.
             mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
                 (`fulmar_core.symmetry`).
+            coordinates: Observations end with what `training.coordinates` makes of the targets.
             orders_held: Actions are orders (`training.orders`) that stand for so many control steps; 0: they are not.
 
         Raises:
-            ConfigError: The robot cannot be mirrored so, or takes no orders.
+            ConfigError: The robot cannot be mirrored so, or takes no orders, or the task has no path.
         """
         task = fitted(asked_for(task, scenario), robot)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
@@ -93,10 +97,12 @@ class BatchVecEnv(VecEnv):
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
-        more = len(told_terms(robot)) if told else 0
-        observation_space = gymnasium.spaces.Box(
-            -np.inf, np.inf, (len(self.simulation.observer.names) + more,), np.float32
-        )
+        names = self.simulation.observer.names
+        self.places = places_of(names) if coordinates else ()
+        if coordinates and not self.places:
+            raise ConfigError(f"'coordinates': task '{task.name}' has no path. Leave 'coordinates' out.")
+        more = coordinate_terms(len(self.places)) + (len(told_terms(robot)) if told else 0)
+        observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(names) + more,), np.float32)
         action_space: gymnasium.Space[Any]
         if self.takes_orders:
             action_space = gymnasium.spaces.MultiDiscrete([KINDS] * count)
@@ -174,12 +180,12 @@ class BatchVecEnv(VecEnv):
         return self._shown(observations, np.arange(self.num_envs))
 
     def _shown(self, observations: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """The mirror image of some goals, where that was asked for; of which is remembered."""
-        if self.mirror is None:
-            return observations
-        mirrored = observations[:, self.mirror.side] < 0.0
-        self._mirrored[worlds] = mirrored
-        return np.where(mirrored[:, None], observations @ self.mirror.seen, observations)
+        """The mirror image of some goals, and coordinates, where these were asked for; of which image is remembered."""
+        if self.mirror is not None:
+            mirrored = observations[:, self.mirror.side] < 0.0
+            self._mirrored[worlds] = mirrored
+            observations = np.where(mirrored[:, None], observations @ self.mirror.seen, observations)
+        return with_coordinates(observations, self.places) if self.places else observations
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""

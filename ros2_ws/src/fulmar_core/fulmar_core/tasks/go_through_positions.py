@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from fulmar_core.counter_rng import Draws
-from fulmar_core.tasks.passing import PassingTask
+from fulmar_core.tasks.passing import PassingTask, path_terms
 from fulmar_core.tasks.waypoints import Course
 
 
@@ -18,6 +18,9 @@ class GoThroughPositions(PassingTask):
 
     kind: Literal["go_through_positions"]
     course: Course
+
+    seen: ClassVar[int] = 3
+    observation_names: ClassVar[tuple[str, ...]] = path_terms(3, heading=False)
 
     def places(self, draws: Draws) -> np.ndarray:
         """Draw where the targets are, shape (worlds, k, 2) [m]."""
