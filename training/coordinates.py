@@ -1,11 +1,12 @@
 """What follows from where targets on a path lie: coordinates, legs between them, and turns from leg to leg.
 
-A task tells each target's direction and distance. Whether the next one lies within a turning circle, or on which side of
-the leg after it, takes products of these, which small networks of tanh learn slowly. So a network may be shown them.
+A task tells each target's direction and distance. Whether the next one lies within a turning circle, or on which side
+of the leg after it, takes products of these, which small networks learn slowly. So a network may be shown them.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 from fulmar_core.arrays import array_namespace
@@ -40,7 +41,7 @@ def with_coordinates(rows: Array, places: Sequence[int]) -> Array:
     xp = array_namespace(rows)
     targets = [rows[:, i : i + 2] * rows[:, i + 2 : i + 3] for i in places]
     columns, before = [rows, *targets], _direction(targets[0])
-    for here, there in zip(targets, targets[1:], strict=False):
+    for here, there in itertools.pairwise(targets):
         leg = there - here
         along = _direction(leg)
         ahead = before[:, :1] * along[:, :1] + before[:, 1:] * along[:, 1:]

@@ -203,7 +203,7 @@ class BatchVecEnv(VecEnv):
         return chosen
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Move as long as an action stands, usually one control step; returns observations, rewards, dones and infos."""
+        """Move while the actions stand, usually one control step; returns observations, rewards, dones and infos."""
         simulation = self.simulation
         reward, ended_early = self._step()
         for _ in range(self.hold - 1):
@@ -229,7 +229,7 @@ class BatchVecEnv(VecEnv):
             observations[ended] = self._observed(ended)
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
 
-    def _step(self) -> tuple[Array, np.ndarray]:
+    def _step(self) -> tuple[np.ndarray, np.ndarray]:
         """One control step; returns rewards and whether episodes ended before their time."""
         simulation = self.simulation
         before, goal, previous = simulation.truth, simulation.goal, simulation.command
@@ -247,7 +247,7 @@ class BatchVecEnv(VecEnv):
             previous=previous,
             command=simulation.command,
         )
-        return reward, np.asarray(ended_early)
+        return np.asarray(reward), np.asarray(ended_early)
 
     def _observed(self, worlds: np.ndarray) -> np.ndarray:
         observations = np.asarray(self.simulation.observe(worlds))
