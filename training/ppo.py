@@ -23,7 +23,7 @@ class KlAdaptiveRate:
         """Begin at the settings' rate."""
         self.rate = settings.learning_rate
         self._low, self._high = settings.learning_rate_range
-        self._target = settings.target_kl
+        self.target = settings.target_kl  # divergence of an update
 
     def __call__(self, progress_remaining: float) -> float:
         """Current rate; how much of the run remains does not matter."""
@@ -31,9 +31,9 @@ class KlAdaptiveRate:
 
     def update(self, kl: float) -> None:
         """Move the rate by half again when the divergence is off by a factor of two."""
-        if kl > 2.0 * self._target:
+        if kl > 2.0 * self.target:
             self.rate = max(self.rate / 1.5, self._low)
-        elif kl < 0.5 * self._target:
+        elif kl < 0.5 * self.target:
             self.rate = min(self.rate * 1.5, self._high)
 
 

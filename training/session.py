@@ -16,6 +16,7 @@ from training.checkpoint import save_checkpoint
 from training.checks import Check, Judge
 from training.deploy import deployed_network
 from training.network import DeployedNetwork
+from training.ppo import KlAdaptiveRate
 from training.progress import Watcher
 from training.settings import TrainingSettings
 from training.specialist import Specialist
@@ -141,6 +142,9 @@ class Session(BaseCallback):
         if self._settings.refinement:
             self._worlds.set_effort(self._settings.effort(progress))
             self.model.ent_coef = self._settings.entropy(progress)  # type: ignore[attr-defined]
+            rate = self.model.learning_rate
+            assert isinstance(rate, KlAdaptiveRate)
+            rate.target = self._settings.target_kl(progress)
         over = progress >= 1.0 or self._asked_to_stop()
         if over or progress >= self._next_check:
             self._check()

@@ -104,18 +104,19 @@ class Curriculum:
 
 @dataclass(frozen=True)
 class Refinement:
-    """Economy and precision, later in a run: commands get dearer and exploring is worth less, both linearly."""
+    """Economy and precision, later in a run: dearer commands, less exploring and smaller updates, all linearly."""
 
     begin: float  # share of the run after which it begins [-]
     end: float  # same of where it is whole [-]
     effort: float  # factor on what using the actuators costs, in the end [-]
     entropy: float  # weight of the entropy in the loss, in the end; less than 0 makes a policy sure of itself
+    updates: float = 1.0  # factor on `target_kl`, in the end
 
     def __post_init__(self) -> None:
         """Refuse shares that are none."""
-        if not 0.0 <= self.begin < self.end <= 1.0 or self.effort <= 0.0:
+        if not 0.0 <= self.begin < self.end <= 1.0 or min(self.effort, self.updates) <= 0.0:
             raise ValueError(
-                "'begin' must lie in [0, 1), 'end' beyond it in (0, 1], and 'effort' be greater than 0."
+                "'begin' must lie in [0, 1), 'end' beyond it in (0, 1], 'effort' and 'updates' be greater than 0."
             )
 
     def share(self, progress: float) -> float:
@@ -239,6 +240,14 @@ class TrainingSettings:
         """Factor on what using the actuators costs when this share of the run is over [-]."""
         refined = self.refinement
         return 1.0 + (refined.effort - 1.0) * refined.share(progress) if refined else 1.0
+
+    def target_kl(self, progress: float) -> float:
+        """How far an update of an on-policy learner goes then."""
+        assert isinstance(self.algorithm, OnPolicy)
+        refined = self.refinement
+        return self.algorithm.target_kl * (
+            1.0 + (refined.updates - 1.0) * refined.share(progress) if refined else 1.0
+        )
 
     def entropy(self, progress: float) -> float:
         """Weight of the entropy in the loss of an on-policy learner then."""

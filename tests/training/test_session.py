@@ -166,14 +166,20 @@ def test_the_curriculum_reaches_the_worlds(tmp_path, quick_judge, monkeypatch):
 
 
 def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypatch):
-    dearer, less = [], []
+    dearer, less, smaller = [], [], []
     monkeypatch.setattr(BatchVecEnv, "set_effort", lambda self, factor: dearer.append(factor))
-    monkeypatch.setattr(FastPPO, "train", lambda self: less.append(self.ent_coef))
-    settings = replace(small("differential_drive"), refinement=Refinement(0.0, 1.0, 5.0, -0.004))
-    before = settings.algorithm.entropy
+    monkeypatch.setattr(
+        FastPPO,
+        "train",
+        lambda self: (less.append(self.ent_coef), smaller.append(self.learning_rate.target)),
+    )
+    refinement = Refinement(0.0, 1.0, 5.0, -0.004, updates=0.2)
+    settings = replace(small("differential_drive"), refinement=refinement)
+    before, target = settings.algorithm.entropy, settings.algorithm.target_kl
     train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=4)
     assert dearer == pytest.approx([1.0, 2.0, 3.0, 4.0, 5.0])
     assert less == pytest.approx([before + share * (-0.004 - before) for share in (0.0, 0.25, 0.5, 0.75)])
+    assert smaller == pytest.approx([target * share for share in (1.0, 0.8, 0.6, 0.4)])
 
 
 def test_a_refined_run_keeps_its_last_network(tmp_path, quick_judge):

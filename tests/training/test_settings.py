@@ -75,17 +75,34 @@ def test_a_curriculum_grows_until_the_scenario_is_whole(progress, strength):
 
 
 @pytest.mark.parametrize(
-    ("progress", "effort", "entropy"),
-    [(0.0, 1.0, 0.0), (0.2, 1.0, 0.0), (0.4, 2.0, -0.01), (0.6, 3.0, -0.02), (1.0, 3.0, -0.02)],
+    ("progress", "effort", "entropy", "updates"),
+    [
+        (0.0, 1.0, 0.0, 1.0),
+        (0.2, 1.0, 0.0, 1.0),
+        (0.4, 2.0, -0.01, 0.6),
+        (0.6, 3.0, -0.02, 0.2),
+        (1.0, 3.0, -0.02, 0.2),
+    ],
 )
-def test_a_refinement_makes_commands_dearer_and_exploring_worth_less(progress, effort, entropy):
-    refined = replace(load_training_settings(PLATFORM, TASK), refinement=Refinement(0.2, 0.6, 3.0, -0.02))
+def test_a_refinement_makes_commands_dearer_exploring_worth_less_and_updates_smaller(
+    progress, effort, entropy, updates
+):
+    refinement = Refinement(0.2, 0.6, 3.0, -0.02, updates=0.2)
+    refined = replace(load_training_settings(PLATFORM, TASK), refinement=refinement)
+    assert refined.target_kl(progress) == pytest.approx(updates * refined.algorithm.target_kl)
     assert refined.effort(progress) == pytest.approx(effort)
     assert refined.entropy(progress) == pytest.approx(entropy)
 
 
 @pytest.mark.parametrize(
-    "values", [(0.6, 0.6, 1.0, 0.0), (-0.1, 0.5, 1.0, 0.0), (0.1, 1.5, 1.0, 0.0), (0.1, 0.5, 0.0, 0.0)]
+    "values",
+    [
+        (0.6, 0.6, 1.0, 0.0),
+        (-0.1, 0.5, 1.0, 0.0),
+        (0.1, 1.5, 1.0, 0.0),
+        (0.1, 0.5, 0.0, 0.0),
+        (0.1, 0.5, 1.0, 0.0, 0.0),
+    ],
 )
 def test_a_refinement_of_impossible_shares_is_refused(values):
     with pytest.raises(ValueError, match="must lie in"):
