@@ -14,7 +14,10 @@ from fulmar_core.tasks.waypoints import Course
 
 @dataclass(frozen=True, kw_only=True)
 class GoThroughPositions(PassingTask):
-    """Pass through positions of a random course in their order."""
+    """Pass through positions of a random course in their order.
+
+    Three of them are seen, one more than in RoboRAN: where a boat leaves a waypoint to depends on the next two.
+    """
 
     kind: Literal["go_through_positions"]
     course: Course
