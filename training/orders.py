@@ -12,9 +12,7 @@ from typing import Any
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 
-KINDS = (
-    3  # of orders to one actuator: -1 astern, 0 as it is, 1 ahead, numbered 0, 1 and 2 where they are chosen
-)
+KINDS = 3  # of orders to one actuator: astern, as it is and ahead; numbered 0, 1 and 2 where they are chosen
 
 
 def shares_asked(orders: Any, previous: Any) -> Any:
