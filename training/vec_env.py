@@ -16,7 +16,8 @@ from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.errors import ConfigError
-from fulmar_core.learning_step import learning_step
+from fulmar_core.learning_step import judged_step
+from fulmar_core.observation import shares
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
@@ -231,21 +232,11 @@ class BatchVecEnv(VecEnv):
 
     def _step(self) -> tuple[np.ndarray, np.ndarray]:
         """One control step; returns rewards and whether episodes ended before their time."""
-        simulation = self.simulation
-        before, goal, previous = simulation.truth, simulation.goal, simulation.command
-        shares = self._actions
+        asked = self._actions
         if self.takes_orders:
-            shares = shares_asked(shares, previous / self._scale)
-        simulation.step(shares * self._scale)
-        reward, ended_early = learning_step(
-            self._judged,
-            self.task,
-            before=before,
-            after=simulation.truth,
-            goal=goal,
-            ended=simulation.goal,
-            previous=previous,
-            command=simulation.command,
+            asked = shares_asked(asked, shares(self.simulation.command, self._scale))
+        reward, ended_early = judged_step(
+            self.simulation, asked * self._scale, robot=self._judged, task=self.task
         )
         return np.asarray(reward), np.asarray(ended_early)
 

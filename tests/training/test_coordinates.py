@@ -83,6 +83,11 @@ def test_tasks_without_a_path_are_refused():
         worlds(task=load_task("track_velocities"))
 
 
+def test_networks_that_are_told_are_refused():
+    with pytest.raises(ValueError, match="that are not 'told'"):
+        replace(load_training_settings(BOAT, TASK), orders=None, told=True)
+
+
 def test_networks_with_a_memory_are_refused():
     with pytest.raises(ValueError, match="'coordinates' are for networks without memory"):
         replace(load_training_settings(BOAT, TASK, "recurrent_ppo"), coordinates=True)

@@ -126,6 +126,12 @@ def test_robots_whose_actuators_follow_at_once_take_no_orders():
         worlds(hold=3, robot=robot)
 
 
+@pytest.mark.parametrize("more", [{"told": True}, {"wrench": True}])
+def test_networks_that_are_told_or_ask_for_a_wrench_give_no_orders(more):
+    with pytest.raises(ValueError, match="'orders' are for ppo, without"):
+        replace(load_training_settings(BOAT, TASK), coordinates=False, **more)
+
+
 @pytest.mark.parametrize("name", ["recurrent_ppo", "kingfisher_go_to_position_with_obstacles", "sac"])
 def test_learners_that_cannot_learn_orders_say_so(name):
     with pytest.raises(ValueError, match="'orders' are for ppo, without"):

@@ -10,6 +10,7 @@ from fulmar_core.observation import shares
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.push_block import PushBlock
 
@@ -54,6 +55,34 @@ def learning_step(
         over = away > robot.limits.geofence
     touching = task.collides(after, goal, robot)
     return reward, over if touching is None else over | touching
+
+
+def judged_step(
+    simulation: BatchSimulation, command: Array, *, robot: Robot, task: Task
+) -> tuple[Array, Array]:
+    """Move a batch one control step, and judge it.
+
+    Args:
+        simulation: The worlds.
+        command: In the actuators' units, shape (worlds, n).
+        robot: Says what using its actuators costs, and how far off it may be.
+        task: Says what the step is worth.
+
+    Returns:
+        As `learning_step`.
+    """
+    before, goal, previous = simulation.truth, simulation.goal, simulation.command
+    simulation.step(command)
+    return learning_step(
+        robot,
+        task,
+        before=before,
+        after=simulation.truth,
+        goal=goal,
+        ended=simulation.goal,
+        previous=previous,
+        command=simulation.command,
+    )
 
 
 def _cost(robot: Robot, previous: Array, command: Array) -> Array:

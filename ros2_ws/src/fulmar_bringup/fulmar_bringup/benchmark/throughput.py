@@ -23,7 +23,7 @@ import numpy as np
 
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episode, episode_steps
-from fulmar_core.learning_step import learning_step
+from fulmar_core.learning_step import judged_step
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
@@ -111,19 +111,9 @@ class BatchPace:
 
     def _step(self) -> None:
         simulation = self._simulation
-        before, goal, previous = simulation.truth, simulation.goal, simulation.command
-        simulation.step(self._commands[self._at])
+        command = self._commands[self._at]
         self._at = (self._at + 1) % DIFFERENT
-        self.reward, ended_early = learning_step(
-            self._robot,
-            self._task,
-            before=before,
-            after=simulation.truth,
-            goal=goal,
-            ended=simulation.goal,
-            previous=previous,
-            command=simulation.command,
-        )
+        self.reward, ended_early = judged_step(simulation, command, robot=self._robot, task=self._task)
         self._age += 1
         ended = self._age >= self._horizon
         ended[self._library.numbers(ended_early)] = True
