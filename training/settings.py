@@ -187,9 +187,7 @@ class TrainingSettings:
     # Goals on the right are shown, and answered, as on the left; or, by `ends`, those behind as those ahead.
     mirror: Symmetry | None = None
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
-    coordinates: bool = (
-        False  # whether the network is shown the targets of a path by coordinates and legs too
-    )
+    coordinates: bool = False  # whether it is shown targets of a path by coordinates and legs too
     orders: Orders | None = None  # shares of full command without it
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
@@ -238,22 +236,23 @@ class TrainingSettings:
 
     def effort(self, progress: float) -> float:
         """Factor on what using the actuators costs when this share of the run is over [-]."""
-        refined = self.refinement
-        return 1.0 + (refined.effort - 1.0) * refined.share(progress) if refined else 1.0
+        return self._refined(progress, 1.0, self.refinement.effort) if self.refinement else 1.0
 
     def target_kl(self, progress: float) -> float:
         """How far an update of an on-policy learner goes then."""
         assert isinstance(self.algorithm, OnPolicy)
-        refined = self.refinement
-        return self.algorithm.target_kl * (
-            1.0 + (refined.updates - 1.0) * refined.share(progress) if refined else 1.0
-        )
+        first = self.algorithm.target_kl
+        return first * self._refined(progress, 1.0, self.refinement.updates) if self.refinement else first
 
     def entropy(self, progress: float) -> float:
         """Weight of the entropy in the loss of an on-policy learner then."""
         assert isinstance(self.algorithm, OnPolicy)
-        first, refined = self.algorithm.entropy, self.refinement
-        return first + (refined.entropy - first) * refined.share(progress) if refined else first
+        first = self.algorithm.entropy
+        return self._refined(progress, first, self.refinement.entropy) if self.refinement else first
+
+    def _refined(self, progress: float, first: float, last: float) -> float:
+        assert self.refinement is not None
+        return first + (last - first) * self.refinement.share(progress)
 
 
 def load_training_settings(robot: Robot, task: Task, name: str | None = None) -> TrainingSettings:

@@ -132,9 +132,8 @@ def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
         for _ in range(6000):
             publisher.publish(Odometry())
         rounds_s.append(time.monotonic() - begin)
-    assert (
-        statistics.median(rounds_s) < 2.0
-    )  # who is held up is so each time; the machine's own pauses are not
+    # Who is held up is so each time; the machine's own pauses are not.
+    assert statistics.median(rounds_s) < 2.0
 
 
 PUBLISHES_AND_ASKS = """

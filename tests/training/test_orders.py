@@ -70,6 +70,14 @@ def test_an_episode_that_ends_while_an_order_is_held_ends_with_it():
     assert not any(info["TimeLimit.truncated"] for info in infos)
 
 
+def test_an_episode_that_ends_under_way_has_ended_also_if_the_last_step_says_nothing(monkeypatch):
+    env = worlds(hold=3)
+    env.reset()
+    over = iter([np.arange(16) == 4, np.arange(16) == 7, np.zeros(16, dtype=bool)])
+    monkeypatch.setattr(env, "_step", lambda: (np.zeros(16, dtype=np.float32), next(over)))
+    assert np.flatnonzero(env.step(ordered(AHEAD, AHEAD))[2]).tolist() == [4, 7]
+
+
 def test_orders_to_a_mirrored_goal_are_mirrored_back():
     plain, mirrored, mirror = worlds(hold=2), worlds(hold=2, mirror="sides"), Mirror.of(BOAT, TASK, "sides")
     other = plain.reset()[:, mirror.side] < 0.0
@@ -100,6 +108,7 @@ def test_a_deployed_network_asks_for_what_the_likeliest_orders_ask_for(deployed)
     shown = np.where(other[:, None], rows @ mirror.seen, rows)
     orders = learner.predict(env.normalize_obs(shown), deterministic=True)[0] - 1.0
     orders[other] = orders[other] @ mirror.done
+    assert 0 < (orders == 0.0).sum() < orders.size
     asked = np.where(orders == 0.0, previous, orders)
     command, raw, _ = network.infer(rows)
     np.testing.assert_allclose(command, asked * BOAT.actuators.scale, atol=1e-6)
@@ -124,6 +133,11 @@ def test_robots_whose_actuators_follow_at_once_take_no_orders():
     robot = load_robot("floating_platform")
     with pytest.raises(ConfigError, match="'orders': the actuators of 'floating_platform' have no slew"):
         worlds(hold=3, robot=robot)
+
+
+def test_orders_that_stand_for_no_time_are_refused():
+    with pytest.raises(ValueError, match="'hold' must be at least 1"):
+        Orders(hold=0)
 
 
 @pytest.mark.parametrize("more", [{"told": True}, {"wrench": True}])
