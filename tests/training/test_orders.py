@@ -16,6 +16,7 @@ from fulmar_core.tasks import load_task
 from training.deploy import deployed_network
 from training.learners import build_learner
 from training.network import load_network, save_network
+from training.run_folder import NETWORK_FILE
 from training.settings import Orders, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
@@ -123,10 +124,13 @@ def test_a_network_of_orders_is_read_back_as_it_was_written(deployed, tmp_path):
     np.testing.assert_array_equal(again.infer(seen)[0], network.infer(seen)[0])
 
 
-def test_a_run_counts_control_steps(small_settings, tmp_path):
+def test_a_run_learns_as_it_is_told_and_counts_control_steps(small_settings, tmp_path):
     settings = replace(small_settings, orders=Orders(hold=3), mirror="sides", coordinates=True)
     record = train(BOAT, TASK, settings, seed=1, out=tmp_path, updates=1)
     assert record["steps"] == settings.worlds * settings.algorithm.steps * 3
+    assert record["curve"][-1]["steps"] == record["steps"]
+    plan = load_network(tmp_path / NETWORK_FILE).plan
+    assert (plan.decision, len(plan.places), plan.side is None) == ("order", TASK.seen, False)
 
 
 def test_robots_whose_actuators_follow_at_once_take_no_orders():
