@@ -22,8 +22,6 @@ from fulmar_ros.qos import subscriber_qos
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
-pytestmark = pytest.mark.real_time
-
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"
 POLICY, LQR = BAGS / "floating_platform_go_to_pose_policy", BAGS / "floating_platform_go_to_pose_lqr"
 
@@ -55,6 +53,7 @@ def heard(ros_domain: RosDomain):
     rclpy.try_shutdown(context=context)
 
 
+@pytest.mark.real_time
 @pytest.mark.slow
 def test_a_bag_is_played_byte_for_byte_with_its_clock(heard):
     bag = open_bag(POLICY)

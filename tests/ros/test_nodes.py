@@ -16,8 +16,6 @@ from fulmar_core.topics import (
 from tests.conftest import RosDomain
 from tests.ros.neighbour import NAMESPACE, Neighbour, until
 
-pytestmark = pytest.mark.real_time
-
 
 @pytest.mark.parametrize(
     ("module", "parameter", "words"),
@@ -55,6 +53,7 @@ def test_a_wrong_parameter_ends_a_node_with_one_line_and_exit_code_two(
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.real_time
 @pytest.mark.parametrize("part", ["plant", "controller"])
 def test_a_node_survives_its_whole_lifecycle_twice(
     part: str, request: pytest.FixtureRequest, neighbour: Neighbour
