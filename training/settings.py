@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Literal
 
@@ -97,6 +97,21 @@ class Curriculum:
         if not (0.0 <= self.start <= 1.0 and 0.0 < self.until <= 1.0):
             raise ValueError("'start' must lie in [0, 1] and 'until' in (0, 1].")
 
+    def rewarded(self, task: Task) -> Task:
+        """The task as it is rewarded while it learns.
+
+        Raises:
+            ConfigError: The task has no waypoints.
+        """
+        if self.course_reward is None:
+            return task
+        own, new = task.reward_weights, asdict(self.course_reward)
+        if not new.keys() <= {field.name for field in fields(own)}:
+            raise ConfigError(
+                f"'course_reward': task '{task.name}' has no waypoints. Leave 'course_reward' out."
+            )
+        return replace(task, reward_weights=replace(own, **new))
+
     def strength(self, progress: float) -> float:
         """Strength of the scenario, where `progress` is the share of the run that is over [-]."""
         return min(1.0, self.start + (1.0 - self.start) * progress / self.until)
@@ -134,6 +149,22 @@ class Orders:
         """Refuse to hold nothing."""
         if self.hold < 1:
             raise ValueError("'hold' must be at least 1.")
+
+
+@dataclass(frozen=True)
+class CourseReward:
+    """What counts on a way through waypoints while it learns, in place of the task's own weights of the same names.
+
+    Both lead the same way at last; getting nearer is told at once, and reaching is what is meant.
+    """
+
+    progress: float  # per metre that the robot comes nearer
+    reached: float  # per waypoint
+
+    def __post_init__(self) -> None:
+        """Refuse to punish what is asked for."""
+        if self.progress < 0.0 or self.reached <= 0.0:
+            raise ValueError("'progress' must be at least 0, 'reached' greater than 0.")
 
 
 @dataclass(frozen=True)
@@ -189,6 +220,7 @@ class TrainingSettings:
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
     coordinates: bool = False  # whether it is shown targets of a path by coordinates and legs too
     orders: Orders | None = None  # shares of full command without it
+    course_reward: CourseReward | None = None  # the task's own without it
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
     def __post_init__(self) -> None:
@@ -229,6 +261,21 @@ class TrainingSettings:
             return replace(robot, timing=replace(robot.timing, control_hz=self.control_hz))
         except ValueError as error:
             raise ConfigError(f"'{robot.name}' cannot be commanded at this rate: {error}") from error
+
+    def rewarded(self, task: Task) -> Task:
+        """The task as it is rewarded while it learns.
+
+        Raises:
+            ConfigError: The task has no waypoints.
+        """
+        if self.course_reward is None:
+            return task
+        own, new = task.reward_weights, asdict(self.course_reward)
+        if not new.keys() <= {field.name for field in fields(own)}:
+            raise ConfigError(
+                f"'course_reward': task '{task.name}' has no waypoints. Leave 'course_reward' out."
+            )
+        return replace(task, reward_weights=replace(own, **new))
 
     def strength(self, progress: float) -> float:
         """Strength of the scenario when this share of the run is over [-]."""

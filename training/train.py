@@ -124,7 +124,7 @@ def train(
     scenario = load_scenario(settings.scenario)
     worlds = BatchVecEnv(
         robot,
-        task,
+        settings.rewarded(task),
         scenario,
         worlds=settings.worlds,
         seed=seed,

@@ -17,7 +17,7 @@ from training.deploy import deployed_network
 from training.learners import build_learner
 from training.network import load_network, save_network
 from training.run_folder import NETWORK_FILE
-from training.settings import Orders, load_training_settings
+from training.settings import CourseReward, Orders, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -124,13 +124,23 @@ def test_a_network_of_orders_is_read_back_as_it_was_written(deployed, tmp_path):
     np.testing.assert_array_equal(again.infer(seen)[0], network.infer(seen)[0])
 
 
-def test_a_run_learns_as_it_is_told_and_counts_control_steps(small_settings, tmp_path):
+def test_a_run_learns_as_it_is_told_and_counts_control_steps(small_settings, tmp_path, monkeypatch):
+    weights = []
+
+    class Noted(BatchVecEnv):
+        def __init__(self, robot, task, *scenario, **more):
+            weights.append(task.reward_weights)
+            super().__init__(robot, task, *scenario, **more)
+
+    monkeypatch.setattr("training.train.BatchVecEnv", Noted)
     settings = replace(small_settings, orders=Orders(hold=3), mirror="sides", coordinates=True)
+    settings = replace(settings, course_reward=CourseReward(progress=3.0, reached=30.0))
     record = train(BOAT, TASK, settings, seed=1, out=tmp_path, updates=1)
     assert record["steps"] == settings.worlds * settings.algorithm.steps * 3
     assert record["curve"][-1]["steps"] == record["steps"]
     plan = load_network(tmp_path / NETWORK_FILE).plan
     assert (plan.decision, len(plan.places), plan.side is None) == ("order", TASK.seen, False)
+    assert weights == [replace(TASK.reward_weights, progress=3.0, reached=30.0)]
 
 
 def test_robots_whose_actuators_follow_at_once_take_no_orders():

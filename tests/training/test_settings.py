@@ -11,6 +11,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.settings import (
+    CourseReward,
     Curriculum,
     Refinement,
     StopAtSuccess,
@@ -45,6 +46,7 @@ def test_a_file_of_the_pair_s_own_name_replaces_the_family_s(monkeypatch, tmp_pa
 def test_what_is_written_is_what_is_read(tmp_path, name):
     settings = load_training_settings(TURTLEBOT, TASK, name)
     settings = replace(settings, curriculum=Curriculum(0.2, 0.5), stop_at_success=StopAtSuccess(0.995))
+    settings = replace(settings, course_reward=CourseReward(3.0, 30.0))
     write_training_settings(settings, tmp_path / "settings.yaml")
     assert load_training_settings(TURTLEBOT, TASK, str(tmp_path / "settings.yaml")) == settings
 
@@ -144,3 +146,24 @@ def test_a_curriculum_of_impossible_shares_is_refused(values):
 def test_a_stop_that_would_come_always_or_never_is_refused(values):
     with pytest.raises(ValueError, match="must lie in"):
         StopAtSuccess(*values)
+
+
+def test_a_course_may_be_rewarded_otherwise_while_a_robot_learns_it():
+    course = load_task("go_through_positions")
+    settings = replace(load_training_settings(TURTLEBOT, course), course_reward=CourseReward(3.0, 30.0))
+    rewarded = settings.rewarded(course)
+    assert rewarded.reward_weights == replace(course.reward_weights, progress=3.0, reached=30.0)
+    assert replace(rewarded, reward_weights=course.reward_weights) == course
+    assert replace(settings, course_reward=None).rewarded(course) is course
+
+
+def test_a_course_s_reward_is_refused_where_there_is_no_course():
+    settings = replace(load_training_settings(TURTLEBOT, TASK), course_reward=CourseReward(3.0, 30.0))
+    with pytest.raises(ConfigError, match="'course_reward': task 'go_to_pose' has no waypoints"):
+        settings.rewarded(TASK)
+
+
+@pytest.mark.parametrize(("progress", "reached"), [(-1.0, 30.0), (3.0, 0.0)])
+def test_a_reward_for_going_away_or_for_nothing_is_refused(progress, reached):
+    with pytest.raises(ValueError, match="'progress' must be at least 0, 'reached' greater than 0"):
+        CourseReward(progress, reached)
