@@ -30,10 +30,10 @@ class Executor(Protocol):
 
 
 class LocalExecutor:
-    """A process for each job, some at once."""
+    """A process for each job, some at once: as many as there are cores for, each job with its own threads."""
 
     def __init__(self, at_once: int | None = None) -> None:
-        """Run this many at once; one for each core by default."""
+        """Run this many jobs of one thread at once; one for each core by default."""
         self._at_once = at_once or len(os.sched_getaffinity(0))
 
     def run(self, jobs: Sequence[Job], watch: Watch) -> list[Outcome]:
@@ -43,7 +43,7 @@ class LocalExecutor:
         waiting = list(range(len(jobs)))
         try:
             while waiting or running:
-                while waiting and len(running) < self._at_once:
+                while waiting and self._has_room(jobs, running, jobs[waiting[0]]):
                     number = waiting.pop(0)
                     running[number] = _start(jobs[number])
                 time.sleep(POLL_S)
@@ -56,6 +56,11 @@ class LocalExecutor:
                 process.wait()
             raise
         return [outcomes[number] for number in range(len(jobs))]
+
+    def _has_room(self, jobs: Sequence[Job], running: dict[int, Any], next_one: Job) -> bool:
+        """Whether a job may begin: alone always, beside others if all their threads have a core."""
+        taken = sum(jobs[number].settings.threads for number in running)
+        return not running or taken + next_one.settings.threads <= self._at_once
 
     @staticmethod
     def _collect(

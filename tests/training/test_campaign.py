@@ -53,6 +53,33 @@ def test_a_campaign_runs_every_seed_reports_the_one_that_fails_and_names_the_bes
     assert states == {0: "done", 1: "failed", 2: "done"}
 
 
+class Pretended:
+    """A process that has ended when it is looked at for the second time."""
+
+    def __init__(self, threads):
+        self.threads, self.looks = threads, 0
+
+    def poll(self):
+        self.looks += 1
+        return 0 if self.looks > 1 else None
+
+
+def test_a_run_takes_a_core_for_each_thread_and_one_that_has_more_runs_alone(job, monkeypatch):
+    begun, busy = [], []
+
+    def start(job):
+        begun.append(Pretended(job.settings.threads))
+        busy.append(sum(process.threads for process in begun if process.looks < 2))
+        return begun[-1]
+
+    monkeypatch.setattr("training.executors._start", start)
+    monkeypatch.setattr("training.executors._outcome", lambda job, code: Outcome(job, {}))
+    monkeypatch.setattr("training.executors.POLL_S", 0.0)
+    jobs = [replace(job, settings=replace(job.settings, threads=threads)) for threads in (1, 2, 1, 1, 3)]
+    assert len(LocalExecutor(2).run(jobs, lambda *_: None)) == len(jobs)
+    assert busy == [1, 2, 1, 2, 3]
+
+
 @pytest.mark.slow
 def test_a_process_whose_parent_dies_finishes_its_run(job):
     waits = """
