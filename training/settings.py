@@ -206,9 +206,7 @@ class TrainingSettings:
     # run, so that the same seed keeps the same network on any machine.
     evaluate_every_s: float  # [s]
     checkpoint_every_s: float = 30.0  # wall-clock between checkpoints to resume from [s]
-    threads: int = (
-        1  # of PyTorch, each with a core of its own; a second one gains a fifth where networks are deep
-    )
+    threads: int = 1  # of PyTorch, each on a core of its own; in deep networks a second one gains a fifth
     curriculum: Curriculum | None = None
     refinement: Refinement | None = None  # of ppo and recurrent_ppo
     stop_at_success: StopAtSuccess | None = None
