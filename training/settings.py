@@ -97,21 +97,6 @@ class Curriculum:
         if not (0.0 <= self.start <= 1.0 and 0.0 < self.until <= 1.0):
             raise ValueError("'start' must lie in [0, 1] and 'until' in (0, 1].")
 
-    def rewarded(self, task: Task) -> Task:
-        """The task as it is rewarded while it learns.
-
-        Raises:
-            ConfigError: The task has no waypoints.
-        """
-        if self.course_reward is None:
-            return task
-        own, new = task.reward_weights, asdict(self.course_reward)
-        if not new.keys() <= {field.name for field in fields(own)}:
-            raise ConfigError(
-                f"'course_reward': task '{task.name}' has no waypoints. Leave 'course_reward' out."
-            )
-        return replace(task, reward_weights=replace(own, **new))
-
     def strength(self, progress: float) -> float:
         """Strength of the scenario, where `progress` is the share of the run that is over [-]."""
         return min(1.0, self.start + (1.0 - self.start) * progress / self.until)
