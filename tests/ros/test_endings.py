@@ -132,7 +132,7 @@ def test_an_evaluation_that_is_told_to_stop_leaves_nobody_behind(
     children = wait_for_children(run, 5)  # with Python's own tracker of shared memory
     time.sleep(UNDER_WAY_S)
     run.send_signal(number)
-    _, err = run.communicate(timeout=30.0)
+    _, err = run.communicate(timeout=10.0)
     assert nothing_left(children)
     if number != signal.SIGKILL:
         assert run.returncode == 1
@@ -146,7 +146,7 @@ def test_the_first_failure_of_an_evaluation_ends_it(ros_domain: RosDomain, tmp_p
     children = wait_for_children(run, 5)
     time.sleep(UNDER_WAY_S)
     child_running(run, "policy_server.lqr_node").kill()
-    _, err = run.communicate(timeout=30.0)
+    _, err = run.communicate(timeout=15.0)  # a plant waits 5 s for an answer
     assert run.returncode == 1
     assert "fulmar: controller was killed by SIGKILL" in err
     assert nothing_left(children)
