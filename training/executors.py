@@ -43,7 +43,7 @@ class LocalExecutor:
         waiting = list(range(len(jobs)))
         try:
             while waiting or running:
-                while waiting and self._has_room(jobs, running, jobs[waiting[0]]):
+                while waiting and self._has_room(jobs[waiting[0]], [jobs[number] for number in running]):
                     number = waiting.pop(0)
                     running[number] = _start(jobs[number])
                 time.sleep(POLL_S)
@@ -57,10 +57,10 @@ class LocalExecutor:
             raise
         return [outcomes[number] for number in range(len(jobs))]
 
-    def _has_room(self, jobs: Sequence[Job], running: dict[int, Any], next_one: Job) -> bool:
+    def _has_room(self, job: Job, running: Sequence[Job]) -> bool:
         """Whether a job may begin: alone always, beside others if all their threads have a core."""
-        taken = sum(jobs[number].settings.threads for number in running)
-        return not running or taken + next_one.settings.threads <= self._at_once
+        threads = sum(one.settings.threads for one in (*running, job))
+        return not running or threads <= self._at_once
 
     @staticmethod
     def _collect(
