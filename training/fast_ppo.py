@@ -25,21 +25,37 @@ from torch.nn.utils import clip_grad_norm_
 
 from training.action_law import ActionLaw, action_law
 from training.fast_mlp import FastMlp, fast_precision
+from training.muon import MuonAndAdam, hidden_matrices
 
+_EPS = 1e-5  # of Adam, as in Stable-Baselines3
 _COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
 
 
 class FastPPO(PPO):
     """PPO for an `MlpPolicy` of separate tanh networks over MultiBinary, MultiDiscrete or Box actions, on a CPU."""
 
+    def __init__(self, *args: Any, muon: bool = False, **more: Any) -> None:
+        """Build it; see `PPO` for everything but whether hidden layers learn by Muon (`training.muon`)."""
+        self.muon = muon
+        super().__init__(*args, **more)
+
     def _setup_model(self) -> None:
         self.policy_kwargs = {
             "activation_fn": torch.nn.Tanh,
-            "optimizer_kwargs": {"eps": 1e-5, "fused": True},
+            "optimizer_kwargs": {"eps": _EPS, "fused": True},
             **self.policy_kwargs,
         }
         super()._setup_model()
+        if self.muon:
+            self._use_muon()
         self._networks(fast_precision())  # refuses other policies
+
+    def _use_muon(self) -> None:
+        policy = self.policy
+        hidden = hidden_matrices([*policy.mlp_extractor.policy_net, *policy.mlp_extractor.value_net])
+        theirs = {id(weight) for weight in hidden}
+        others = [parameter for parameter in policy.parameters() if id(parameter) not in theirs]
+        policy.optimizer = MuonAndAdam(hidden, others, lr=self.lr_schedule(1.0), eps=_EPS)
 
     def _excluded_save_params(self) -> list[str]:
         return [*super()._excluded_save_params(), "_actor", "_critic", "_law"]

@@ -78,9 +78,9 @@ def build_ppo(
         kind = RecurrentPPO
         policy["lstm_hidden_size"] = settings.memory
     elif settings.fast:
-        kind = FastPPO
+        kind, more = FastPPO, {"muon": settings.optimizer == "muon"}
         if settings.lessons:
-            kind, more = Apprentice, {"lessons": settings.lessons}
+            kind, more = Apprentice, more | {"lessons": settings.lessons}
     return kind(
         "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy",
         env,

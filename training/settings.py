@@ -43,6 +43,7 @@ class Ppo(OnPolicy):
     kind: Literal["ppo"] = "ppo"
     fast: bool = True  # our faster computation of it instead of the one of Stable-Baselines3
     lessons: int = 0  # updates in which it first imitates the classical law of the robot's family
+    optimizer: Literal["adam", "muon"] = "adam"  # muon, for hidden layers, learns more from fewer samples
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,6 +214,8 @@ class TrainingSettings:
         algorithm = self.algorithm
         if isinstance(algorithm, Ppo) and algorithm.lessons and not algorithm.fast:
             raise ValueError("'lessons' are for the fast PPO.")
+        if isinstance(algorithm, Ppo) and algorithm.optimizer != "adam" and not algorithm.fast:
+            raise ValueError(f"'optimizer: {algorithm.optimizer}' is for the fast PPO.")
         if self.specialist and (not self.told or isinstance(algorithm, RecurrentPpo)):
             raise ValueError(
                 "'specialist' needs 'told', to know when its time has come, and a network without memory."
