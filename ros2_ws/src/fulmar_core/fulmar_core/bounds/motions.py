@@ -48,9 +48,9 @@ class Motions:
 def motions_of(robot: Robot) -> Motions | None:
     """Steady speeds and turn rates of a robot of a family that moves along its heading.
 
-    Propellers: surge and yaw drag balance the thrusts; that a turning boat also slides sideways, slower and in a tighter circle,
-    is left out. Wheels: the limits of the drive, for cars also the friction of the tyres; they speed up and stop by
-    their slew, or by their motors' force if that is less.
+    Propellers: surge and yaw drag balance the thrusts; that a turning boat also slides sideways, slower and in a
+    tighter circle, is left out. Wheels: the limits of the drive, for cars also the friction of the tyres; they speed up
+    and stop by their slew, or by their motors' force if that is less.
 
     Args:
         robot: The robot.
