@@ -27,7 +27,6 @@ from training.action_law import ActionLaw, action_law
 from training.fast_mlp import FastMlp, fast_precision
 from training.muon import MuonAndAdam, hidden_matrices
 
-_EPS = 1e-5  # of Adam, as in Stable-Baselines3
 _COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
 
 
@@ -42,7 +41,7 @@ class FastPPO(PPO):
     def _setup_model(self) -> None:
         self.policy_kwargs = {
             "activation_fn": torch.nn.Tanh,
-            "optimizer_kwargs": {"eps": _EPS, "fused": True},
+            "optimizer_kwargs": {"eps": 1e-5, "fused": True},
             **self.policy_kwargs,
         }
         super()._setup_model()
@@ -52,10 +51,12 @@ class FastPPO(PPO):
 
     def _use_muon(self) -> None:
         policy = self.policy
-        hidden = hidden_matrices([*policy.mlp_extractor.policy_net, *policy.mlp_extractor.value_net])
-        theirs = {id(weight) for weight in hidden}
-        others = [parameter for parameter in policy.parameters() if id(parameter) not in theirs]
-        policy.optimizer = MuonAndAdam(hidden, others, lr=self.lr_schedule(1.0), eps=_EPS)
+        policy.optimizer = MuonAndAdam(
+            policy.parameters(),
+            hidden=hidden_matrices([*policy.mlp_extractor.policy_net, *policy.mlp_extractor.value_net]),
+            lr=self.lr_schedule(1.0),
+            **policy.optimizer_kwargs,
+        )
 
     def _excluded_save_params(self) -> list[str]:
         return [*super()._excluded_save_params(), "_actor", "_critic", "_law"]

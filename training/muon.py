@@ -7,7 +7,7 @@ would have (Liu et al., arXiv 2502.16982, §2.2), so that one learning rate suit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import torch
@@ -18,22 +18,26 @@ _MOMENTUM = 0.9
 
 
 class MuonAndAdam(Optimizer):
-    """One optimiser to whoever sets learning rates, steps, saves or loads."""
+    """One optimiser to whoever sets learning rates, steps, saves or loads; its closure must be None."""
 
     def __init__(
-        self, hidden: Sequence[nn.Parameter], others: Sequence[nn.Parameter], *, lr: float, eps: float
+        self, parameters: Iterable[nn.Parameter], *, hidden: Sequence[nn.Parameter], lr: float, **adam: Any
     ) -> None:
         """Share the work out.
 
         Args:
-            hidden: Matrices of hidden layers.
-            others: All other parameters: biases, output layers, standard deviations.
-            lr: Learning rate of both.
-            eps: Adam's term against division by zero.
+            parameters: All of them.
+            hidden: Those that are matrices of hidden layers, shapes (outputs, inputs).
+            lr: Learning rate of both [-].
+            adam: Everything else that Adam is told.
+
+        Raises:
+            ValueError: Something in `hidden` is no matrix.
         """
-        super().__init__([*hidden, *others], {"lr": lr})
+        every, by_muon = list(parameters), {id(matrix) for matrix in hidden}
+        super().__init__(every, {"lr": lr})
         self._muon = Muon(hidden, lr=lr, weight_decay=0.0, momentum=_MOMENTUM, adjust_lr_fn="match_rms_adamw")
-        self._adam = Adam(others, lr=lr, eps=eps, fused=True)
+        self._adam = Adam([one for one in every if id(one) not in by_muon], lr=lr, **adam)
         self._share_groups()
 
     def _share_groups(self) -> None:
@@ -59,5 +63,5 @@ class MuonAndAdam(Optimizer):
 
 
 def hidden_matrices(layers: Sequence[nn.Module]) -> list[nn.Parameter]:
-    """Weights of the linear layers among some layers."""
+    """Weights of the linear layers among some layers, shapes (outputs, inputs)."""
     return [layer.weight for layer in layers if isinstance(layer, nn.Linear)]

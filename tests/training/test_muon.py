@@ -20,10 +20,7 @@ def network():
 
 
 def optimiser_of(network, lr=1e-2):
-    hidden = hidden_matrices(network[:-1])
-    theirs = {id(weight) for weight in hidden}
-    others = [parameter for parameter in network.parameters() if id(parameter) not in theirs]
-    return MuonAndAdam(hidden, others, lr=lr, eps=1e-5)
+    return MuonAndAdam(network.parameters(), hidden=hidden_matrices(network[:-1]), lr=lr, eps=1e-5)
 
 
 def pull(network, seed=0):

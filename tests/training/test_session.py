@@ -25,10 +25,11 @@ TURTLEBOT, TASK = load_robot("turtlebot2"), load_task("go_to_pose")
 
 
 def small(name):
-    """Settings of an algorithm, or of ppo with an optimiser, cut to what takes a moment."""
-    optimizer = name if name == "muon" else None
-    settings = load_training_settings(TURTLEBOT, TASK, "differential_drive" if optimizer else name)
-    algorithm = replace(settings.algorithm, optimizer=optimizer) if optimizer else settings.algorithm
+    """Settings of an algorithm, or of ppo with Muon, cut to what takes a moment."""
+    settings = load_training_settings(TURTLEBOT, TASK, "differential_drive" if name == "muon" else name)
+    algorithm = settings.algorithm
+    if name == "muon":
+        algorithm = replace(algorithm, optimizer="muon")
     if hasattr(algorithm, "epochs"):
         algorithm = replace(algorithm, steps=8, minibatch=64, epochs=2, hidden=(8,))
     else:
