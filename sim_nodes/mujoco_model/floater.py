@@ -30,19 +30,19 @@ class Floater:
     @property
     def steady(self) -> bool:
         """Whether forces change with nothing but what the actuators do; those of water change with every step."""
-        return self._water is None
+        return self.water is None
 
     def __init__(self, robot: Robot) -> None:
         """Prepare for `add`."""
         self._robot, self._actuators = robot, robot.actuators
         self._body = 0
         self._planar, self._swims = robot.body.planar, robot.hydrodynamics is not None
-        self._water: Water | None = None
+        self.water: Water | None = None
         if robot.hydrodynamics is not None:
             places, directions = (
                 np.array(vectors) for vectors in list(zip(*self._pushes(), strict=True))[1:]
             )
-            self._water = Water(robot.hydrodynamics, places, directions)
+            self.water = Water(robot.hydrodynamics, places, directions)
 
     @property
     def rest_height(self) -> float:
@@ -88,8 +88,8 @@ class Floater:
         model.body_mass[self._body] = world.mass
         model.body_inertia[self._body] = nominal * (world.yaw_inertia / nominal[2])
         model.body_ipos[self._body] = (world.com_x, world.com_y, 0.0)
-        if self._water is not None:
-            self._water.take_world(world, model.body_inertia[self._body])
+        if self.water is not None:
+            self.water.take_world(world, model.body_inertia[self._body])
 
     def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
         """Put the body where it starts, upright and at rest height."""
@@ -116,10 +116,15 @@ class Floater:
         else:
             data.ctrl[:] = actuators.thrust(applied) * gain
         fx, fy, torque = outside
-        wrench = (fx, fy, 0.0, 0.0, 0.0, torque)
-        if self._water is not None:
-            wrench = self._water.wrench(data, wrench)
-        data.xfrc_applied[self._body] = wrench
+        push = np.array((fx, fy, 0.0, 0.0, 0.0, torque))
+        if self.water is None:
+            data.xfrc_applied[self._body] = push
+            return
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, data.qpos[3:7])
+        data.xfrc_applied[self._body] = self.water.wrench(
+            data.qpos[2], rotation.reshape(3, 3), data.qvel[:6], data.ctrl, push
+        )
 
     def _pushes(self) -> list[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
         """Name, place and unit vector of everything that pushes."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY, Hydrodynamics
+from fulmar_core.rotation import cross
 
 
 class Water:
     """Buoyancy, righting moments, drag and added mass.
 
-    Still water is at z = 0, where the hull floats at rest whatever it weighs in an episode.
+    Still water is at z = 0, where the hull floats at rest whatever it weighs in an episode. One hull or many at once.
     """
 
     def __init__(self, hydrodynamics: Hydrodynamics, places: np.ndarray, directions: np.ndarray) -> None:
@@ -40,32 +40,42 @@ class Water:
         moments = np.cross(self._places - self._offset, self._directions)
         self._per_newton = np.concatenate((self._directions, moments), axis=1)
 
-    def wrench(self, data: mujoco.MjData, outside: tuple[float, ...]) -> np.ndarray:
+    def wrench(
+        self,
+        height: np.ndarray,
+        to_world: np.ndarray,
+        qvel: np.ndarray,
+        thrusts: np.ndarray,
+        outside: np.ndarray,
+    ) -> np.ndarray:
         """What to apply to the body beside its actuators and its weight.
 
         Args:
-            data: State of a model whose first joint is the body's free one, with the coming thrusts in `ctrl`.
-            outside: Push of the surroundings in the world's frame, six numbers [N, N·m].
+            height: Of the body's origin, shape (...,) [m].
+            to_world: Rotation from the body's frame to the world's, shape (..., 3, 3).
+            qvel: Velocities as MuJoCo has them of a free joint, shape (..., 6).
+            thrusts: The coming ones of the actuators, shape (..., n) [N].
+            outside: Push of the surroundings in the world's frame, shape (..., 6) [N, N·m].
 
         Returns:
-            Force and moment about the centre of mass in the world's frame, shape (6,) [N, N·m].
+            Force and moment about the centre of mass in the world's frame, shape (..., 6) [N, N·m].
         """
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, data.qpos[3:7])
-        to_world = rotation.reshape(3, 3)
-        omega = data.qvel[3:6]
-        velocity = np.concatenate((data.qvel[:3] @ to_world + _cross(omega, self._offset), omega))
+        omega = qvel[..., 3:]
+        ahead = (qvel[..., None, :3] @ to_world)[..., 0, :] + cross(omega, self._offset)
+        velocity = np.concatenate((ahead, omega), axis=-1)
         weight = GRAVITY * self._mass[0]
-        up = to_world[2]  # in the body's frame
-        buoyancy, righting = self._water.hydrostatics.wrench(data.qpos[2], up, weight)
-        thrust = data.ctrl @ self._per_newton
-        total = self._drag * self._water.damping(velocity) + thrust
-        total[:3] += outside[:3] @ to_world + (buoyancy - weight) * up
-        total[3:] += outside[3:] @ to_world + righting
+        up = to_world[..., 2, :]  # in the body's frame
+        buoyancy, righting = self._water.hydrostatics.wrench(height, up, weight)
+        thrust = thrusts @ self._per_newton
+        total = self._drag * self._water.damping(velocity) + thrust + _turned(outside, to_world)
+        total[..., :3] += (buoyancy - weight)[..., None] * up
+        total[..., 3:] += righting
         felt = self._water.with_added_mass(total, velocity, self._mass, self._inertia) - thrust
-        felt[:3] += weight * up
-        return np.concatenate((to_world @ felt[:3], to_world @ felt[3:]))
+        felt[..., :3] += weight * up
+        return _turned(felt, to_world.swapaxes(-1, -2))
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def _turned(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Force and moment as rows, each times the rotation."""
+    turned: np.ndarray = (wrench.reshape(*wrench.shape[:-1], 2, 3) @ rotation).reshape(wrench.shape)
+    return turned

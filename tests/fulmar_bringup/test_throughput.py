@@ -10,14 +10,23 @@ import typer
 from typer.testing import CliRunner
 
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 
-from fulmar_bringup.benchmark.throughput import BatchPace, Library, MujocoPace, SharedPace
-from fulmar_bringup.commands.benchmark_throughput import throughput
+from fulmar_bringup.benchmark.throughput import (  # noqa: E402
+    SEED,
+    AfloatPace,
+    BatchPace,
+    Library,
+    MujocoPace,
+    SharedPace,
+)
+from fulmar_bringup.commands.benchmark_throughput import throughput  # noqa: E402
+from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
 
 BOAT, TASK, RANDOMISED = load_robot("kingfisher"), load_task("go_to_pose"), load_scenario("randomised")
 NUMPY = Library("numpy")
@@ -43,8 +52,26 @@ def test_the_json_has_both_paces_of_each_robot_and_their_ratio(command, cores):
         assert found["ratio"] == pytest.approx(found["batch_steps_per_s"] / found["mujoco_steps_per_s"])
     wet = [name for name, found in figures["robots"].items() if "mujoco_with_water_steps_per_s" in found]
     assert wet == ["kingfisher"]
-    assert figures["robots"]["kingfisher"]["mujoco_with_water_steps_per_s"] > 0.0
+    boat = figures["robots"]["kingfisher"]
+    assert boat["ratio_with_water"] == pytest.approx(
+        boat["batch_steps_per_s"] / boat["mujoco_with_water_steps_per_s"]
+    )
     assert (figures["worlds"], figures["scenario"], figures["cores"]) == (16, "randomised", int(cores))
+
+
+def test_boats_are_rolled_out_in_the_very_water_of_the_plant():
+    rolled_out = AfloatPace(BOAT, TASK, RANDOMISED, worlds=3, threads=1)
+    plant = MujocoBackend.of(BOAT, TASK, RANDOMISED)
+    plant.reset(draw_episode(BOAT, TASK, RANDOMISED, seed=SEED, number=0), seed=SEED)
+    machine, full = plant._scene.machine, np.array([1.0, -1.0])
+    thrusts = np.tile(np.asarray(BOAT.actuators.thrust(full)), (3, 1))
+    for _ in range(200):
+        rolled_out.step(thrusts)
+        machine.drive(plant.model, plant.data, full, np.ones(2), (0.0, 0.0, 0.0))
+        mujoco.mj_step(plant.model, plant.data)
+    moved = np.concatenate(([plant.data.time], plant.data.qpos, plant.data.qvel))
+    assert np.abs(plant.data.qvel[5]) > 0.1  # it turns
+    np.testing.assert_allclose(rolled_out.states, np.tile(moved, (3, 1)), rtol=1e-9, atol=1e-12)
 
 
 def test_without_json_a_table_is_printed(command):

@@ -3,8 +3,8 @@
 Both are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
 count. A step of the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward
 and, where episodes end, new ones; worlds are shared out among processes. A step of MuJoCo is its physics alone, over
-the same control period; MuJoCo's own drag in a fluid stands for the water, which it would need a callback for. What
-the plant's own water costs is measured beside it: the plant's simulator, one in one thread of Python.
+the same control period; MuJoCo's own drag in a fluid stands for the water, which it would need a callback for, so that
+the rollout is faster than any boat's could be. Beside it robots on water are rolled out in the plant's own water.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any
 import mujoco
 import mujoco.rollout
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episode, episode_steps
@@ -28,12 +29,14 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.mujoco_model import Scene
+from sim_nodes.mujoco_model.floater import Floater
 
 DIFFERENT = 16  # batches of random commands, used again and again
 SIMULATED, STRETCH = 64, 10  # robots in one rollout of MuJoCo, and control steps, each with its own command
 SEED = 1
+_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_CONTROL = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED
 
 
 @dataclass(frozen=True)
@@ -195,16 +198,11 @@ class MujocoPace:
             model.opt.density, model.opt.viscosity = robot.hydrodynamics.hydrostatics.water_density, 1e-3
         self._datas = [mujoco.MjData(model) for _ in range(threads)]
         held = robot.timing.substeps(robot.timing.control_hz) * scene.machine.steps_per_tick
-        rng = np.random.default_rng(SEED)
-        controls = np.empty((SIMULATED * STRETCH, model.nu))
-        for row, command in zip(controls, _random_commands(robot, len(controls), rng), strict=True):
-            scene.machine.drive(model, data, command, np.ones_like(command), (0.0, 0.0, 0.0))
-            row[:] = data.ctrl
+        controls = _random_controls(robot, scene, SIMULATED * STRETCH)
         self._controls = np.repeat(controls.reshape(SIMULATED, STRETCH, -1), held, axis=1)
-        spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        state = np.zeros(mujoco.mj_stateSize(model, spec))
+        state = np.zeros(mujoco.mj_stateSize(model, _STATE))
         mujoco.mj_resetData(model, data)
-        mujoco.mj_getState(model, data, state, spec)
+        mujoco.mj_getState(model, data, state, _STATE)
         self._states = np.tile(state, (SIMULATED, 1))
 
     def steps_per_s(self, seconds: float) -> float:
@@ -218,24 +216,66 @@ class MujocoPace:
         return count / (time.perf_counter() - began)
 
 
-class PlantPace:
-    """The plant's own simulator, at random commands: MuJoCo with the core's water at every physics step."""
+class AfloatPace:
+    """MuJoCo's batch rollout of a robot in the plant's own water, at random commands.
 
-    def __init__(self, robot: Robot, task: Task, scenario: Scenario) -> None:
-        """Begin an episode and draw commands."""
-        self._backend = MujocoBackend.of(robot, task, scenario)
-        self._backend.reset(draw_episode(robot, task, scenario, seed=SEED, number=0), seed=SEED)
-        self._ticks = robot.timing.substeps(robot.timing.control_hz)
-        self._commands = _random_commands(robot, DIFFERENT, np.random.default_rng(SEED))
+    Its forces follow from where each physics step ends, so the rollout goes step by step, and the water of all robots
+    is computed at once in between.
+
+    Attributes:
+        states: MuJoCo's full physics state of each robot, shape (worlds, n).
+    """
+
+    def __init__(self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, threads: int) -> None:
+        """Put robots on the water and draw commands; as many as the batch has, since few would cost more each."""
+        scene = Scene(robot)
+        machine, self._model, model = scene.machine, scene.model, scene.model
+        assert isinstance(machine, Floater)
+        assert machine.water is not None
+        self._water = machine.water
+        episode = draw_episode(robot, task, scenario, seed=SEED, number=0)
+        machine.take_world(model, episode.world)
+        mujoco.mj_setConst(model, scene.data)
+        mujoco.mj_resetData(model, scene.data)
+        machine.place(model, scene.data, episode.start)
+        self._datas = [mujoco.MjData(model) for _ in range(threads)]
+        state = np.zeros(mujoco.mj_stateSize(model, _STATE))
+        mujoco.mj_getState(model, scene.data, state, _STATE)
+        self.states = np.tile(state, (worlds, 1))
+        self._control = np.zeros((worlds, 1, mujoco.mj_stateSize(model, _CONTROL)))
+        self._substeps = robot.timing.substeps(robot.timing.control_hz)
+        controls = _random_controls(robot, scene, SIMULATED * DIFFERENT)
+        self._thrusts = np.resize(controls, (DIFFERENT, worlds, model.nu))
+        self._calm = np.zeros((worlds, 6))
 
     def steps_per_s(self, seconds: float) -> float:
-        """Step for a while; returns how many control steps were made a second."""
+        """Roll out for a while; returns how many control steps of single robots were made a second."""
         began, count = time.perf_counter(), 0
         while time.perf_counter() - began < seconds or not count:
-            for command in self._commands:
-                self._backend.step(command, self._ticks)
-            count += DIFFERENT
-        return count / (time.perf_counter() - began)
+            thrusts = self._thrusts[count % DIFFERENT]
+            for _ in range(self._substeps):
+                self.step(thrusts)
+            count += 1
+        return count * len(self.states) / (time.perf_counter() - began)
+
+    def step(self, thrusts: np.ndarray) -> None:
+        """One physics step of all robots at these thrusts, shape (worlds, n) [N].
+
+        A state is time, place, attitude and velocities; a control is thrusts, and a push of every body, the hull last.
+        """
+        height, attitude, qvel = np.split(self.states[:, 3:14], (1, 5), axis=1)
+        to_world = Rotation.from_quat(np.roll(attitude, -1, axis=1)).as_matrix()
+        self._control[:, 0, : thrusts.shape[1]] = thrusts
+        self._control[:, 0, -6:] = self._water.wrench(height[:, 0], to_world, qvel, thrusts, self._calm)
+        states, _ = mujoco.rollout.rollout(
+            self._model,
+            self._datas,
+            self.states,
+            self._control,
+            control_spec=_CONTROL,
+            persistent_pool=True,
+        )
+        self.states = states[:, 0]
 
 
 def measure(
@@ -265,7 +305,7 @@ def measure(
 
     Returns:
         For each robot's name the medians `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`; for robots on
-        water also `mujoco_with_water_steps_per_s`.
+        water also `mujoco_with_water_steps_per_s` and `ratio_with_water`.
     """
     found = {}
     with ExitStack() as stack:
@@ -279,7 +319,7 @@ def measure(
             batch = shared or BatchPace(robot, task, scenario, worlds=worlds, library=library)
             paces = [batch, MujocoPace(robot, threads=cores)]
             if robot.hydrodynamics is not None:
-                paces.append(PlantPace(robot, task, scenario))
+                paces.append(AfloatPace(robot, task, scenario, worlds=worlds, threads=cores))
             for pace in paces:
                 pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
             measured = []
@@ -293,7 +333,10 @@ def measure(
                 "ratio": ours / theirs,
             }
             if wet:
-                found[robot.name]["mujoco_with_water_steps_per_s"] = wet[0]
+                found[robot.name] |= {
+                    "mujoco_with_water_steps_per_s": wet[0],
+                    "ratio_with_water": ours / wet[0],
+                }
     return found
 
 
@@ -302,3 +345,13 @@ def _random_commands(robot: Robot, count: int, rng: np.random.Generator) -> np.n
     return np.asarray(
         actuators.limited(rng.uniform(-1.0, 1.0, (count, len(actuators.names))) * actuators.scale)
     )
+
+
+def _random_controls(robot: Robot, scene: Scene, count: int) -> np.ndarray:
+    """What MuJoCo's actuators do at random commands, shape (count, n)."""
+    controls = np.empty((count, scene.model.nu))
+    rng = np.random.default_rng(SEED)
+    for row, command in zip(controls, _random_commands(robot, count, rng), strict=True):
+        scene.machine.drive(scene.model, scene.data, command, np.ones_like(command), (0.0, 0.0, 0.0))
+        row[:] = scene.data.ctrl
+    return controls
