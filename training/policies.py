@@ -23,6 +23,8 @@ from training.jobs import Job, Outcome
 from training.settings import TrainingSettings, load_training_settings
 from training.specialist import specialist_settings
 
+UPDATES_A_SECOND = 7.0  # of one run on one idle core, where nothing better is known
+
 
 @dataclass(frozen=True)
 class ShippedPolicy:
@@ -133,6 +135,26 @@ def is_made(job: Job) -> bool:
     except BundleError:
         return False
     return passport.training.get("recipe") == job.recipe
+
+
+def expected_s(jobs: Sequence[Job], at_once: int) -> float:
+    """How long jobs learn, each for as long as when its bundle was made last [s].
+
+    Args:
+        jobs: Of which those without a bundle are guessed by their updates.
+        at_once: Cores that they share.
+    """
+    each = [_took_s(job) for job in jobs]
+    shared = sum(time_s * job.settings.threads for time_s, job in zip(each, jobs, strict=True)) / at_once
+    return max([shared, *each])
+
+
+def _took_s(job: Job) -> float:
+    assert job.bundle is not None
+    try:
+        return float(read_passport(job.bundle).training["wall_s"])
+    except (BundleError, LookupError):
+        return (job.updates or 0) / UPDATES_A_SECOND
 
 
 def set_aside(job: Job) -> Path | None:

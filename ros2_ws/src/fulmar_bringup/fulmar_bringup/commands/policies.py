@@ -13,8 +13,6 @@ from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.exit_codes import FAILED
 
-UPDATES_A_MINUTE = 400  # of one run on one idle core, for the estimate
-
 
 def policies(
     names: Annotated[
@@ -49,7 +47,7 @@ def policies(
     from policy_server.shipped import policies_directory
     from training.executors import LocalExecutor
     from training.job_bars import JobBars
-    from training.policies import is_made, load_policy_table, make_policies, policy_job, set_aside
+    from training.policies import expected_s, is_made, load_policy_table, make_policies, policy_job, set_aside
 
     table = load_policy_table()
     known = [policy.name for policy in table.policies]
@@ -68,13 +66,13 @@ def policies(
         for policy in table.policies
         if not names or policy.name in names
     ]
+    missing = jobs if anew else [job for job in jobs if not is_made(job)]
+    minutes = expected_s(missing, table.at_once) / 60.0
     for job in jobs if anew else []:
         if aside := set_aside(job):
             console.print(f"{job.name}: the old one is in {aside}", markup=False, soft_wrap=True)
-    missing = [job for job in jobs if not is_made(job)]
-    left = sum(job.updates or 0 for job in missing) / table.at_once
     console.print(
-        f"{len(missing)} of {len(jobs)} policies to make, about {left / UPDATES_A_MINUTE:.0f} minutes and the judging"
+        f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} minutes and the judging"
     )
     with JobBars(missing) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
