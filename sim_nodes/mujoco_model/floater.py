@@ -23,6 +23,9 @@ class Floater:
     A planar robot gets two slides and a hinge and stands on a floor under gravity, which holds it up but pushes
     nowhere. A robot with hydrodynamics swims. Any other robot floats free without gravity. One actuator for each
     nozzle or propeller pushes at its place along its direction, and takes newtons.
+
+    Attributes:
+        water: That a robot with hydrodynamics swims in; None for any other.
     """
 
     steps_per_tick = 1

@@ -17,14 +17,8 @@ from fulmar_core.tasks import load_task
 
 mujoco = pytest.importorskip("mujoco")
 
-from fulmar_bringup.benchmark.throughput import (  # noqa: E402
-    SEED,
-    AfloatPace,
-    BatchPace,
-    Library,
-    MujocoPace,
-    SharedPace,
-)
+from fulmar_bringup.benchmark.mujoco_pace import SEED, AfloatPace, MujocoPace  # noqa: E402
+from fulmar_bringup.benchmark.throughput import BatchPace, Library, SharedPace  # noqa: E402
 from fulmar_bringup.commands.benchmark_throughput import throughput  # noqa: E402
 from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
 

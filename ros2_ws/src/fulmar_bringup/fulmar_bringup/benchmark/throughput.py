@@ -2,9 +2,8 @@
 
 Both are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
 count. A step of the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward
-and, where episodes end, new ones; worlds are shared out among processes. A step of MuJoCo is its physics alone, over
-the same control period; MuJoCo's own drag in a fluid stands for the water, which it would need a callback for, so that
-the rollout is faster than any boat's could be. Beside it robots on water are rolled out in the plant's own water.
+and, where episodes end, new ones; worlds are shared out among processes. A step of MuJoCo (`mujoco_pace`) is its
+physics alone, over the same control period.
 """
 
 from __future__ import annotations
@@ -17,26 +16,16 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-import mujoco
-import mujoco.rollout
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from fulmar_bringup.benchmark.mujoco_pace import DIFFERENT, SEED, AfloatPace, MujocoPace, random_commands
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import draw_episode, episode_steps
+from fulmar_core.episode import episode_steps
 from fulmar_core.learning_step import judged_step
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from sim_nodes.mujoco_model import Scene
-from sim_nodes.mujoco_model.floater import Floater
-
-DIFFERENT = 16  # batches of random commands, used again and again
-SIMULATED, STRETCH = 64, 10  # robots in one rollout of MuJoCo, and control steps, each with its own command
-SEED = 1
-_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_CONTROL = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED
 
 
 @dataclass(frozen=True)
@@ -100,7 +89,7 @@ class BatchPace:
         self._horizon = episode_steps(task, self._simulation.control_dt)
         rng = np.random.default_rng(SEED)
         self._age = rng.integers(0, self._horizon, worlds)
-        self._commands = [library.array(_random_commands(robot, worlds, rng)) for _ in range(DIFFERENT)]
+        self._commands = [library.array(random_commands(robot, worlds, rng)) for _ in range(DIFFERENT)]
         self._at = 0
 
     def steps_per_s(self, seconds: float) -> float:
@@ -181,103 +170,6 @@ def _serve(pipe: Connection) -> None:
             pipe.send(None)
 
 
-class MujocoPace:
-    """MuJoCo's batch rollout of the same robot at random commands."""
-
-    def __init__(self, robot: Robot, *, threads: int) -> None:
-        """Compile the robot and draw commands.
-
-        Args:
-            robot: The robot.
-            threads: That MuJoCo may use.
-        """
-        scene = Scene(robot)
-        self._model, model, data = scene.model, scene.model, scene.data
-        if robot.hydrodynamics is not None:
-            model.opt.gravity[:] = 0.0  # what water would carry must not sink
-            model.opt.density, model.opt.viscosity = robot.hydrodynamics.hydrostatics.water_density, 1e-3
-        self._datas = [mujoco.MjData(model) for _ in range(threads)]
-        held = robot.timing.substeps(robot.timing.control_hz) * scene.machine.steps_per_tick
-        controls = _random_controls(robot, scene, SIMULATED * STRETCH)
-        self._controls = np.repeat(controls.reshape(SIMULATED, STRETCH, -1), held, axis=1)
-        state = np.zeros(mujoco.mj_stateSize(model, _STATE))
-        mujoco.mj_resetData(model, data)
-        mujoco.mj_getState(model, data, state, _STATE)
-        self._states = np.tile(state, (SIMULATED, 1))
-
-    def steps_per_s(self, seconds: float) -> float:
-        """Roll out for a while; returns how many control steps of single robots were made a second."""
-        began, count = time.perf_counter(), 0
-        while time.perf_counter() - began < seconds or not count:
-            mujoco.rollout.rollout(
-                self._model, self._datas, self._states, self._controls, persistent_pool=True
-            )
-            count += SIMULATED * STRETCH
-        return count / (time.perf_counter() - began)
-
-
-class AfloatPace:
-    """MuJoCo's batch rollout of a robot in the plant's own water, at random commands.
-
-    Its forces follow from where each physics step ends, so the rollout goes step by step, and the water of all robots
-    is computed at once in between.
-
-    Attributes:
-        states: MuJoCo's full physics state of each robot, shape (worlds, n).
-    """
-
-    def __init__(self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, threads: int) -> None:
-        """Put robots on the water and draw commands; as many as the batch has, since few would cost more each."""
-        scene = Scene(robot)
-        machine, self._model, model = scene.machine, scene.model, scene.model
-        assert isinstance(machine, Floater)
-        assert machine.water is not None
-        self._water = machine.water
-        episode = draw_episode(robot, task, scenario, seed=SEED, number=0)
-        machine.take_world(model, episode.world)
-        mujoco.mj_setConst(model, scene.data)
-        mujoco.mj_resetData(model, scene.data)
-        machine.place(model, scene.data, episode.start)
-        self._datas = [mujoco.MjData(model) for _ in range(threads)]
-        state = np.zeros(mujoco.mj_stateSize(model, _STATE))
-        mujoco.mj_getState(model, scene.data, state, _STATE)
-        self.states = np.tile(state, (worlds, 1))
-        self._control = np.zeros((worlds, 1, mujoco.mj_stateSize(model, _CONTROL)))
-        self._substeps = robot.timing.substeps(robot.timing.control_hz)
-        controls = _random_controls(robot, scene, SIMULATED * DIFFERENT)
-        self._thrusts = np.resize(controls, (DIFFERENT, worlds, model.nu))
-        self._calm = np.zeros((worlds, 6))
-
-    def steps_per_s(self, seconds: float) -> float:
-        """Roll out for a while; returns how many control steps of single robots were made a second."""
-        began, count = time.perf_counter(), 0
-        while time.perf_counter() - began < seconds or not count:
-            thrusts = self._thrusts[count % DIFFERENT]
-            for _ in range(self._substeps):
-                self.step(thrusts)
-            count += 1
-        return count * len(self.states) / (time.perf_counter() - began)
-
-    def step(self, thrusts: np.ndarray) -> None:
-        """One physics step of all robots at these thrusts, shape (worlds, n) [N].
-
-        A state is time, place, attitude and velocities; a control is thrusts, and a push of every body, the hull last.
-        """
-        height, attitude, qvel = np.split(self.states[:, 3:14], (1, 5), axis=1)
-        to_world = Rotation.from_quat(np.roll(attitude, -1, axis=1)).as_matrix()
-        self._control[:, 0, : thrusts.shape[1]] = thrusts
-        self._control[:, 0, -6:] = self._water.wrench(height[:, 0], to_world, qvel, thrusts, self._calm)
-        states, _ = mujoco.rollout.rollout(
-            self._model,
-            self._datas,
-            self.states,
-            self._control,
-            control_spec=_CONTROL,
-            persistent_pool=True,
-        )
-        self.states = states[:, 0]
-
-
 def measure(
     robots: list[Robot],
     task: Task,
@@ -338,20 +230,3 @@ def measure(
                     "ratio_with_water": ours / wet[0],
                 }
     return found
-
-
-def _random_commands(robot: Robot, count: int, rng: np.random.Generator) -> np.ndarray:
-    actuators = robot.actuators
-    return np.asarray(
-        actuators.limited(rng.uniform(-1.0, 1.0, (count, len(actuators.names))) * actuators.scale)
-    )
-
-
-def _random_controls(robot: Robot, scene: Scene, count: int) -> np.ndarray:
-    """What MuJoCo's actuators do at random commands, shape (count, n)."""
-    controls = np.empty((count, scene.model.nu))
-    rng = np.random.default_rng(SEED)
-    for row, command in zip(controls, _random_commands(robot, count, rng), strict=True):
-        scene.machine.drive(scene.model, scene.data, command, np.ones_like(command), (0.0, 0.0, 0.0))
-        row[:] = scene.data.ctrl
-    return controls
