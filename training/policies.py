@@ -23,7 +23,7 @@ from training.jobs import Job, Outcome
 from training.settings import TrainingSettings, load_training_settings
 from training.specialist import specialist_settings
 
-UPDATES_A_SECOND = 7.0  # of one run on one idle core, where nothing better is known
+UPDATES_A_SECOND = 5.0  # of one run on one idle core, where nothing better is known
 
 
 @dataclass(frozen=True)
