@@ -60,12 +60,7 @@ class MujocoBackend:
         obstacles = np.asarray(episode.goal.obstacles, dtype=float)
         if not self._scene.has_room_for(obstacles):
             self._enter(Scene(self.robot, radii_for(obstacles), self._block))
-        scene, machine = self._scene, self._scene.machine
-        machine.take_world(scene.model, episode.world)
-        mujoco.mj_setConst(scene.model, scene.data)
-        mujoco.mj_resetData(scene.model, scene.data)
-        machine.place(scene.model, scene.data, episode.start)
-        scene.place_things(episode.goal)
+        self._scene.begin(episode)
         self._unit.reset(seed, number)
         truth, imu = self._read()
         return self._sample(truth, imu, self._world.reset(episode, truth, seed=seed, number=number))

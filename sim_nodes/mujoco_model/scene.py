@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.dynamics.pushing import Block
+from fulmar_core.episode import Episode
 from fulmar_core.goal import Goal
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.block import NAME as BLOCK
@@ -38,8 +39,15 @@ class Scene:
         """Whether these obstacles can be shown, shape (m, 3); if not, another scene has to be compiled."""
         return there_is_room(self._radii, obstacles)
 
-    def place_things(self, goal: Goal) -> None:
-        """Move obstacles and block to where an episode has them; `data` has just been reset."""
+    def begin(self, episode: Episode) -> None:
+        """Put everything as an episode begins: bodies, the robot at its start, obstacles and block."""
+        self.machine.take_world(self.model, episode.world)
+        mujoco.mj_setConst(self.model, self.data)
+        mujoco.mj_resetData(self.model, self.data)
+        self.machine.place(self.model, self.data, episode.start)
+        self._place_things(episode.goal)
+
+    def _place_things(self, goal: Goal) -> None:
         place_obstacles(self.model, self.data, np.asarray(goal.obstacles))
         if self._block is not None:
             place_block(self.model, self.data, float(goal.block[0]), float(goal.block[1]))

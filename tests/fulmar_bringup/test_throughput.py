@@ -20,7 +20,7 @@ mujoco = pytest.importorskip("mujoco")
 from fulmar_bringup.benchmark.mujoco_pace import SEED, AfloatPace, MujocoPace  # noqa: E402
 from fulmar_bringup.benchmark.throughput import BatchPace, Library, SharedPace  # noqa: E402
 from fulmar_bringup.commands.benchmark_throughput import throughput  # noqa: E402
-from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
+from sim_nodes.mujoco_model import Scene  # noqa: E402
 
 BOAT, TASK, RANDOMISED = load_robot("kingfisher"), load_task("go_to_pose"), load_scenario("randomised")
 NUMPY = Library("numpy")
@@ -55,13 +55,12 @@ def test_the_json_has_both_paces_of_each_robot_and_their_ratio(command, cores):
 
 def test_boats_are_rolled_out_in_the_very_water_of_the_plant():
     rolled_out = AfloatPace(BOAT, TASK, RANDOMISED, worlds=3, threads=1)
-    plant = MujocoBackend.of(BOAT, TASK, RANDOMISED)
-    plant.reset(draw_episode(BOAT, TASK, RANDOMISED, seed=SEED, number=0), seed=SEED)
-    machine, full = plant._scene.machine, np.array([1.0, -1.0])
+    plant, full = Scene(BOAT), np.array([1.0, -1.0])
+    plant.begin(draw_episode(BOAT, TASK, RANDOMISED, seed=SEED, number=0))
     thrusts = np.tile(np.asarray(BOAT.actuators.thrust(full)), (3, 1))
     for _ in range(200):
         rolled_out.step(thrusts)
-        machine.drive(plant.model, plant.data, full, np.ones(2), (0.0, 0.0, 0.0))
+        plant.machine.drive(plant.model, plant.data, full, np.ones(2), (0.0, 0.0, 0.0))
         mujoco.mj_step(plant.model, plant.data)
     moved = np.concatenate(([plant.data.time], plant.data.qpos, plant.data.qvel))
     assert np.abs(plant.data.qvel[5]) > 0.1  # it turns

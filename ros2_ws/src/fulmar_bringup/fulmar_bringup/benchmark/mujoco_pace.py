@@ -75,15 +75,11 @@ class AfloatPace:
     def __init__(self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, threads: int) -> None:
         """Put robots on the water and draw commands; as many as the batch has, since few would cost more each."""
         scene = Scene(robot)
-        machine, self._model, model = scene.machine, scene.model, scene.model
-        assert isinstance(machine, Floater)
-        assert machine.water is not None
-        self._water = machine.water
-        episode = draw_episode(robot, task, scenario, seed=SEED, number=0)
-        machine.take_world(model, episode.world)
-        mujoco.mj_setConst(model, scene.data)
-        mujoco.mj_resetData(model, scene.data)
-        machine.place(model, scene.data, episode.start)
+        scene.begin(draw_episode(robot, task, scenario, seed=SEED, number=0))
+        self._model = model = scene.model
+        assert isinstance(scene.machine, Floater)
+        assert scene.machine.water is not None
+        self._water = scene.machine.water
         self._datas = [mujoco.MjData(model) for _ in range(threads)]
         state = np.zeros(mujoco.mj_stateSize(model, _STATE))
         mujoco.mj_getState(model, scene.data, state, _STATE)
@@ -109,10 +105,10 @@ class AfloatPace:
 
         A state is time, place, attitude and velocities; a control is thrusts, and a push of every body, the hull last.
         """
-        height, attitude, qvel = np.split(self.states[:, 3:14], (1, 5), axis=1)
-        to_world = Rotation.from_quat(np.roll(attitude, -1, axis=1)).as_matrix()
+        qpos, qvel = self.states[:, 1:8], self.states[:, 8:14]
+        to_world = Rotation.from_quat(np.roll(qpos[:, 3:], -1, axis=1)).as_matrix()  # MuJoCo has w first
         self._control[:, 0, : thrusts.shape[1]] = thrusts
-        self._control[:, 0, -6:] = self._water.wrench(height[:, 0], to_world, qvel, thrusts, self._calm)
+        self._control[:, 0, -6:] = self._water.wrench(qpos[:, 2], to_world, qvel, thrusts, self._calm)
         states, _ = mujoco.rollout.rollout(
             self._model,
             self._datas,
