@@ -117,7 +117,7 @@ def _print(figures: dict[str, Any]) -> None:
         "MuJoCo, steps/s",
         "ratio",
         "MuJoCo in the plant's water, steps/s",
-        "ratio",
+        "ratio in water",
     ):
         table.add_column(column, justify="right")
     for name, found in figures["robots"].items():
