@@ -145,7 +145,8 @@ def expected_s(jobs: Sequence[Job], at_once: int) -> float:
         at_once: Cores that they share.
     """
     each = [_took_s(job) for job in jobs]
-    shared = sum(time_s * job.settings.threads for time_s, job in zip(each, jobs, strict=True)) / at_once
+    cores = [min(job.settings.threads, at_once) for job in jobs]
+    shared = sum(time_s * taken for time_s, taken in zip(each, cores, strict=True)) / at_once
     return max([shared, *each])
 
 
