@@ -177,8 +177,8 @@ def test_no_steering_beats_the_bound(robot, least):
     assert np.mean(best / most) > least  # the bound is no sky; boats need a better law than this one
 
 
-@pytest.mark.parametrize(("robot", "least"), [("turtlebot2", 0.9), ("kingfisher", 0.8)])
-def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least):
+@pytest.mark.parametrize(("robot", "least", "passed"), [("turtlebot2", 0.9, 42), ("kingfisher", 0.8, 47)])
+def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least, passed):
     """Commands of the first judged episodes, in thousandths, as optimal control with all the dynamics found them."""
     with np.load(Path(__file__).with_name("time_optimal_drives.npz")) as drives:
         commands = drives[robot].astype(np.float32) / 1000.0
@@ -196,6 +196,7 @@ def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least):
     most = bound_of(machine, start, places, RADIUS, task.episode_s, start_yaw=drawn.start.yaw).bound.goals
     assert np.all(goals <= most)
     assert np.mean(goals / most) >= least
+    assert goals.sum() == passed
 
 
 SURGE = Surge(mass=35.0, drag=17.0, ahead=39.0, astern=8.0)
