@@ -35,6 +35,16 @@ def moving(robot):
 
 
 @pytest.mark.parametrize("name", EVERY)
+def test_what_mujoco_makes_of_masses_is_made_of_those_of_the_episode(name, episode):
+    robot = load_robot(name)
+    backend = MujocoBackend(robot)
+    heavier = 1.1 * robot.body.mass
+    backend.reset(episode(robot, mass=heavier), seed=0)
+    model = backend.model
+    assert model.body_subtreemass[0] == pytest.approx(model.body_mass.sum()) == pytest.approx(heavier)
+
+
+@pytest.mark.parametrize("name", EVERY)
 def test_a_reset_puts_every_robot_where_it_was_asked_to_be(name, episode):
     robot = load_robot(name)
     start = moving(robot)
