@@ -68,9 +68,10 @@ def test_boats_are_rolled_out_in_the_very_water_of_the_plant():
 
 
 def test_without_json_a_table_is_printed(command):
-    done = command("--robots", "jetbot", "--worlds", "8", "--seconds", "0.05", "--cores", "1")
-    assert "jetbot" in done.stdout
-    assert "ratio" in done.stdout
+    long = "modular_freeflyer"
+    done = command("--robots", f"kingfisher,{long}", "--worlds", "8", "--seconds", "0.05", "--cores", "1")
+    assert long in done.stdout
+    assert "ratio there ┃" in done.stdout  # nothing is cut off in 80 columns
 
 
 @pytest.mark.parametrize(

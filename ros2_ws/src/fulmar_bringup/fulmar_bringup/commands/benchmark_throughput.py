@@ -108,17 +108,11 @@ def _check_device(device: str, library: str) -> None:
 
 def _print(figures: dict[str, Any]) -> None:
     table = Table(
-        title=f"{figures['worlds']:,} worlds · {figures['task']} · {figures['scenario']} · "
+        title=f"steps/s · {figures['worlds']:,} worlds · {figures['task']} · {figures['scenario']} · "
         f"{figures['library']} on {figures['device']} · {figures['cores']} cores"
     )
     table.add_column("robot")
-    for column in (
-        "batch, steps/s",
-        "MuJoCo, steps/s",
-        "ratio",
-        "MuJoCo in the plant's water, steps/s",
-        "ratio in water",
-    ):
+    for column in ("batch", "MuJoCo", "ratio", "in water", "ratio there"):
         table.add_column(column, justify="right")
     for name, found in figures["robots"].items():
         table.add_row(
