@@ -48,11 +48,13 @@ class Bench:
         values = [np.full(len(self.numbers), value) for value in VALUES]
         if growing:
             values = [column + self.steps for column in values]
-        measured = self.odometer.measure(
-            PlanarState(*values), self.world, self.numbers, self.repeats, self.steps, only=only
-        )
+        truth = PlanarState(*values)
         if only is None:
+            measured = self.odometer.measure(truth, self.world, self.numbers, self.repeats, self.steps)
             self.steps = self.steps + 1
+        else:
+            first = self.odometer.first(truth, self.world, self.numbers, self.repeats)
+            measured = self.odometer.restart(truth, only, first)
         return np.stack([getattr(measured, name) for name in COLUMNS])
 
 

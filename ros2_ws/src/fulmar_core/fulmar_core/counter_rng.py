@@ -68,7 +68,7 @@ def words(keys: Keys, counter: Array | int, count: int) -> Array:
     Returns:
         Words in [0, 2³²), shape (count, n): numbers of one kind lie together.
     """
-    first, second = keys
+    first, second = (_counter(key) for key in keys)
     xp = array_namespace(first)
     here = counter * OTHER & MASK if isinstance(counter, int) else _low(_counter(counter) * OTHER)
     base = _mix(_low(first + here)) ^ second
@@ -156,7 +156,7 @@ class Draws:
 def _counter(values: Array) -> Array:
     """Integers as words: 32-bit where the library can compute with them, else the low half of 64."""
     if is_numpy(values):
-        return np.asarray(values).astype(np.uint32)
+        return np.asarray(values).astype(np.uint32, copy=False)
     xp = array_namespace(values)
     return xp.astype(values, xp.int64) & MASK
 

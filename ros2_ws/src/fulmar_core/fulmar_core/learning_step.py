@@ -85,6 +85,14 @@ def judged_step(
     )
 
 
+def observed_step(
+    simulation: BatchSimulation, command: Array, *, robot: Robot, task: Task
+) -> tuple[Array, Array, Array]:
+    """`judged_step`, and what controllers see after it, shape (worlds, n)."""
+    reward, over = judged_step(simulation, command, robot=robot, task=task)
+    return reward, over, simulation.observe()
+
+
 def _cost(robot: Robot, previous: Array, command: Array) -> Array:
     """What using the actuators costs, shape (worlds,)."""
     costs = robot.costs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from array_api_compat import device
 
-from fulmar_core.arrays import array_namespace, clip
+from fulmar_core.arrays import array_namespace, clip, is_numpy
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
@@ -80,6 +80,6 @@ def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> 
 
 def shares(command: Array, scale: np.ndarray) -> Array:
     """Commands as shares of the largest ones, shapes (..., n), (n,) and (..., n)."""
-    if (scale == 1.0).all():
+    if is_numpy(command) and (scale == 1.0).all():
         return command
     return command / array_namespace(command).asarray(scale, dtype=command.dtype, device=device(command))

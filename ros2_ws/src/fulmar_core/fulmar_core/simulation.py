@@ -10,10 +10,10 @@ import numpy as np
 from array_api_compat import is_numpy_namespace
 
 from fulmar_core.arrays import array_namespace
-from fulmar_core.counter_rng import uniform_from, words, world_keys
+from fulmar_core.counter_rng import Keys, uniform_from, words, world_keys
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import FIELDS, World
-from fulmar_core.episode import Episode, draw_episodes
+from fulmar_core.episode import draw_episodes
 from fulmar_core.goal import Goal
 from fulmar_core.motion import actuation_of, control_step, longest_delay, may_be_off_centre, may_open_late
 from fulmar_core.observation import Observer, slewed
@@ -23,11 +23,11 @@ from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.tasks import Task, fitted
 from fulmar_core.tasks.push_block import PushBlock
-from fulmar_core.upcoming import UpcomingEpisodes
+from fulmar_core.upcoming import Beginning, UpcomingEpisodes
 
 _MOVING = (
     "truth", "measured", "goal", "world", "command",
-    "_strength", "_repeats", "_steps", "_actuation", "_odometer", "_noise_keys",
+    "_strength", "_repeats", "_steps", "_noise_keys",
 )  # fmt: skip
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
@@ -92,7 +92,7 @@ class BatchSimulation:
         self._numbers = self._whole(first + np.arange(worlds))
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
-        self._noise_keys = world_keys(seed, self._numbers, self._repeats, ACTUATOR_NOISE)
+        self._noise_keys = self._actuator_keys(self._numbers, self._repeats)
         self._latest_s = longest_delay(robot, scenario)
         self._off_centre = may_be_off_centre(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0
@@ -110,7 +110,7 @@ class BatchSimulation:
         self.command: Array = self._safe.T
         self._upcoming = UpcomingEpisodes(self._draw, worlds)
         self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
-        self._measure(None)
+        self._measure()
 
     @property
     def strength(self) -> float:
@@ -154,14 +154,16 @@ class BatchSimulation:
         index = self._whole(which)
         self._repeats[index] = self._repeats[index] + 1
         self._steps[index] = 0
-        some = world_keys(self.seed, self._numbers[index], self._repeats[index], ACTUATOR_NOISE)
-        for every, new in zip(self._noise_keys, some, strict=True):
-            every[index] = new
-        self._upcoming.begin(which, index, self._repeats_now(), self.truth, self.goal, self.world)
+        coming = self._upcoming.begin(which, self._repeats_now())
+        self.truth.write(index, coming.start[index])
+        self.goal.write(index, coming.goal[index])
+        self.world.adopt(index, coming.world)
+        for every, new in zip(self._noise_keys, coming.noise_keys, strict=True):
+            every[index] = new[index]
         self._actuation.reset(index, self._safe[:, :1])
         self.command = self._xp.asarray(self.command, copy=True)
         self.command[index] = self._safe[:, 0]
-        self._measure(index)
+        self.measured = self._odometer.restart(self.truth, index, coming.reading)
 
     def step(self, command: Array) -> None:
         """Apply one command for one control step.
@@ -196,21 +198,35 @@ class BatchSimulation:
         if isinstance(self.task, PushBlock):
             self.goal, self.truth = self.task.pushed(self.goal, before, self.truth, self.robot)
         self.goal = self.task.advance(self.goal, self.truth, time_s + self.control_dt)
-        self._measure(None)
+        self._measure()
+
+    def moving(self) -> dict[str, Any]:
+        """Everything that moves, by name: arrays, what is made of arrays, and numbers; not copied."""
+        own = {name: getattr(self, name) for name in _MOVING}
+        return own | {"_actuation": self._actuation.moving(), "_odometer": self._odometer.moving()}
+
+    def take(self, moving: dict[str, Any]) -> None:
+        """Go on from what `moving` told of worlds that were built alike; not copied."""
+        for name in _MOVING:
+            setattr(self, name, moving[name])
+        self._actuation.take(moving["_actuation"])
+        self._odometer.take(moving["_odometer"])
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that moves, as a copy of its own that pickles."""
-        return {name: copy.deepcopy(getattr(self, name)) for name in _MOVING}
+        return copy.deepcopy(self.moving())
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Go on from a snapshot of a simulation that was built alike."""
-        for name in _MOVING:
-            setattr(self, name, copy.deepcopy(snapshot[name]))
+        self.take(copy.deepcopy(snapshot))
         self._upcoming.forget()
 
-    def _draw(self, worlds: np.ndarray, repeats: np.ndarray) -> Episode:
-        """Episodes of some worlds in the simulation's own arrays."""
-        return Episode(*self._draw_parts(worlds, repeats))
+    def _draw(self, worlds: np.ndarray, repeats: np.ndarray) -> Beginning:
+        """How some worlds begin, in the simulation's own arrays."""
+        start, goal, world = self._draw_parts(worlds, repeats)
+        numbers, repeated = self._whole(self._first + worlds), self._whole(repeats)
+        reading = self._odometer.first(start, world, numbers, repeated)
+        return Beginning(start, goal, world, self._actuator_keys(numbers, repeated), reading)
 
     def _draw_parts(self, worlds: np.ndarray, repeats: np.ndarray) -> tuple[PlanarState, Goal, World]:
         drawn = draw_episodes(
@@ -225,7 +241,7 @@ class BatchSimulation:
         )
         return (
             PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS)),
-            Goal(*(self._real(getattr(drawn.goal, name)) for name in Goal.__slots__)),
+            Goal(*(self._side_by_side(getattr(drawn.goal, name)) for name in Goal.__slots__)),
             World(*(self._real(getattr(drawn.world, name)) for name in FIELDS)).packed(),
         )
 
@@ -233,10 +249,12 @@ class BatchSimulation:
         """How often each world has begun anew, as NumPy."""
         return np.array(self._repeats.cpu().numpy() if self._on_torch else self._repeats)
 
-    def _measure(self, restarted: Array | None) -> None:
-        """Measure every world; where only some restarted, the others keep what they had."""
+    def _actuator_keys(self, numbers: Array, repeats: Array) -> Keys:
+        return world_keys(self.seed, numbers, repeats, ACTUATOR_NOISE)
+
+    def _measure(self) -> None:
         self.measured = self._odometer.measure(
-            self.truth, self.world, self._numbers, self._repeats, self._steps, only=restarted
+            self.truth, self.world, self._numbers, self._repeats, self._steps
         )
 
     @property
@@ -247,6 +265,11 @@ class BatchSimulation:
         """A copy of its own, in the simulation's floating type, where its arrays live."""
         kwargs = {} if self._device is None else {"device": self._device}
         return self._xp.asarray(values, dtype=self._dtype, copy=True, **kwargs)
+
+    def _side_by_side(self, values: Array) -> Array:
+        """As `_real`, with the same number of all worlds beside one another in memory, as in all else that moves."""
+        xp = self._xp
+        return xp.moveaxis(self._real(np.ascontiguousarray(np.moveaxis(values, 0, -1))), -1, 0)
 
     def _whole(self, values: np.ndarray) -> Array:
         kwargs = {} if self._device is None else {"device": self._device}

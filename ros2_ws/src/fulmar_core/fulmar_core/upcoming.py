@@ -3,16 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from fulmar_core.counter_rng import Keys
 from fulmar_core.disturbances.world import World
-from fulmar_core.episode import Episode
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
+from fulmar_core.sensors.odometer import FirstReading
 
-Draw = Callable[[np.ndarray, np.ndarray], Episode]  # of some worlds that began anew so often
+
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """Everything that is settled before the first step of an episode of each world."""
+
+    start: PlanarState
+    goal: Goal
+    world: World
+    noise_keys: Keys  # of what actuators do wrong
+    reading: FirstReading
+
+    def write(self, index: Array, other: Beginning) -> None:
+        """Overwrite some worlds in place."""
+        self.start.write(index, other.start)
+        self.goal.write(index, other.goal)
+        self.world.write(index, other.world)
+        for every, new in zip(self.noise_keys, other.noise_keys, strict=True):
+            every[index] = new
+        self.reading.write(index, other.reading)
+
+
+Draw = Callable[[np.ndarray, np.ndarray], Beginning]  # of some worlds that began anew so often
 
 
 class UpcomingEpisodes:
@@ -22,38 +45,27 @@ class UpcomingEpisodes:
         """Draw nothing yet."""
         self._draw = draw
         self._ready = np.zeros(worlds, dtype=bool)
-        self._episodes: Episode | None = None
+        self._next: Beginning | None = None
 
     def forget(self) -> None:
         """Draw all anew when they are needed: what they are drawn from has changed."""
         self._ready[:] = False
 
-    def begin(
-        self,
-        which: np.ndarray,
-        index: Array,
-        repeats: np.ndarray,
-        start: PlanarState,
-        goal: Goal,
-        world: World,
-    ) -> None:
-        """Write the next episodes of some worlds over what they have now.
+    def begin(self, which: np.ndarray, repeats: np.ndarray) -> Beginning:
+        """Use up the next episodes of some worlds.
 
         Args:
             which: Numbers of the worlds in the batch.
-            index: The same, as an index of the arrays' library.
             repeats: How often every world has begun anew when these have, shape (worlds,).
-            start: State to overwrite.
-            goal: Goal to overwrite.
-            world: Worlds to overwrite.
+
+        Returns:
+            Of every world in the batch; until the next call, what it says of these is how they begin.
         """
         if not self._ready[which].all():
             self._refill(which, repeats)
-        assert self._episodes is not None
-        start.write(index, self._episodes.start[index])
-        goal.write(index, self._episodes.goal[index])
-        world.write(index, self._episodes.world[index])
         self._ready[which] = False
+        assert self._next is not None
+        return self._next
 
     def _refill(self, which: np.ndarray, repeats: np.ndarray) -> None:
         """Draw for every world whose next episode is not there yet."""
@@ -61,12 +73,10 @@ class UpcomingEpisodes:
         coming[which] = repeats[which]
         missing = np.flatnonzero(~self._ready)
         drawn = self._draw(missing, coming[missing])
-        if self._episodes is None:
+        if self._next is None:
             assert len(missing) == len(self._ready)
-            self._episodes = drawn
+            self._next = drawn
         else:
             index = missing if isinstance(drawn.start.x, np.ndarray) else missing.tolist()
-            self._episodes.start.write(index, drawn.start)
-            self._episodes.goal.write(index, drawn.goal)
-            self._episodes.world.write(index, drawn.world)
+            self._next.write(index, drawn)
         self._ready[:] = True

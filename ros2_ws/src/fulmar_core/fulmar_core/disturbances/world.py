@@ -88,6 +88,11 @@ class World:
         for name in FIELDS:
             getattr(self, name)[..., index] = getattr(other, name)
 
+    def adopt(self, index: Any, other: World) -> None:
+        """Overwrite some worlds by the same ones of another batch, in place; both are packed."""
+        assert self._packing is not None and other._packing is not None
+        self._packing[0][..., index] = other._packing[0][..., index]
+
     def astype(self, dtype: Any) -> World:
         """Copy in another NumPy floating type."""
         return World(*(np.array(getattr(self, name), dtype=dtype) for name in FIELDS))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from array_api_compat import device
@@ -12,6 +13,8 @@ from fulmar_core.counter_rng import NOISE, Keys, normal_from, uniform_from, word
 from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
+
+_MOVING = ("_past", "_held", "_keys")
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,20 @@ class OdometrySpec:
         return np.array([[getattr(channel, part)] for channel in self.channels])
 
 
+@dataclass(frozen=True, slots=True)
+class FirstReading:
+    """What is measured before the first step, and what the noise of all later measurements hangs on."""
+
+    columns: Array  # (6, n)
+    keys: Keys
+
+    def write(self, index: Array, other: FirstReading) -> None:
+        """Overwrite some worlds in place."""
+        self.columns[:, index] = other.columns
+        for every, new in zip(self.keys, other.keys, strict=True):
+            every[index] = new
+
+
 class Odometer:
     """Measures a batch of worlds, once every `period` seconds; remembers what it held back."""
 
@@ -91,6 +108,15 @@ class Odometer:
         self._held: Array | None = None
         self._keys: Keys | None = None
 
+    def moving(self) -> dict[str, Any]:
+        """What measurements change, by name; not copied."""
+        return {name: getattr(self, name) for name in _MOVING}
+
+    def take(self, moving: dict[str, Any]) -> None:
+        """Go on from what `moving` told; not copied."""
+        for name in _MOVING:
+            setattr(self, name, moving[name])
+
     def measure(
         self,
         truth: PlanarState,
@@ -98,10 +124,8 @@ class Odometer:
         numbers: Array,
         repeats: Array,
         steps: Array,
-        *,
-        only: Array | None = None,
     ) -> PlanarState:
-        """What is reported now.
+        """What is reported now; no world may have begun anew since the last call but by `restart`.
 
         Args:
             truth: True state, shapes (n,).
@@ -109,22 +133,18 @@ class Odometer:
             numbers: Number of each world, shape (n,).
             repeats: How often each began anew, shape (n,).
             steps: How many measurements each had in this episode, shape (n,); 0 forgets its past.
-            only: Numbers of worlds that began anew since the last call, which alone are measured again; without this
-                word no world may begin anew.
 
         Returns:
             Measured state, shapes (n,).
         """
-        if not (self._noisy or self._blurred):
+        if self._perfect:
             return truth
         xp = array_namespace(truth.x)
-        if only is not None:
-            return self._restart(truth[only], world, numbers[only], repeats[only], only)
-        columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
+        columns = _columns(truth)
         if self._keys is None:
             self._keys = world_keys(self._seed, numbers, repeats, NOISE)
         bits = words(self._keys, steps, self._words)
-        reading = self._disturbed(columns, _errors(world), bits)
+        reading = self._disturbed(columns, world, bits)
         if self._depth > 1:
             reading = self._delayed(reading, world)
         lost = uniform_from(bits[6], columns.dtype) < (world.dropout if self._noisy else 0.0)
@@ -135,24 +155,39 @@ class Odometer:
         self._held = reading
         return PlanarState(*(reading[i] for i in range(6)))
 
-    def _restart(
-        self, truth: PlanarState, world: World, numbers: Array, repeats: Array, only: Array
-    ) -> PlanarState:
-        """First measurement of some worlds; nothing of their past remains."""
-        assert self._held is not None
-        xp = array_namespace(truth.x)
-        columns = xp.stack((truth.x, truth.y, truth.yaw, truth.vx, truth.vy, truth.yaw_rate))
+    def first(self, truth: PlanarState, world: World, numbers: Array, repeats: Array) -> FirstReading:
+        """First measurement of episodes that are to begin; arguments as in `measure`. Changes nothing."""
         keys = world_keys(self._seed, numbers, repeats, NOISE)
-        assert self._keys is not None
-        for every, some in zip(self._keys, keys, strict=True):
-            every[only] = some
-        errors = tuple(error[..., only] for error in _errors(world))
-        reading = self._disturbed(columns, errors, words(keys, 0, self._words))
+        columns = _columns(truth)
+        if not self._perfect:
+            columns = self._disturbed(columns, world, words(keys, 0, self._words))
+        return FirstReading(columns, keys)
+
+    def restart(self, truth: PlanarState, which: Array, first: FirstReading) -> PlanarState:
+        """Forget the past of some worlds, in whose place `first` is reported.
+
+        Args:
+            truth: True state of all worlds, shapes (n,).
+            which: Numbers of the worlds that begin anew.
+            first: First readings of all worlds, of which theirs count.
+
+        Returns:
+            Measured state, shapes (n,); the other worlds keep what they had.
+        """
+        if self._perfect:
+            return truth
+        assert self._held is not None and self._keys is not None
+        for every, new in zip(self._keys, first.keys, strict=True):
+            every[which] = new[which]
         # Who was given readings keeps them; what is still under way nobody was given.
-        self._held = xp.asarray(self._held, copy=True)
+        self._held = array_namespace(self._held).asarray(self._held, copy=True)
         for old in (self._held, *self._past):
-            old[:, only] = reading
+            old[:, which] = first.columns[:, which]
         return PlanarState(*(self._held[i] for i in range(6)))
+
+    @property
+    def _perfect(self) -> bool:
+        return not (self._noisy or self._blurred)
 
     @property
     def _words(self) -> int:
@@ -165,23 +200,22 @@ class Odometer:
             self._constants[part] = xp.asarray(self._spec.column(part), dtype=like.dtype, device=device(like))
         return self._constants[part]
 
-    def _disturbed(self, columns: Array, errors: tuple[Array, ...], bits: Array) -> Array:
-        """Columns, shape (6, n), with the `_errors` that worlds have, and with random bits."""
+    def _disturbed(self, columns: Array, world: World, bits: Array) -> Array:
+        """Columns, shape (6, n), with the errors that worlds have, and with random bits."""
         xp = array_namespace(columns)
-        scale, bias, loudness, blur, spin_blur = errors
         if "scale_std" in self._used:
-            columns = columns * (1.0 + self._constant("scale_std", columns) * scale)
+            columns = columns * (1.0 + self._constant("scale_std", columns) * world.sensor_scale)
         if "bias_std" in self._used:
-            columns = columns + self._constant("bias_std", columns) * bias
+            columns = columns + self._constant("bias_std", columns) * world.sensor_bias
         if "std" in self._used:
-            noise = normal_from(bits[:6], columns.dtype) * loudness
+            noise = normal_from(bits[:6], columns.dtype) * world.noise
             columns = columns + self._constant("std", columns) * noise
         if self._blurred:
             share = 2.0 * uniform_from(bits[7:10], columns.dtype) - 1.0
             error = (
-                blur * share[0],
-                blur * share[1],
-                spin_blur * share[2],
+                world.velocity_noise * share[0],
+                world.velocity_noise * share[1],
+                world.yaw_rate_noise * share[2],
             )
             columns = xp.stack(
                 (*(columns[i] for i in range(3)), *(columns[3 + i] + error[i] for i in range(3)))
@@ -208,6 +242,7 @@ class Odometer:
         return chosen
 
 
-def _errors(world: World) -> tuple[Array, ...]:
-    """How far off sensors are in each world: scale, bias, noise, and what blurs velocities and turn rates."""
-    return world.sensor_scale, world.sensor_bias, world.noise, world.velocity_noise, world.yaw_rate_noise
+def _columns(state: PlanarState) -> Array:
+    """What is measured, shape (6, n)."""
+    parts = state.x, state.y, state.yaw, state.vx, state.vy, state.yaw_rate
+    return array_namespace(state.x).stack(parts)
