@@ -136,6 +136,7 @@ def train(
         mirror=settings.mirror,
         coordinates=settings.coordinates,
         orders_held=settings.orders.hold if settings.orders else 0,
+        compiled=settings.compiled,
     )
     story = Story()
     if resume:

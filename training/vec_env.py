@@ -16,12 +16,12 @@ from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.errors import ConfigError
-from fulmar_core.learning_step import judged_step
 from fulmar_core.observation import shares
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task, fitted
+from training.compiled import step_of
 from training.coordinates import coordinate_terms, places_of, with_coordinates
 from training.orders import KINDS, check_orders, shares_asked
 from training.stranded import asked_for
@@ -58,6 +58,7 @@ class BatchVecEnv(VecEnv):
         mirror: Symmetry | None = None,
         coordinates: bool = False,
         orders_held: int = 0,
+        compiled: bool = False,
     ) -> None:
         """Build the worlds.
 
@@ -78,6 +79,7 @@ class BatchVecEnv(VecEnv):
                 (`fulmar_core.symmetry`).
             coordinates: Observations end with what `training.coordinates` makes of the targets.
             orders_held: Actions are orders (`training.orders`) that stand for so many control steps; 0: they are not.
+            compiled: Steps are compiled (`training.compiled`).
 
         Raises:
             ConfigError: The robot cannot be mirrored so, or takes no orders, or the task has no path.
@@ -94,7 +96,8 @@ class BatchVecEnv(VecEnv):
             check_orders(robot)
         self.takes_orders, self.hold = orders_held > 0, max(orders_held, 1)
         self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
-        self.simulation = self._new_simulation(strength)
+        self._compiled = compiled
+        self._begin(strength)
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
@@ -115,8 +118,9 @@ class BatchVecEnv(VecEnv):
         self._age = np.zeros(worlds, dtype=int)
         self._actions = np.zeros((worlds, count), dtype=np.float32)
 
-    def _new_simulation(self, strength: float) -> BatchSimulation:
-        return BatchSimulation(
+    def _begin(self, strength: float) -> None:
+        """Build the worlds anew."""
+        self.simulation = BatchSimulation(
             self.robot,
             self.task,
             self._scenario,
@@ -125,6 +129,7 @@ class BatchVecEnv(VecEnv):
             training=self._training,
             strength=strength,
         )
+        self._observed_step = step_of(self.simulation, compiled=self._compiled)
 
     @property
     def told(self) -> bool:
@@ -160,7 +165,7 @@ class BatchVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """Begin anew in every world; returns the observations, shape (worlds, n)."""
-        self.simulation = self._new_simulation(self.simulation.strength)
+        self._begin(self.simulation.strength)
         rng = np.random.Generator(np.random.Philox(self._seed))
         self._age = rng.integers(0, self._horizon if self._staggered else 1, self.num_envs)
         self.reset_infos = [{} for _ in range(self.num_envs)]
@@ -206,16 +211,16 @@ class BatchVecEnv(VecEnv):
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Move while the actions stand, usually one control step; returns observations, rewards, dones and infos."""
         simulation = self.simulation
-        reward, ended_early = self._step()
+        reward, ended_early, seen = self._step()
         for _ in range(self.hold - 1):
-            more, ended = self._step()
+            more, ended, seen = self._step()
             reward, ended_early = reward + more, ended_early | ended
         self._age += self.hold
         timed_out = (self._age >= self._horizon) & ~ended_early
         done = ended_early | timed_out
         if self._told:
             self._told.learn(simulation)
-        observations = self._completed(np.asarray(simulation.observe()))
+        observations = self._completed(seen)
         # One shared dictionary where nothing ended: a thousand empty ones a step would cost more than the physics.
         infos: list[dict[str, Any]] = [_NOTHING_TO_SAY] * self.num_envs
         ended = np.flatnonzero(done)
@@ -230,15 +235,13 @@ class BatchVecEnv(VecEnv):
             observations[ended] = self._observed(ended)
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
 
-    def _step(self) -> tuple[np.ndarray, np.ndarray]:
-        """One control step; returns rewards and whether episodes ended before their time."""
+    def _step(self) -> tuple[np.ndarray, ...]:
+        """One control step; returns rewards, whether episodes ended before their time, and observations."""
         asked = self._actions
         if self.takes_orders:
             asked = shares_asked(asked, shares(self.simulation.command, self._scale))
-        reward, ended_early = judged_step(
-            self.simulation, asked * self._scale, robot=self._judged, task=self.task
-        )
-        return np.asarray(reward), np.asarray(ended_early)
+        told = self._observed_step(asked * self._scale, robot=self._judged, task=self.task)
+        return tuple(np.asarray(part) for part in told)
 
     def _observed(self, worlds: np.ndarray) -> np.ndarray:
         observations = np.asarray(self.simulation.observe(worlds))

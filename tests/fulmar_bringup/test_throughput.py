@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -24,13 +25,14 @@ from sim_nodes.mujoco_model import Scene  # noqa: E402
 
 BOAT, TASK, RANDOMISED = load_robot("kingfisher"), load_task("go_to_pose"), load_scenario("randomised")
 NUMPY = Library("numpy")
+LIBRARY = {"numpy": ("--library", "numpy"), "compiled": ("--library", "compiled"), None: ()}
 
 
 @pytest.fixture(scope="module")
 def command():
     app = typer.Typer()
     app.command()(throughput)
-    return lambda *words: CliRunner().invoke(app, words)
+    return lambda *words, library="numpy": CliRunner().invoke(app, (*words, *LIBRARY[library]))
 
 
 @pytest.mark.parametrize("cores", ["1", "2"])
@@ -84,14 +86,34 @@ def test_without_json_a_table_is_printed(command):
     ],
 )
 def test_what_does_not_exist_is_refused(command, words, error):
-    assert isinstance(command(*words).exception, error)
+    assert isinstance(command(*words, library=None).exception, error)
 
 
 def test_without_a_graphics_card_cuda_is_refused_in_words(command):
     torch = pytest.importorskip("torch")
     if torch.cuda.is_available():
         pytest.skip("there is a graphics card")
-    assert "graphics card" in str(command("--device", "cuda").exception)
+    assert "graphics card" in str(command("--device", "cuda", library=None).exception)
+
+
+@pytest.mark.parametrize("cores", ["1", "2"])
+def test_without_a_compiler_nothing_is_compiled_and_whoever_asks_for_it_is_told(command, monkeypatch, cores):
+    pytest.importorskip("torch")
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    small = "--robots", "turtlebot2", "--worlds", "6", "--seconds", "0.05", "--cores", cores
+    assert json.loads(command(*small, "--json", library=None).stdout)["library"] == "numpy"
+    assert "python3-dev" in str(command(*small, library="compiled").exception)
+
+
+@pytest.mark.slow
+def test_steps_are_compiled_where_nobody_says_otherwise(command):
+    pytest.importorskip("torch")
+    if shutil.which("g++") is None:
+        pytest.skip("no C++ compiler here")
+    done = command("--robots", "turtlebot2", "--worlds", "64", "--seconds", "0.05", "--json", library=None)
+    figures = json.loads(done.stdout)
+    assert figures["library"] == "compiled"
+    assert figures["robots"]["turtlebot2"]["batch_steps_per_s"] > 0.0
 
 
 def test_a_step_of_the_batch_observes_rewards_and_begins_new_episodes():

@@ -2,7 +2,8 @@
 
 Both are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
 count. A step of the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward
-and, where episodes end, new ones; worlds are shared out among processes. A step of MuJoCo (`mujoco_pace`) is its
+and, where episodes end, new ones; worlds are shared out among processes. It is compiled (`training.compiled`), or
+carried out array by array. A step of MuJoCo (`mujoco_pace`) is its
 physics alone, over the same control period.
 """
 
@@ -13,6 +14,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -21,7 +23,8 @@ import numpy as np
 from fulmar_bringup.benchmark.mujoco_pace import DIFFERENT, SEED, AfloatPace, MujocoPace, random_commands
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
-from fulmar_core.learning_step import judged_step
+from fulmar_core.errors import ConfigError
+from fulmar_core.learning_step import observed_step
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
@@ -30,14 +33,14 @@ from fulmar_core.tasks import Task
 
 @dataclass(frozen=True)
 class Library:
-    """Where the arrays of the batch live."""
+    """Where the arrays of the batch live, and who computes with them."""
 
-    name: str  # numpy or torch
+    name: str  # numpy, compiled (NumPy's arrays, a kernel of torch's compiler) or torch
     device: str = "cpu"  # cpu or cuda
 
     def namespace(self) -> Any:
-        """The library's module."""
-        if self.name == "numpy":
+        """The module of the arrays."""
+        if self.name != "torch":
             return np
         import torch
 
@@ -56,7 +59,7 @@ class Library:
 
     def array(self, values: np.ndarray) -> Array:
         """Values in single precision, where they are needed."""
-        if self.name == "numpy":
+        if self.name != "torch":
             return values.astype(np.float32)
         import torch
 
@@ -64,7 +67,18 @@ class Library:
 
     def numbers(self, truths: Array) -> np.ndarray:
         """Where an array of truth values is true."""
-        return np.flatnonzero(truths if self.name == "numpy" else truths.cpu().numpy())
+        return np.flatnonzero(truths.cpu().numpy() if self.name == "torch" else truths)
+
+    def step_of(self, simulation: BatchSimulation) -> Callable[..., tuple[Array, Array, Array]]:
+        """How a batch moves: `observed_step` of the command, the robot and the task."""
+        if self.name != "compiled":
+            return partial(observed_step, simulation)
+        import torch
+
+        from training.compiled import CompiledStep
+
+        torch.set_num_threads(1)  # as in `namespace`
+        return CompiledStep(simulation)
 
 
 class BatchPace:
@@ -84,8 +98,9 @@ class BatchPace:
             first=first,
             training=True,
             xp=library.namespace(),
-            device=None if library.name == "numpy" else library.device,
+            device=library.device if library.name == "torch" else None,
         )
+        self._observed_step = library.step_of(self._simulation)
         self._horizon = episode_steps(task, self._simulation.control_dt)
         rng = np.random.default_rng(SEED)
         self._age = rng.integers(0, self._horizon, worlds)
@@ -105,11 +120,12 @@ class BatchPace:
         simulation = self._simulation
         command = self._commands[self._at]
         self._at = (self._at + 1) % DIFFERENT
-        self.reward, ended_early = judged_step(simulation, command, robot=self._robot, task=self._task)
+        self.reward, ended_early, self.observation = self._observed_step(
+            command, robot=self._robot, task=self._task
+        )
         self._age += 1
         ended = self._age >= self._horizon
         ended[self._library.numbers(ended_early)] = True
-        self.observation = simulation.observe()
         over = np.flatnonzero(ended)
         if over.size:
             simulation.reset(over)
@@ -136,14 +152,21 @@ class SharedPace:
         bounds = np.linspace(0, worlds, len(self._pipes) + 1).astype(int)
         for pipe, first, last in zip(self._pipes, bounds, bounds[1:], strict=False):
             pipe.send((robot, task, scenario, int(last - first), library, int(first)))
-        for pipe in self._pipes:
-            pipe.recv()
+        self._answers()
 
     def steps_per_s(self, seconds: float) -> float:
         """Step for a while; returns how many steps of single worlds were made a second by all together."""
         for pipe in self._pipes:
             pipe.send(seconds)
-        return sum(pipe.recv() for pipe in self._pipes)
+        return sum(self._answers())
+
+    def _answers(self) -> list[Any]:
+        """What all of them say, or the first complaint."""
+        answers = [pipe.recv() for pipe in self._pipes]
+        for answer in answers:
+            if isinstance(answer, ConfigError):
+                raise answer
+        return answers
 
     def close(self) -> None:
         """Let the processes end."""
@@ -161,13 +184,16 @@ def _serve(pipe: Connection) -> None:
             order = pipe.recv()
         except EOFError:
             return
-        if isinstance(order, float):
-            assert pace is not None
-            pipe.send(pace.steps_per_s(order))
-        else:
-            robot, task, scenario, worlds, library, first = order
-            pace = BatchPace(robot, task, scenario, worlds=worlds, library=library, first=first)
-            pipe.send(None)
+        try:
+            if isinstance(order, float):
+                assert pace is not None
+                pipe.send(pace.steps_per_s(order))
+            else:
+                robot, task, scenario, worlds, library, first = order
+                pace = BatchPace(robot, task, scenario, worlds=worlds, library=library, first=first)
+                pipe.send(None)
+        except ConfigError as error:
+            pipe.send(error)
 
 
 def measure(

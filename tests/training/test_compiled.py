@@ -1,0 +1,130 @@
+"""Compiled steps: the worlds move as they do in NumPy, episodes begin in between, and nothing is compiled twice."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.errors import ConfigError
+from fulmar_core.learning_step import observed_step
+from fulmar_core.robot import load_robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import load_task
+from training.compiled import CompiledStep
+from training.vec_env import BatchVecEnv
+
+pytestmark = pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler here")
+
+RANDOMISED = load_scenario("randomised")
+ROBOT, TASK = load_robot("turtlebot2"), load_task("track_velocities")  # quick to compile
+WORLDS = 24
+
+
+def assert_moves_as_in_numpy(robot, task, steps=60):
+    plain, batch = (
+        BatchSimulation(robot, task, RANDOMISED, worlds=WORLDS, seed=5, training=True) for _ in range(2)
+    )
+    compiled, rng = CompiledStep(batch), np.random.default_rng(6)
+    for k in range(steps):
+        command = rng.uniform(-1.0, 1.0, (WORLDS, len(robot.actuators.names))) * robot.actuators.scale
+        command = command.astype(np.float32)
+        reward, over, seen = observed_step(plain, command, robot=robot, task=plain.task)
+        told = compiled(command, robot=robot, task=batch.task)
+        np.testing.assert_array_equal(told[1], over)
+        np.testing.assert_allclose(told[0], reward, atol=2e-4)
+        np.testing.assert_allclose(told[2], seen, atol=2e-4)
+        assert told[2].dtype == seen.dtype
+        if k % 17 == 9:
+            for worlds in (plain, batch):
+                worlds.reset([1, 3, 5 + k % 4])
+            np.testing.assert_allclose(batch.observe(), plain.observe(), atol=2e-4)
+    assert np.ptp(reward) > 0.0
+
+
+def test_compiled_worlds_move_as_in_numpy():
+    assert_moves_as_in_numpy(ROBOT, TASK)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robot", "task"),
+    [
+        ("floating_platform", "go_to_position_with_obstacles"),
+        ("modular_freeflyer", "push_block"),
+        ("kingfisher", "go_through_positions"),
+        ("leatherback", "race_gates"),
+    ],
+)
+def test_compiled_worlds_of_every_family_move_as_in_numpy(robot, task):
+    assert_moves_as_in_numpy(load_robot(robot), load_task(task))
+
+
+def learned_in(env, steps):
+    """Observations and rewards of some steps under commands that are the same for everybody."""
+    rng, seen = np.random.default_rng(7), []
+    for _ in range(steps):
+        env.step_async(rng.uniform(-1.0, 1.0, (WORLDS, 2)))
+        observations, rewards, _, _ = env.step_wait()
+        seen += [observations, rewards[:, None]]
+    return np.concatenate(seen, axis=1)
+
+
+@pytest.fixture
+def environments():
+    return [
+        BatchVecEnv(ROBOT, TASK, RANDOMISED, worlds=WORLDS, seed=5, compiled=compiled)
+        for compiled in (False, True)
+    ]
+
+
+def test_a_learner_sees_the_same_and_pays_what_effort_costs_now(environments):
+    plain, compiled = environments
+    for env in environments:
+        env.reset()
+    np.testing.assert_allclose(learned_in(compiled, 30), learned_in(plain, 30), atol=2e-4)
+    for factor in (2.0, 30.0):
+        for env in environments:
+            env.set_effort(factor)
+        with torch.compiler.set_stance("fail_on_recompile"):
+            dearer = learned_in(compiled, 3)
+        np.testing.assert_allclose(dearer, learned_in(plain, 3), atol=2e-3)
+
+
+def test_a_learner_goes_on_from_where_it_was_to_the_last_bit(environments):
+    compiled = environments[1]
+    compiled.reset()
+    learned_in(compiled, 5)
+    state = compiled.state()
+    went = learned_in(compiled, 20)
+    compiled.set_state(state)
+    np.testing.assert_array_equal(learned_in(compiled, 20), went)
+
+
+def test_worlds_that_are_built_anew_are_not_compiled_anew(environments):
+    compiled = environments[1]
+    compiled.reset()
+    first = learned_in(compiled, 2)
+    compiled.reset()
+    with torch.compiler.set_stance("fail_on_recompile"):
+        np.testing.assert_array_equal(learned_in(compiled, 2), first)
+
+
+@pytest.mark.slow
+def test_a_compiler_that_fails_is_told_of(monkeypatch, tmp_path):
+    monkeypatch.setenv("CXX", "false")
+    monkeypatch.setenv("TORCHINDUCTOR_CACHE_DIR", str(tmp_path))
+    batch = BatchSimulation(ROBOT, TASK, RANDOMISED, worlds=7, seed=5)
+    with pytest.raises(ConfigError, match="python3-dev"):
+        CompiledStep(batch)(np.zeros((7, 2), dtype=np.float32), robot=ROBOT, task=TASK)
+
+
+@pytest.mark.slow
+def test_effort_is_the_only_cost_that_a_kernel_does_not_hold():
+    """A robot with other costs of its own is another robot: compiled anew, not judged by the old ones."""
+    dear = replace(ROBOT, costs=replace(ROBOT.costs, change=5.0))
+    assert_moves_as_in_numpy(dear, TASK, steps=3)
