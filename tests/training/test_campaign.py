@@ -160,11 +160,12 @@ def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path):
 
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     try:
-        cluster.add_node(num_cpus=1)
+        cluster.add_node(num_cpus=2)
         executor = RayExecutor(cluster.address)
         assert sum(node["Alive"] for node in ray.nodes()) == 2
         watched = []
         jobs = [with_seed(job, seed) for seed in (1, 2, JUDGE_SEED)]
+        jobs[1] = replace(jobs[1], settings=replace(job.settings, threads=3))  # which no machine here has
         told = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
         assert told["failed"] == 1
         assert "are kept for judging" in told["seeds"][2]["error"]
