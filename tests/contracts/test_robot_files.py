@@ -85,6 +85,13 @@ def test_its_safe_command_is_within_its_limits_and_moves_nothing(robot):
 
 
 @EACH
+def test_commands_of_many_worlds_stay_side_by_side_in_memory(robot):
+    """Interleaved ones would make a compiled step, which reads sixteen worlds at once, half as fast."""
+    commands = np.ones((len(robot.actuators.names), 5), dtype=np.float32)
+    assert np.asarray(robot.actuators.limited(commands.T)).T.flags.c_contiguous
+
+
+@EACH
 def test_full_commands_stay_full_and_nothing_goes_beyond(robot):
     commands = corners(robot)
     assert np.all(np.abs(commands) <= robot.actuators.scale + 1e-12)

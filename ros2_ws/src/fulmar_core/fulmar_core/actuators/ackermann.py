@@ -75,4 +75,5 @@ class Ackermann:
         speed, steering = within[..., 0], within[..., 1]
         grip = GRIP * self.friction * GRAVITY * self.wheelbase
         widest = xp.atan(grip / clip(speed * speed, 1e-6, None))
-        return xp.stack((speed, clip(steering, -widest, widest)), axis=-1)
+        both = xp.stack((speed, clip(steering, -widest, widest)))
+        return both.T if both.ndim == 2 else xp.moveaxis(both, 0, -1)  # worlds side by side in memory
