@@ -101,7 +101,9 @@ def test_without_a_compiler_nothing_is_compiled_and_whoever_asks_for_it_is_told(
     pytest.importorskip("torch")
     monkeypatch.setenv("CXX", "no-such-compiler")
     small = "--robots", "turtlebot2", "--worlds", "6", "--seconds", "0.05", "--cores", cores
-    assert json.loads(command(*small, "--json", library=None).stdout)["library"] == "numpy"
+    done = command(*small, "--json", library=None)
+    assert json.loads(done.stdout)["library"] == "numpy"
+    assert "nothing is compiled" in done.stderr
     assert "python3-dev" in str(command(*small, library="compiled").exception)
 
 

@@ -8,7 +8,7 @@ import typer
 from rich.table import Table
 
 from fulmar_bringup.commands.arguments import JsonOption, ScenarioOption, TaskOption
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import step_bar
 from fulmar_core.errors import ConfigError, UnknownNameError
 
@@ -105,11 +105,13 @@ def _fastest(device: str) -> str:
 
     if device != "cpu":
         return "torch"
-    if find_spec("torch") is None:
-        return "numpy"
-    from training.compiled import compiler_found
+    if find_spec("torch") is not None:
+        from training.compiled import compiler_found
 
-    return "compiled" if compiler_found() else "numpy"
+        if compiler_found():
+            return "compiled"
+    console.print("note: without torch and g++ nothing is compiled; NumPy computes the batch.")
+    return "numpy"
 
 
 def _check_device(device: str, library: str) -> None:
