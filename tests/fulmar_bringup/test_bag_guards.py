@@ -12,6 +12,7 @@ import pytest
 from fulmar_bringup.bags.cast import answers_of
 from fulmar_bringup.bags.contents import Bag, Topic, open_bag
 from fulmar_bringup.bags.course import Course, course_of
+from fulmar_bringup.bags.guarded import number_of
 from fulmar_bringup.bags.live_node import rerun_through_node
 from fulmar_bringup.bags.rerun import Answers, rerun
 from fulmar_core.controllers.classical import load_classical
@@ -199,3 +200,11 @@ def test_a_request_that_came_to_nothing_changes_nothing(bag):
 def test_guards_without_sense_are_refused(bag):
     with pytest.raises(BagError, match="guards"):
         course_of(guarded(bag, max_run_time_s="long"))
+
+
+@pytest.mark.parametrize("told", ["fast", [1.0], {"hz": 1.0}])
+def test_numbers_of_a_run_that_are_none_are_refused_in_one_line(told):
+    assert number_of({"rate": 2}, "rate", 1.0) == 2.0
+    assert number_of({}, "rate", 1.0) == 1.0
+    with pytest.raises(BagError, match=r"^what the bag says of its run makes no sense: rate: [^\n]*$"):
+        number_of({"rate": told}, "rate", 1.0)

@@ -74,8 +74,9 @@ def test_an_episode_that_ends_while_an_order_is_held_ends_with_it():
 def test_an_episode_that_ends_under_way_has_ended_also_if_the_last_step_says_nothing(monkeypatch):
     env = worlds(hold=3)
     env.reset()
+    seen = np.asarray(env.simulation.observe())
     over = iter([np.arange(16) == 4, np.arange(16) == 7, np.zeros(16, dtype=bool)])
-    monkeypatch.setattr(env, "_step", lambda: (np.zeros(16, dtype=np.float32), next(over)))
+    monkeypatch.setattr(env, "_step", lambda: (np.zeros(16, dtype=np.float32), next(over), seen))
     assert np.flatnonzero(env.step(ordered(AHEAD, AHEAD))[2]).tolist() == [4, 7]
 
 

@@ -18,7 +18,7 @@ from fulmar_bringup.bags.decode import (
     stamp_of,
     twist_vectors,
 )
-from fulmar_bringup.bags.guarded import begins_with_its_run, changes_of, limits_of, presses_of
+from fulmar_bringup.bags.guarded import begins_with_its_run, changes_of, limits_of, number_of, presses_of
 from fulmar_bringup.bags.plain_twist import answers_within, plain_commands
 from fulmar_bringup.bags.told import ABSENT, Told
 from fulmar_bringup.planning import PoseTuple
@@ -120,15 +120,19 @@ def course_of(
     if limits["max_run_time_s"] and not begins_with_its_run(info):
         limits["max_run_time_s"] = 0.0
         warnings.append("the bag begins within its run: whether max_run_time was over is not judged.")
-    settings = ControllerSettings(
-        robot=the_robot.name,
-        task=the_task.name,
-        control_hz=control_hz or float(info.get("control_hz") or 0.0),
-        lockstep=bool(info.get("lockstep")),
-        rate=float(info.get("rate") or 1.0),
-        goals_streamed=bool(info.get("goals")),
-        **limits,
-    )
+    hz, rate = control_hz or number_of(info, "control_hz", 0.0), number_of(info, "rate", 1.0)
+    try:
+        settings = ControllerSettings(
+            robot=the_robot.name,
+            task=the_task.name,
+            control_hz=hz,
+            lockstep=bool(info.get("lockstep")),
+            rate=rate,
+            goals_streamed=bool(info.get("goals")),
+            **limits,
+        )
+    except ValueError as error:
+        raise BagError(f"what the bag says of its run makes no sense: {error}") from error
     wire = command_wire(the_robot)
     names = the_robot.actuators.names
     read = twist_vectors if wire is VELOCITY_COMMAND else (lambda topic: joint_vectors(topic, "effort"))

@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_bringup.bags.contents import Bag, Topic, json_object, span_ns
 from fulmar_bringup.bags.decode import messages, stamps_ns
+from fulmar_bringup.bags.guarded import number_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
 from fulmar_core.topics import COMMAND, METADATA, ODOMETRY, VELOCITY_COMMAND
@@ -129,7 +130,7 @@ def _lateness(
     time goes faster, a delay has no meaning.
     """
     info = bag.info or {}
-    if stamps is None or period_ns is None or info.get("lockstep") or float(info.get("rate") or 1.0) != 1.0:
+    if stamps is None or period_ns is None or info.get("lockstep") or number_of(info, "rate", 1.0) != 1.0:
         return None, None
     delay_ns = (log_ns - stamps).astype(float)
     delay_ns -= delay_ns.min()

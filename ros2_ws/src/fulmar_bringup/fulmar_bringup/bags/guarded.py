@@ -44,6 +44,18 @@ def limits_of(info: Mapping[str, Any]) -> Limits:
         raise BagError(f"the guards that the bag names make no sense: {error}.") from error
 
 
+def number_of(info: Mapping[str, Any], name: str, default: float) -> float:
+    """What a bag says of its run as a number; `default` where it says nothing, or 0.
+
+    Raises:
+        BagError: It is no number.
+    """
+    try:
+        return float(info.get(name) or default)
+    except (TypeError, ValueError) as error:
+        raise BagError(f"what the bag says of its run makes no sense: {name}: {error}.") from error
+
+
 def begins_with_its_run(info: Mapping[str, Any]) -> bool:
     """Whether a bag holds its run from the beginning, and not just what was before a fault."""
     told = info.get("recording")
