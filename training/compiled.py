@@ -27,7 +27,7 @@ from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
 
-Moving = dict[str, Any]  # as of `BatchSimulation.moving`
+Moving = dict[str, Any]  # as of `Moves.moving`
 ObservedStep = Callable[..., tuple[Array, Array, Array]]  # `observed_step` of one batch
 
 _NO_COMPILER = (
@@ -67,7 +67,8 @@ class CompiledStep:
         )
         self._twin.step(torch.from_numpy(np.array(batch.command)))  # fills caches, which cannot be traced
         self._compiled = torch.compile(observed_step, fullgraph=True, dynamic=False)
-        self._asked: Robot | None = None  # as it is passed, and as torch sees it
+        self._asked: Robot | None = None  # as it was passed last,
+        self._judge = batch.robot  # and as torch sees that one
         self._arrays: Moving = {}  # of the batch, and of the twin, when both were last the same
         self._tensors: Moving = {}
 

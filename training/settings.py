@@ -204,7 +204,7 @@ class TrainingSettings:
     # Goals on the right are shown, and answered, as on the left; or, by `ends`, those behind as those ahead.
     mirror: Symmetry | None = None
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
-    compiled: bool = False  # whether steps of the worlds are compiled first, which half a minute goes into
+    compiled: bool = False  # whether steps of the worlds are compiled first
     coordinates: bool = False  # whether it is shown targets of a path by coordinates and legs too
     orders: Orders | None = None  # shares of full command without it
     course_reward: CourseReward | None = None  # the task's own without it

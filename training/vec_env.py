@@ -82,7 +82,8 @@ class BatchVecEnv(VecEnv):
             compiled: Steps are compiled (`training.compiled`).
 
         Raises:
-            ConfigError: The robot cannot be mirrored so, or takes no orders, or the task has no path.
+            ConfigError: The robot cannot be mirrored so, or takes no orders, or the task has no path, or there is no
+                compiler.
         """
         task = fitted(asked_for(task, scenario), robot)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale

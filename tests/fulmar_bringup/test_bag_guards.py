@@ -12,6 +12,7 @@ import pytest
 from fulmar_bringup.bags.cast import answers_of
 from fulmar_bringup.bags.contents import Bag, Topic, open_bag
 from fulmar_bringup.bags.course import Course, course_of
+from fulmar_bringup.bags.figures import describe
 from fulmar_bringup.bags.guarded import number_of
 from fulmar_bringup.bags.live_node import rerun_through_node
 from fulmar_bringup.bags.rerun import Answers, rerun
@@ -197,9 +198,10 @@ def test_a_request_that_came_to_nothing_changes_nothing(bag):
     assert course_of(told).changes == ()
 
 
-def test_guards_without_sense_are_refused(bag):
-    with pytest.raises(BagError, match="guards"):
-        course_of(guarded(bag, max_run_time_s="long"))
+@pytest.mark.parametrize("guards", [{"max_run_time_s": "long"}, {"area": [0.0, 0.0, 2.0, 0.0]}])
+def test_guards_without_sense_are_refused(bag, guards):
+    with pytest.raises(BagError, match=r"make(s)? no sense: [^\n]*$"):
+        course_of(guarded(bag, **guards))
 
 
 @pytest.mark.parametrize("told", ["fast", [1.0], {"hz": 1.0}])
@@ -208,3 +210,10 @@ def test_numbers_of_a_run_that_are_none_are_refused_in_one_line(told):
     assert number_of({}, "rate", 1.0) == 1.0
     with pytest.raises(BagError, match=r"^what the bag says of its run makes no sense: rate: [^\n]*$"):
         number_of({"rate": told}, "rate", 1.0)
+
+
+def test_a_rate_that_is_no_number_is_refused_by_whoever_looks_at_the_bag(bag):
+    damaged = replace(bag, info={**(bag.info or {}), "lockstep": False, "rate": "fast"})
+    for look in (describe, course_of):
+        with pytest.raises(BagError, match="rate"):
+            look(damaged)

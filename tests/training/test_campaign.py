@@ -151,22 +151,29 @@ def test_a_campaign_of_failures_has_no_best(job):
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path):
+def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path, monkeypatch):
     pytest.importorskip("ray", reason="the extra 'cluster' is not installed")
     import ray
     from ray.cluster_utils import Cluster
 
-    from training.ray_executor import RayExecutor
+    from training import ray_executor
 
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     try:
         cluster.add_node(num_cpus=2)
-        executor = RayExecutor(cluster.address)
+        executor = ray_executor.RayExecutor(cluster.address)
         assert sum(node["Alive"] for node in ray.nodes()) == 2
         watched = []
         jobs = [with_seed(job, seed) for seed in (1, 2, JUDGE_SEED)]
         jobs[1] = replace(jobs[1], settings=replace(job.settings, threads=3))  # which no machine here has
+        asked, options = [], ray_executor._work.options
+        monkeypatch.setattr(
+            ray_executor._work,
+            "options",
+            lambda num_cpus: asked.append(num_cpus) or options(num_cpus=num_cpus),
+        )
         told = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
+        assert asked == [1, 2, 1]  # a core for each thread, as far as the larger of both has them
         assert told["failed"] == 1
         assert "are kept for judging" in told["seeds"][2]["error"]
         assert told["best_seed"] in (1, 2)

@@ -57,6 +57,18 @@ def _beginnings(seed: int, stream: int, xp: Any, dtype: Any, where: Any) -> tupl
     return odd, start
 
 
+def keys_at(keys: Keys, index: Any) -> Keys:
+    """Those of some worlds."""
+    first, second = keys
+    return first[index], second[index]
+
+
+def write_keys(keys: Keys, index: Any, new: Keys) -> None:
+    """Overwrite those of some worlds in place."""
+    for every, some in zip(keys, new, strict=True):
+        every[index] = some
+
+
 def words(keys: Keys, counter: Array | int, count: int) -> Array:
     """Hash counters to words.
 

@@ -57,10 +57,10 @@ def learning_step(
     return reward, over if touching is None else over | touching
 
 
-def judged_step(
+def observed_step(
     simulation: BatchSimulation, command: Array, *, robot: Robot, task: Task
-) -> tuple[Array, Array]:
-    """Move a batch one control step, and judge it.
+) -> tuple[Array, Array, Array]:
+    """Move a batch one control step, judge it, and look.
 
     Args:
         simulation: The worlds.
@@ -69,11 +69,11 @@ def judged_step(
         task: Says what the step is worth.
 
     Returns:
-        As `learning_step`.
+        Reward and whether episodes are over, as `learning_step`, and what controllers see now, shape (worlds, k).
     """
     before, goal, previous = simulation.truth, simulation.goal, simulation.command
     simulation.step(command)
-    return learning_step(
+    reward, over = learning_step(
         robot,
         task,
         before=before,
@@ -83,13 +83,6 @@ def judged_step(
         previous=previous,
         command=simulation.command,
     )
-
-
-def observed_step(
-    simulation: BatchSimulation, command: Array, *, robot: Robot, task: Task
-) -> tuple[Array, Array, Array]:
-    """`judged_step`, and what controllers see after it, shape (worlds, n)."""
-    reward, over = judged_step(simulation, command, robot=robot, task=task)
     return reward, over, simulation.observe()
 
 

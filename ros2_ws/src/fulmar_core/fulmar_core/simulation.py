@@ -10,12 +10,13 @@ import numpy as np
 from array_api_compat import is_numpy_namespace
 
 from fulmar_core.arrays import array_namespace
-from fulmar_core.counter_rng import Keys, uniform_from, words, world_keys
+from fulmar_core.counter_rng import Keys, keys_at, uniform_from, words, world_keys, write_keys
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.episode import draw_episodes
 from fulmar_core.goal import Goal
 from fulmar_core.motion import actuation_of, control_step, longest_delay, may_be_off_centre, may_open_late
+from fulmar_core.moving import Moves
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
@@ -25,14 +26,10 @@ from fulmar_core.tasks import Task, fitted
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.upcoming import Beginning, UpcomingEpisodes
 
-_MOVING = (
-    "truth", "measured", "goal", "world", "command",
-    "_strength", "_repeats", "_steps", "_noise_keys",
-)  # fmt: skip
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
 
-class BatchSimulation:
+class BatchSimulation(Moves):
     """Worlds that step together; each is reset by itself.
 
     Attributes:
@@ -42,6 +39,11 @@ class BatchSimulation:
         command: What was last commanded, after every limit, shape (worlds, n).
         strength: How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-].
     """
+
+    MOVING = (
+        "truth", "measured", "goal", "world", "command",
+        "_strength", "_repeats", "_steps", "_noise_keys",
+    )  # fmt: skip
 
     truth: PlanarState
     measured: PlanarState
@@ -158,8 +160,7 @@ class BatchSimulation:
         self.truth.write(index, coming.start[index])
         self.goal.write(index, coming.goal[index])
         self.world.adopt(index, coming.world)
-        for every, new in zip(self._noise_keys, coming.noise_keys, strict=True):
-            every[index] = new[index]
+        write_keys(self._noise_keys, index, keys_at(coming.noise_keys, index))
         self._actuation.reset(index, self._safe[:, :1])
         self.command = self._xp.asarray(self.command, copy=True)
         self.command[index] = self._safe[:, 0]
@@ -201,14 +202,13 @@ class BatchSimulation:
         self._measure()
 
     def moving(self) -> dict[str, Any]:
-        """Everything that moves, by name: arrays, what is made of arrays, and numbers; not copied."""
-        own = {name: getattr(self, name) for name in _MOVING}
-        return own | {"_actuation": self._actuation.moving(), "_odometer": self._odometer.moving()}
+        """As `Moves.moving`, with what moves of actuators and odometer as dictionaries of their own."""
+        parts = {"_actuation": self._actuation.moving(), "_odometer": self._odometer.moving()}
+        return super().moving() | parts
 
     def take(self, moving: dict[str, Any]) -> None:
-        """Go on from what `moving` told of worlds that were built alike; not copied."""
-        for name in _MOVING:
-            setattr(self, name, moving[name])
+        """As `Moves.take`."""
+        super().take(moving)
         self._actuation.take(moving["_actuation"])
         self._odometer.take(moving["_odometer"])
 

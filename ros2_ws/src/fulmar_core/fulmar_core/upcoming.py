@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.counter_rng import Keys
+from fulmar_core.counter_rng import Keys, write_keys
 from fulmar_core.disturbances.world import World
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
@@ -30,8 +30,7 @@ class Beginning:
         self.start.write(index, other.start)
         self.goal.write(index, other.goal)
         self.world.write(index, other.world)
-        for every, new in zip(self.noise_keys, other.noise_keys, strict=True):
-            every[index] = new
+        write_keys(self.noise_keys, index, other.noise_keys)
         self.reading.write(index, other.reading)
 
 

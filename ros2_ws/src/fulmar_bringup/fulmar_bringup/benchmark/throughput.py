@@ -3,8 +3,7 @@
 Both are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
 count. A step of the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward
 and, where episodes end, new ones; worlds are shared out among processes. It is compiled (`training.compiled`), or
-carried out array by array. A step of MuJoCo (`mujoco_pace`) is its
-physics alone, over the same control period.
+carried out array by array. A step of MuJoCo (`mujoco_pace`) is its physics alone, over the same control period.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def throughput(
     A step of the batch has all that training asks for: disturbances, odometry, observation, reward and new episodes.
     MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
     the medians are printed. Robots on water are also rolled out by MuJoCo in the water of the plant ("in water").
-    Before that a step of each robot is compiled, which takes about 20 s.
+    Before that a step of each robot is compiled, which takes 10 to 30 s.
 
     Try:
 

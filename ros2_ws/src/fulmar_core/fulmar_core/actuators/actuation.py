@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from array_api_compat import device
 
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.disturbances.world import World
+from fulmar_core.moving import Moves
 from fulmar_core.rotation import Array
 
-_MOVING = ("_before", "_wanted", "applied", "gain", "_since_s", "_late", "_open_late")
 
-
-class ActuationState:
+class ActuationState(Moves):
     """What the actuators of a batch of worlds do now; actuators first, worlds last."""
+
+    MOVING = ("_before", "_wanted", "applied", "gain", "_since_s", "_late", "_open_late")
 
     def __init__(
         self,
@@ -47,15 +46,6 @@ class ActuationState:
         if response.slew:
             xp = array_namespace(safe)
             self._slew = xp.asarray(response.slew, dtype=safe.dtype, device=device(safe))[:, None]
-
-    def moving(self) -> dict[str, Any]:
-        """What steps change, by name; not copied."""
-        return {name: getattr(self, name) for name in _MOVING}
-
-    def take(self, moving: dict[str, Any]) -> None:
-        """Go on from what `moving` told; not copied."""
-        for name in _MOVING:
-            setattr(self, name, moving[name])
 
     def reset(self, which: Array, safe: Array) -> None:
         """Bring some worlds back to the safe state.

@@ -89,7 +89,10 @@ class World:
             getattr(self, name)[..., index] = getattr(other, name)
 
     def adopt(self, index: Any, other: World) -> None:
-        """Overwrite some worlds by the same ones of another batch, in place; both are packed."""
+        """Overwrite some worlds by the same ones of another batch, in place; both are packed.
+
+        Worlds that were picked out first, for `write`, cost a view of each field, which takes longer than the copy.
+        """
         assert self._packing is not None and other._packing is not None
         self._packing[0][..., index] = other._packing[0][..., index]
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from array_api_compat import device
 
 from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.counter_rng import NOISE, Keys, normal_from, uniform_from, words, world_keys
+from fulmar_core.counter_rng import (
+    NOISE,
+    Keys,
+    keys_at,
+    normal_from,
+    uniform_from,
+    words,
+    world_keys,
+    write_keys,
+)
 from fulmar_core.disturbances.world import World
-from fulmar_core.planar import PlanarState
+from fulmar_core.moving import Moves
+from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.rotation import Array
-
-_MOVING = ("_past", "_held", "_keys")
 
 
 @dataclass(frozen=True)
@@ -69,12 +76,13 @@ class FirstReading:
     def write(self, index: Array, other: FirstReading) -> None:
         """Overwrite some worlds in place."""
         self.columns[:, index] = other.columns
-        for every, new in zip(self.keys, other.keys, strict=True):
-            every[index] = new
+        write_keys(self.keys, index, other.keys)
 
 
-class Odometer:
+class Odometer(Moves):
     """Measures a batch of worlds, once every `period` seconds; remembers what it held back."""
+
+    MOVING = ("_past", "_held", "_keys")
 
     def __init__(
         self,
@@ -107,15 +115,6 @@ class Odometer:
         self._past: list[Array] = []  # readings, newest first
         self._held: Array | None = None
         self._keys: Keys | None = None
-
-    def moving(self) -> dict[str, Any]:
-        """What measurements change, by name; not copied."""
-        return {name: getattr(self, name) for name in _MOVING}
-
-    def take(self, moving: dict[str, Any]) -> None:
-        """Go on from what `moving` told; not copied."""
-        for name in _MOVING:
-            setattr(self, name, moving[name])
 
     def measure(
         self,
@@ -153,7 +152,7 @@ class Odometer:
         if self._held is not None:
             reading = xp.where(lost & (steps != 0), self._held, reading)
         self._held = reading
-        return PlanarState(*(reading[i] for i in range(6)))
+        return _state(reading)
 
     def first(self, truth: PlanarState, world: World, numbers: Array, repeats: Array) -> FirstReading:
         """First measurement of episodes that are to begin; arguments as in `measure`. Changes nothing."""
@@ -177,13 +176,12 @@ class Odometer:
         if self._perfect:
             return truth
         assert self._held is not None and self._keys is not None
-        for every, new in zip(self._keys, first.keys, strict=True):
-            every[which] = new[which]
+        write_keys(self._keys, which, keys_at(first.keys, which))
         # Who was given readings keeps them; what is still under way nobody was given.
         self._held = array_namespace(self._held).asarray(self._held, copy=True)
         for old in (self._held, *self._past):
             old[:, which] = first.columns[:, which]
-        return PlanarState(*(self._held[i] for i in range(6)))
+        return _state(self._held)
 
     @property
     def _perfect(self) -> bool:
@@ -244,5 +242,9 @@ class Odometer:
 
 def _columns(state: PlanarState) -> Array:
     """What is measured, shape (6, n)."""
-    parts = state.x, state.y, state.yaw, state.vx, state.vy, state.yaw_rate
-    return array_namespace(state.x).stack(parts)
+    return array_namespace(state.x).stack([getattr(state, name) for name in COLUMNS])
+
+
+def _state(columns: Array) -> PlanarState:
+    """The state of such columns; its arrays are their rows."""
+    return PlanarState(*(columns[i] for i in range(len(COLUMNS))))

@@ -1,0 +1,20 @@
+"""What of an object steps change: to be copied, to be resumed from, or to be lent to another library's arrays."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+
+class Moves:
+    """Something that steps, and tells by name what they change: arrays, what is made of arrays, and numbers."""
+
+    MOVING: ClassVar[tuple[str, ...]]
+
+    def moving(self) -> dict[str, Any]:
+        """Everything that steps change, by name; not copied."""
+        return {name: getattr(self, name) for name in self.MOVING}
+
+    def take(self, moving: dict[str, Any]) -> None:
+        """Go on from what `moving` told of one that was built alike; not copied."""
+        for name in self.MOVING:
+            setattr(self, name, moving[name])
