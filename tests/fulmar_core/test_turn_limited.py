@@ -169,8 +169,8 @@ def steered(robot: str, waypoints, *, gain: float, slow: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("robot", "least"), [("turtlebot2", 0.65), ("kingfisher", 0.15)])
 def test_no_steering_beats_the_bound(robot, least):
-    waypoints = courses(8, seed=4)
-    most = bound(waypoints, 60.0, motions_of(load_robot(robot)), start_yaw=np.zeros(8)).goals
+    waypoints = courses(4, seed=4)
+    most = bound(waypoints, 60.0, motions_of(load_robot(robot)), start_yaw=np.zeros(4)).goals
     tracks = [steered(robot, waypoints, gain=2.0, slow=slow) for slow in (0.5, 1.0)]
     best = np.max([goals_reached(track, waypoints, radius=RADIUS) for track in tracks], axis=0)
     assert np.all(best <= most)

@@ -17,6 +17,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
 from fulmar_core.errors import BagError
+from fulmar_ros.bag_metadata import read_information
 from fulmar_ros.bag_recovery import recover
 from fulmar_ros.bag_thread import BagThread
 from fulmar_ros.bag_types import type_store
@@ -261,3 +262,9 @@ def test_recovery_of_a_whole_bag_changes_no_message(tmp_path):
     assert recover(tmp_path / "bag") == ()
     assert_readable(tmp_path / "bag", 100)
     assert len(list((tmp_path / "bag").iterdir())) == 2
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "- " * 100_000, "rosbag2_bagfile_information: [1", "- 1"])
+def test_metadata_that_cannot_be_read_tells_nothing(tmp_path, text):
+    (tmp_path / "metadata.yaml").write_text(text)
+    assert read_information(tmp_path) == {}

@@ -123,7 +123,9 @@ def test_a_recorder_that_cannot_begin_is_the_failure(ros_domain: RosDomain, tmp_
     assert "[recorder] " in done.stderr
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow), signal.SIGKILL]
+)
 def test_an_evaluation_that_is_told_to_stop_leaves_nobody_behind(
     number: signal.Signals, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -140,6 +142,7 @@ def test_an_evaluation_that_is_told_to_stop_leaves_nobody_behind(
         assert "Traceback" not in err
 
 
+@pytest.mark.slow
 def test_the_first_failure_of_an_evaluation_ends_it(ros_domain: RosDomain, tmp_path: Path) -> None:
     """The other share is not waited for."""
     run = start_evaluation(ros_domain, tmp_path)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar
 
 
+@pytest.mark.slow
 def test_a_path_through_ros_gives_the_figures_of_mujoco(ros_domain: RosDomain, tmp_path: Path) -> None:
     words = (
         "benchmark drift --rows circle --controllers lqr --episodes 2 --no-report --json --jobs 1 --through"

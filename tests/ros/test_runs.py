@@ -117,8 +117,8 @@ def test_go_to_position_runs_on_its_own_goal_topic(ros_domain: RosDomain, tmp_pa
     [
         ("turtlebot2", "go_through_positions", "goals_reached"),
         ("kingfisher", "go_to_position_with_obstacles", "final_position_error_m"),
-        ("leatherback", "track_velocities", "velocity_error_m_s"),
-        ("modular_freeflyer", "go_through_poses", "goals_reached"),
+        pytest.param("leatherback", "track_velocities", "velocity_error_m_s", marks=pytest.mark.slow),
+        pytest.param("modular_freeflyer", "go_through_poses", "goals_reached", marks=pytest.mark.slow),
     ],
 )
 def test_every_kind_of_goal_and_robot_runs_and_is_judged(
@@ -197,6 +197,7 @@ def test_evaluation_through_ros_agrees_with_mujoco_alone(ros_domain: RosDomain, 
     assert through_ros["AAS"] == alone["AAS"]
 
 
+@pytest.mark.slow
 def test_a_path_is_followed_the_same_way_twice_in_lock_step(ros_domain: RosDomain, tmp_path: Path) -> None:
     """A goal node between odometry and command: the controller waits for what it says to each state."""
     asked = ("turtlebot2", "--controller", "classical", "--goals", "circle", "--lockstep", "--duration", "12")

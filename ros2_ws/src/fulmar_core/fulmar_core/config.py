@@ -19,6 +19,7 @@ import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.yaml_text import TooDeep, compose
 
 T = TypeVar("T")
 MOST_BYTES, MOST_VALUES = 1_000_000, 100_000  # of a file; anything beyond is no configuration
@@ -53,14 +54,14 @@ def _compose(path: Path) -> Node:
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not UTF-8 text (byte {error.start}).") from error
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        root = compose(text)
+    except TooDeep as error:
+        raise ConfigError(f"{path}: {error}.") from error
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise ConfigError(f"{path}:{line}: not valid YAML: {error.problem or error.context}.") from error
     except yaml.YAMLError as error:
         raise ConfigError(f"{path}: not valid YAML: {_one_line(error)}.") from error
-    except RecursionError as error:
-        raise ConfigError(f"{path}: is nested too deeply.") from error
     if root is None:
         raise ConfigError(f"{path}:1: the file is empty.")
     return root

@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from fulmar_core import yaml_text
 from fulmar_ros.bag_file import sync_folder
 
 METADATA_FILE = "metadata.yaml"
@@ -89,7 +90,7 @@ def write_metadata(
 def read_information(directory: Path) -> dict[str, Any]:
     """What the `metadata.yaml` of a folder tells, empty where there is none that can be read."""
     try:
-        found = yaml.safe_load((directory / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
+        found = yaml_text.load((directory / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}

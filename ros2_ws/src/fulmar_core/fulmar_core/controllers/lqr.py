@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
 from fulmar_core.controllers.reach import Reach
+from fulmar_core.controllers.riccati import regulator
 from fulmar_core.controllers.seen import Vector
 from fulmar_core.controllers.situation import Situation, Watch, raw_situation
 from fulmar_core.controllers.valve_allocation import ValveAllocation
@@ -133,10 +133,9 @@ class Lqr(Law):
             [3, 4, 5] if self.reader.tracks else [0, 1, 2, 3, 4, 5] if self.reader.heads else [0, 1, 3, 4, 5]
         )
         a, b = a[np.ix_(used, used)], b[used]
-        p = solve_discrete_are(a, b, dt * np.diag(q[used]), r)
-        self.cost_to_go = p
-        self._hessian = hessian = r + b.T @ p @ b
-        self.gain = np.linalg.solve(hessian, b.T @ p @ a)
+        best = regulator(a, b, dt * np.diag(q[used]), r)
+        self.cost_to_go, self.gain = best.cost_to_go, best.gain
+        self._hessian = hessian = best.hessian
         allocation = OpeningAllocation if robot.actuators.continuous else ValveAllocation
         self.reach = Reach(robot.actuators)
         # How far from the goal the law asks for 1 m/s [s].

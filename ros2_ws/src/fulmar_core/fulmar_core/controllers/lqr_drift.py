@@ -37,10 +37,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.riccati import regulator
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import wrap_angle
 from fulmar_core.tasks import Task
@@ -87,6 +87,7 @@ class LqrDrift(Law):
             raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")
         self._valves, self._weights = robot.actuators, gains
         self._known: dict[tuple[int, int], np.ndarray] = {}
+        self._gain(0, 0)  # the first takes longest, and nothing moves yet
 
     def reset(self) -> None:
         """Forget the heading."""
@@ -138,8 +139,7 @@ class LqrDrift(Law):
         if (heading, rate) not in self._known:
             a, b = self.model(heading * SAME_HEADING, rate * SAME_RATE)
             r = self._weights.input * np.eye(b.shape[1])
-            p = solve_discrete_are(a, b, np.diag(self._weights.states), r)
-            self._known[heading, rate] = np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a)
+            self._known[heading, rate] = regulator(a, b, np.diag(self._weights.states), r).gain
         return self._known[heading, rate]
 
     def model(self, yaw: float, rate: float) -> tuple[np.ndarray, np.ndarray]:
