@@ -60,7 +60,7 @@ def test_looking_around_loads_neither_ros_nor_torch_nor_a_simulator():
         "from fulmar_bringup import cli\n"
         "try: cli.main()\n"
         "except SystemExit: pass\n"
-        "heavy = {'rclpy', 'torch', 'mujoco', 'onnxruntime', 'matplotlib'} & set(sys.modules)\n"
+        "heavy = {'rclpy', 'torch', 'mujoco', 'onnxruntime', 'matplotlib', 'scipy'} & set(sys.modules)\n"
         "sys.exit(f'loaded {heavy}' if heavy else 0)\n"
     )
     done = subprocess.run(

@@ -27,10 +27,15 @@ def compose(text: str) -> Node | None:
     """The nodes of a document, None if it is empty.
 
     Raises:
-        yaml.YAMLError: It is no YAML, or `TooDeep`.
+        yaml.YAMLError: It is no YAML, told with the line as PyYAML's own reader has it, or `TooDeep`.
     """
-    _check_depth(text)
-    root: Node | None = yaml.compose(text, Loader=_LOADER)
+    try:
+        _check_depth(text)
+        root: Node | None = yaml.compose(text, Loader=_LOADER)
+    except TooDeep:
+        raise
+    except yaml.YAMLError:
+        return yaml.compose(text, Loader=yaml.SafeLoader)  # it knows better what was amiss, and where
     return root
 
 
@@ -41,7 +46,11 @@ def load(text: str) -> Any:
         yaml.YAMLError: It is no YAML, or `TooDeep`.
     """
     _check_depth(text)
-    return yaml.load(text, Loader=_LOADER)
+    loader = _LOADER(text)
+    try:
+        return loader.get_single_data()
+    finally:
+        loader.dispose()
 
 
 def _check_depth(text: str) -> None:
