@@ -22,7 +22,7 @@ FILE_CHIP = "file://"  # an address that begins so names a file with one byte a 
 class LineRequest(Protocol):
     """What libgpiod gives who has asked for lines (the part of `gpiod.LineRequest` that is used)."""
 
-    def set_values(self, values: Mapping[int | str, Value]) -> None:
+    def set_values(self, values: dict[int | str, Value]) -> None:
         """Make lines active or inactive; what that means at the pin was settled when they were asked for."""
         ...
 
@@ -54,7 +54,9 @@ def output_lines(
     settings = gpiod.LineSettings(
         direction=Direction.OUTPUT, active_low=active_low, output_value=Value.INACTIVE
     )
-    request: RequestLines = request_of_file if address.startswith(FILE_CHIP) else gpiod.request_lines
+    request: RequestLines = gpiod.request_lines
+    if address.startswith(FILE_CHIP):
+        request = request_of_file
     until = time.monotonic() + patience_s
     while True:
         try:
@@ -94,7 +96,7 @@ class FileLines:
         self._offsets = {line: offset for offset, line in enumerate(self._settings)}
         self.set_values({line: settings.output_value for line, settings in self._settings.items()})
 
-    def set_values(self, values: Mapping[int | str, Value]) -> None:
+    def set_values(self, values: dict[int | str, Value]) -> None:
         """See `LineRequest`."""
         for line, value in values.items():
             active = value is Value.ACTIVE

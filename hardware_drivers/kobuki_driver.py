@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.slowdown import slowdown
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
@@ -47,7 +48,8 @@ class KobukiDriver:
         Raises:
             DeviceError: Nothing is there, or it does not speak Kobuki's protocol.
         """
-        self.robot = robot
+        assert isinstance(robot.actuators, DifferentialDrive)  # settings refuse any other
+        self.robot, self._wheels = robot, robot.actuators
         self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
@@ -68,7 +70,7 @@ class KobukiDriver:
         start = episode.start
         self._begin = (float(start.x), float(start.y), float(start.yaw))  # taken by the reading thread
         deadline = time.monotonic() + 1.0
-        while self._begin is not None and time.monotonic() < deadline:
+        while self._awaits_report() and time.monotonic() < deadline:
             time.sleep(0.002)
         return self.step(self.robot.actuators.safe_command)
 
@@ -109,6 +111,9 @@ class KobukiDriver:
             "warning": warning,
         }
 
+    def _awaits_report(self) -> bool:
+        return self._begin is not None
+
     def _send(self, command: np.ndarray) -> np.ndarray:
         """Send what is allowed of a command, shape (2,), and return it."""
         self._sent = self._allowed(np.asarray(command, dtype=float))
@@ -135,7 +140,7 @@ class KobukiDriver:
         begin, stamp_ns = self._begin, self._time.stamp_ns(core.time_ms, now_ns)
         if begin is not None:
             self._odometry.begin(*begin)
-        rims = self.robot.actuators.wheel_speeds(self._sent) * WHEEL_RADIUS
+        rims = self._wheels.wheel_speeds(self._sent) * WHEEL_RADIUS
         if problem := self._standing.problem(rims, np.array((core.left, core.right)), stamp_ns / 1e9):
             self._feedback.fail(problem)
         rate = math.radians(inertia.rate)

@@ -61,7 +61,7 @@ def packet(payload: bytes) -> bytes:
     return HEAD + body + bytes([checksum(body)])
 
 
-def checksum(body: bytes) -> int:
+def checksum(body: bytes | bytearray) -> int:
     """Exclusive or of all bytes."""
     total = 0
     for byte in body:

@@ -33,9 +33,8 @@ class MockBackend:
             *(np.array([getattr(start, name)], dtype=float) for name in PlanarState.__slots__)
         )
         self._place = np.array(episode.goal.block, dtype=float)
-        sample = self._sample()
-        self._world.reset(episode, sample.odometry, seed=seed, number=number)
-        return sample
+        self._world.reset(episode, rigid_of(self._state[0]), seed=seed, number=number)
+        return self._sample()
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Apply a command; see `Backend.step`."""

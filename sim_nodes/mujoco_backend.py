@@ -73,13 +73,13 @@ class MujocoBackend:
         """
         model, data, machine, world = self.model, self.data, self._scene.machine, self._world
         world.begin(np.asarray(command, dtype=float), ticks, self._truth)
-        outside = tuple(float(part[0]) for part in world.outside)
+        fx, fy, torque = (float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
         doing = None
         for _ in range(ticks):
             applied = world.actuation.advance(dt, latest_s=world.latest_s)
             if applied is not doing or not machine.steady:
-                machine.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
+                machine.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], (fx, fy, torque))
                 doing = applied
             mujoco.mj_step(model, data, machine.steps_per_tick)
         if not np.isfinite(data.qpos).all():

@@ -10,6 +10,7 @@ import numpy as np
 from fulmar_core.counter_rng import uniform_from, words, world_keys
 from fulmar_core.disturbances.outside import outside_wrench, push_is_constant
 from fulmar_core.disturbances.world import FIELDS, World
+from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of
 from fulmar_core.planar import PlanarState, planar_of
@@ -58,7 +59,7 @@ class OneWorld:
         late = self.world.action_delay[0] + self.world.opening_delay[0]
         response = self._robot.actuators.response
         self.latest_s = float(response.delay_s + response.opening_delay_s + late)
-        self.outside = tuple(np.zeros(1) for _ in range(3))
+        self.outside: Wrench = np.zeros(1), np.zeros(1), np.zeros(1)
         self._constant_push = push_is_constant(self.world)
         self._blurred = bool(self.world.velocity_noise[0] or self.world.yaw_rate_noise[0])
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
@@ -102,7 +103,7 @@ class OneWorld:
         """What the odometry reports now; called once for each `begin`, at its end."""
         return self._measure(truth)
 
-    def _push(self, truth: RigidBodyState, ticks: int) -> tuple[np.ndarray, ...]:
+    def _push(self, truth: RigidBodyState, ticks: int) -> Wrench:
         dt = self._robot.timing.physics_dt
         return outside_wrench(planar_of(truth)[None], self.world, np.array([self._ticks * dt]), ticks * dt)
 

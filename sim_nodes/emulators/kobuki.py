@@ -93,7 +93,8 @@ class KobukiEmulator:
         self._link.close()
 
     def _payloads(self) -> list[bytes]:
-        found, pending = [], self._pending
+        found: list[bytes] = []
+        pending = self._pending
         while True:
             start = pending.find(b"\xaa\x55")
             if start < 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
@@ -37,6 +38,7 @@ class Floater:
 
     def __init__(self, robot: Robot) -> None:
         """Prepare for `add`."""
+        assert isinstance(robot.actuators, Thrusters | Propellers)  # `machine_of` has others for wheels
         self._robot, self._actuators = robot, robot.actuators
         self._body = 0
         self._planar, self._swims = robot.body.planar, robot.hydrodynamics is not None

@@ -63,11 +63,13 @@ def add_hull(
         ahead: Of the outline's centre, ahead of the body's origin [m].
     """
     half = 0.5 * (high - low)
-    box = footprint is not None
+    shape, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [radius, half, 0.0]
+    if footprint is not None:
+        shape, size = mujoco.mjtGeom.mjGEOM_BOX, [0.5 * footprint[0], 0.5 * footprint[1], half]
     body.add_geom(
         name="hull",
-        type=mujoco.mjtGeom.mjGEOM_BOX if box else mujoco.mjtGeom.mjGEOM_CYLINDER,
-        size=[0.5 * footprint[0], 0.5 * footprint[1], half] if box else [radius, half, 0.0],
+        type=shape,
+        size=size,
         pos=[ahead, 0.0, 0.5 * (low + high)],
         rgba=HULL_COLOUR,
         mass=0.0,

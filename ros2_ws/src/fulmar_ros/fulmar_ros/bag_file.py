@@ -9,10 +9,11 @@ from __future__ import annotations
 import errno
 import os
 from pathlib import Path
+from typing import IO, Any, cast
 
 from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
-from mcap.writer import MCAP0_MAGIC
+from mcap.writer import MCAP0_MAGIC, Writer
 
 
 def _provisional_end() -> bytes:
@@ -39,8 +40,13 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
+def mcap_writer(file: BagFile, **options: Any) -> Writer:
+    """A writer with the options of `mcap.writer.Writer`, which asks its stream for no more than this file has."""
+    return Writer(cast(IO[Any], file), **options)
+
+
 class BagFile:
-    """What `mcap.writer.Writer` writes to; bytes wait in memory until `flush`.
+    """What `mcap_writer` writes to; bytes wait in memory until `flush`.
 
     It has its name from the first flush on: nobody finds a file that readers refuse because nothing is in it yet.
     """

@@ -12,10 +12,9 @@ import yaml
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
-from mcap.writer import Writer
 
 from fulmar_core.topics import Delivery
-from fulmar_ros.bag_file import BagFile
+from fulmar_ros.bag_file import BagFile, mcap_writer
 from fulmar_ros.bag_metadata import BagSpan
 from fulmar_ros.bag_types import MessageType, offered_qos
 
@@ -46,7 +45,7 @@ class BagPart:
         """
         self.name = path.name
         self._file = BagFile(path)
-        self._mcap = Writer(self._file, chunk_size=CHUNK_BYTES)
+        self._mcap = mcap_writer(self._file, chunk_size=CHUNK_BYTES)
         self._mcap.start(profile=Profile.ROS2, library="fulmar")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}

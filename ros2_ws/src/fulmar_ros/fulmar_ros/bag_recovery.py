@@ -10,10 +10,9 @@ from pathlib import Path
 import yaml
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.well_known import Profile
-from mcap.writer import Writer
 
 from fulmar_core.errors import BagError
-from fulmar_ros.bag_file import BagFile, sync_folder
+from fulmar_ros.bag_file import BagFile, mcap_writer, sync_folder
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, read_custom, write_metadata
 from fulmar_ros.bag_records import bag_files, plain_name, read_records
 
@@ -95,7 +94,7 @@ class _Copy:
     def __init__(self, path: Path) -> None:
         self.custom: dict[str, str] = {}
         self._file = BagFile(path)
-        self._mcap = Writer(self._file)
+        self._mcap = mcap_writer(self._file)
         self._mcap.start(profile=Profile.ROS2, library="fulmar")
         self._schemas: dict[int, tuple[int, str]] = {0: (0, "")}  # number there: number here and name
         self._channels: dict[int, tuple[int, str, Channel]] = {}

@@ -171,7 +171,8 @@ class ControllerInputs:
         """How the robot is outside its area right now; empty if it is not, or if nobody knows."""
         if self.newest is None:
             return ""
-        return outside(*self.newest.state.position_in_world[:2].tolist(), self._settings.area)
+        x, y = self.newest.state.position_in_world[:2].tolist()
+        return outside(x, y, self._settings.area)
 
     def _change(self, **changes: object) -> None:
         self._flags = dataclasses.replace(self._flags, **changes)  # type: ignore[arg-type]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Path
@@ -12,7 +14,7 @@ from fulmar_core.rotation import from_yaw
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.message_reader import BODY_FRAME, FRAME
 
-GoalMessage = PointStamped | PoseStamped | Path | TwistStamped
+GoalMessage: TypeAlias = PointStamped | PoseStamped | Path | TwistStamped
 TYPES: dict[str, type] = {
     "goal_point": PointStamped,
     "goal_pose": PoseStamped,

@@ -70,7 +70,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
 
     set_up_middleware()
     try:
-        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=None if argv is None else list(argv), signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot read
         sys.stderr.write(f"the ROS arguments on the command line are wrong: {str(error).splitlines()[0]}\n")
         return BAD_USAGE
