@@ -48,7 +48,7 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
     driver = hardware.driver
     if isinstance(driver, GpioValves):
         pins = folder / "gpio"
-        more = {"order": list(driver.order), "active_low": driver.active_low}
+        more: dict[str, bool | list[int]] = {"order": list(driver.order), "active_low": driver.active_low}
         return Emulation("valves", str(pins), f"file://{pins}", more)
     if isinstance(driver, MavlinkBoat):
         number = _free_port(socket.SOCK_DGRAM)

@@ -100,11 +100,14 @@ class Supervisor:
         """
         self.give_obstacles(goal, time_ns=time_ns, alive=alive)
         for part, stamp in self._timed(goal, time_ns):
-            echo = str(stamp)
             self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
-            self.wait_until(lambda echo=echo: self.controller.values.get("goal_stamp_ns") == echo, alive)
+            self.wait_until(self._knows(stamp), alive)
         told = [wire for wire in (self._goal, self._obstacles) if wire is not None]
         self.wait_until(lambda: all(wire.get_subscription_count() >= listeners for wire in told), alive)
+
+    def _knows(self, stamp_ns: int) -> Callable[[], bool]:
+        """Whether the controller says that it has the goal of a time."""
+        return lambda: self.controller.values.get("goal_stamp_ns") == str(stamp_ns)
 
     def give_obstacles(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
         """The obstacles alone, if the task has any; arguments as of `give_goal`."""

@@ -33,7 +33,9 @@ class ControllerSettings:
     trusted_keys: str = ""  # file or folder of public keys: no bundle runs that none of them has signed
     estop: bool = False  # nothing moves before an e-stop is heard
     max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
-    area: tuple[float, ...] = NO_AREA  # x_min, x_max, y_min, y_max that the robot must not leave [m]
+    area: tuple[float, float, float, float] = (
+        NO_AREA  # x_min, x_max, y_min, y_max that the robot must not leave [m]
+    )
     overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
     odometry_may_repeat: bool = False  # to the last bit, while the robot stands: that of encoders does
     copies: int = 1  # of each command, within its period; in real time only

@@ -168,11 +168,11 @@ def _numbers(
     if not left or not paths:
         return []
     nothing = float("nan")
-    tables = [
+    one, other = (
         np.array([[float(row.get(path, nothing)) for path in paths] for row in found])
         for found in (left, right)
-    ]
-    return compare("", paths, *tables, stamps, tolerance)
+    )
+    return compare("", paths, one, other, stamps, tolerance)
 
 
 def _pairs(first: list[int], second: list[int]) -> tuple[list[tuple[int, int]], int, int]:

@@ -23,7 +23,7 @@ class Limits(TypedDict):
     fallback: str
     estop: bool
     max_run_time_s: float
-    area: tuple[float, ...]
+    area: tuple[float, float, float, float]
 
 
 def limits_of(info: Mapping[str, Any]) -> Limits:
@@ -34,11 +34,12 @@ def limits_of(info: Mapping[str, Any]) -> Limits:
     """
     told = info.get("guards") or {}
     try:
+        x_min, x_max, y_min, y_max = (float(side) for side in told.get("area") or NO_AREA)
         return Limits(
             fallback=str(told.get("fallback") or ""),
             estop=bool(told.get("estop")),
             max_run_time_s=float(told.get("max_run_time_s") or 0.0),
-            area=tuple(float(side) for side in told.get("area") or NO_AREA),
+            area=(x_min, x_max, y_min, y_max),
         )
     except (AttributeError, TypeError, ValueError) as error:
         raise BagError(f"the guards that the bag names make no sense: {error}.") from error

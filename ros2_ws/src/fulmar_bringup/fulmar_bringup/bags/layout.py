@@ -38,7 +38,7 @@ def unreadable(kind: str, data: Sequence[bytes]) -> list[int]:
         return []
     walk = _walk_through(kind, data[0])
     alike = _alike(walk, data) if walk else np.zeros(len(data), dtype=bool)
-    return [int(i) for i in np.flatnonzero(~alike) if not _readable(kind, data[i])]
+    return [i for i in np.flatnonzero(~alike).tolist() if not _readable(kind, data[i])]
 
 
 def _readable(kind: str, data: bytes) -> bool:

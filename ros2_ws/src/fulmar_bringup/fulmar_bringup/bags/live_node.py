@@ -136,6 +136,18 @@ class _Heard:
     metadata: dict[str, Any] = field(default_factory=dict)
     error: Exception | None = None
 
+    def command_to(self, stamp_ns: int) -> Callable[[], bool]:
+        """Whether there is a command to the odometry of a time."""
+        return lambda: stamp_ns in self.commands
+
+    def reasons_for(self, stamp_ns: int) -> Callable[[], bool]:
+        """Whether there are the observation and the action behind that command."""
+        return lambda: stamp_ns in self.observations and stamp_ns in self.actions
+
+    def echo_of(self, name: str, stamp_ns: int) -> Callable[[], bool]:
+        """Whether the status names a time."""
+        return lambda: self.status.get(name) == str(stamp_ns)
+
 
 def _exchange(raw: dict[str, list[bytes]], course: Course, group: ProcessGroup) -> tuple[Answers, str | None]:
     set_up_middleware()
@@ -247,15 +259,12 @@ def _feed(
                 )
             wires.odometry.publish(data)
             with heard.changed:
-                answered = heard.changed.wait_for(lambda stamp=stamp: stamp in heard.commands, RESEND_S)
+                answered = heard.changed.wait_for(heard.command_to(stamp), RESEND_S)
             if not answered and group.ended() is not None:
                 wait(lambda: False, 0.0, "ended")
         expects = bool(course.acted[step])
         with heard.changed:
-            both = heard.changed.wait_for(
-                lambda stamp=stamp: stamp in heard.observations and stamp in heard.actions,
-                REASONING_S if expects else 0.0,
-            )
+            both = heard.changed.wait_for(heard.reasons_for(stamp), REASONING_S if expects else 0.0)
         commands[step] = heard.commands[stamp]
         if both:
             acted[step] = True
@@ -299,9 +308,4 @@ def _tell(
         for each in told[name].get(step, ()):
             publisher.publish(raw[name][each.index])
             if name in echoes and not (streamed and name == "goals"):
-                known = str(each.stamp_ns)
-                wait(
-                    lambda name=name, known=known: heard.status.get(echoes[name]) == known,
-                    START_TIMEOUT_S,
-                    f"did not take its {name}",
-                )
+                wait(heard.echo_of(echoes[name], each.stamp_ns), START_TIMEOUT_S, f"did not take its {name}")

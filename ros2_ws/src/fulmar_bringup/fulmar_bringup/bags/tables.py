@@ -76,8 +76,11 @@ def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
         arrays[f"{name}/log_ns"] = np.array(logs, dtype=np.int64)
         arrays[f"{name}/stamp_ns"] = np.array(stamps, dtype=np.int64)
         for column in columns(found):
-            values = [row.get(column) for row in found]
-            if any(isinstance(value, np.ndarray) for value in values) and len(set(map(np.shape, values))) > 1:
+            values: list[Any] = [row.get(column) for row in found]
+            if (
+                any(isinstance(value, np.ndarray) for value in values)
+                and len({np.shape(value) for value in values}) > 1
+            ):
                 left_out.append(f"{topic.name}: {column}: its length changes.")
                 continue
             arrays[f"{name}/{column}"] = _array(values)

@@ -7,6 +7,7 @@ import json
 import os
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def cached_bound(trial: Trial, drawn: Episode, duration_s: float, folder: Path) 
     except (OSError, ValueError, KeyError):
         pass
     bound = waypoint_bound(trial.robot, trial.task, drawn, duration_s)
-    kept = {"goals": bound.goals, "name": np.array(bound.name), "rule": np.array(bound.rule)}
+    kept: dict[str, Any] = {"goals": bound.goals, "name": np.array(bound.name), "rule": np.array(bound.rule)}
     if bound.goals_at_top_speed is not None:
         kept["goals_at_top_speed"] = bound.goals_at_top_speed
     folder.mkdir(parents=True, exist_ok=True)

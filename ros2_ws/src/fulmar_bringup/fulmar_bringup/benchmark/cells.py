@@ -168,7 +168,7 @@ def _training(entry: dict[str, Any]) -> Cell:
 
 
 def _beside(entry: dict[str, Any], quantity: Quantity) -> Cell:
-    way = next(iter(entry["ways"].values()), {})
+    way: dict[str, Any] = next(iter(entry["ways"].values()), {})
     mean = way.get(quantity.figure, {}).get("mean")
     if mean is None:
         return Cell(NOTHING)

@@ -234,7 +234,10 @@ def measure(
             if shared is not None:
                 shared.take(robot, task, scenario, worlds=worlds, library=library)
             batch = shared or BatchPace(robot, task, scenario, worlds=worlds, library=library)
-            paces = [batch, MujocoPace(robot, threads=cores)]
+            paces: list[MujocoPace | AfloatPace | SharedPace | BatchPace] = [
+                batch,
+                MujocoPace(robot, threads=cores),
+            ]
             if robot.hydrodynamics is not None:
                 paces.append(AfloatPace(robot, task, scenario, worlds=worlds, threads=cores))
             for pace in paces:

@@ -56,6 +56,11 @@ def do_all(
     return outcomes
 
 
+def _beyond(done: float, progress: Callable[[float], None]) -> Callable[[float], None]:
+    """Progress of one unit, told as that of all, of which some is done."""
+    return lambda steps: progress(done + steps)
+
+
 def _through_ros(
     units: list[Unit], jobs: int, done: float, progress: Callable[[float], None], note: Done
 ) -> None:
@@ -64,7 +69,7 @@ def _through_ros(
 
     with ros_pool(jobs) as pool:
         for unit in units:
-            note(unit, _outcome_of(unit, lambda steps, done=done: progress(done + steps), pool))
+            note(unit, _outcome_of(unit, _beyond(done, progress), pool))
             done += unit.cost
 
 

@@ -37,7 +37,7 @@ def teleop(
 
     fulmar teleop kingfisher --no-keyboard --share 1
     """
-    from fulmar_bringup.node_table import NodeSpec
+    from fulmar_bringup.node_table import NodeSpec, Parameter
     from fulmar_bringup.processes import command_line
     from fulmar_core.robot import load_robot
     from fulmar_core.topics import GIVE_BACK
@@ -52,7 +52,7 @@ def teleop(
             done, words = person.ask(f"/{robot}/{GIVE_BACK}")
         output.print(words, markup=False)
         raise typer.Exit(0 if done else FAILED)
-    parameters: dict[str, bool | int | float | str | list[float]] = {
+    parameters: dict[str, Parameter] = {
         "robot": robot,
         "keyboard": keyboard,
         "share": share,

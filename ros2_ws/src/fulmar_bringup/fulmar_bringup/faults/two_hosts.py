@@ -123,7 +123,7 @@ def two_hosts(*, seed: int = 0) -> Iterator[TwoHosts]:
         RunFailed: They cannot be made; with what was said.
     """
     number = next(_numbers)
-    names = tuple(f"fulmar_{os.getpid()}_{number}_{side}" for side in ("robot", "other"))
+    names = [f"fulmar_{os.getpid()}_{number}_{side}" for side in ("robot", "other")]
     with contextlib.ExitStack() as undo:
         ends = []
         for place, name in enumerate(names, 1):
@@ -140,7 +140,7 @@ def two_hosts(*, seed: int = 0) -> Iterator[TwoHosts]:
             _ip("-n", name, "route", "add", "224.0.0.0/4", "dev", device)
         cable = Cable((ends[0], ends[1]), seed=seed)
         undo.callback(cable.close)
-        yield TwoHosts(*names, cable)
+        yield TwoHosts(names[0], names[1], cable)
 
 
 @contextlib.contextmanager

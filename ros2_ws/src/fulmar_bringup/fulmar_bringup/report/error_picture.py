@@ -77,7 +77,7 @@ def strips(runs: Sequence[View]) -> list[Strip]:
     ] or list(STRIPS[:2])
 
 
-def draw_progress(rows: Sequence[Axes], runs: Sequence[View]) -> None:
+def draw_progress(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
     """Targets reached where the task counts them, in the first row; then each of `strips`."""
     chosen = strips(runs)
     if counting(runs):

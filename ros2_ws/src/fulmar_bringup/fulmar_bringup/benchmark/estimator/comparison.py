@@ -103,7 +103,7 @@ def compare(
 
 def verdict(found: list[Figures]) -> list[dict[str, object]]:
     """What is required at each rate, and whether it was found."""
-    lines = []
+    lines: list[dict[str, object]] = []
     for rate_hz in RATES_HZ:
         at_rate = {row.method: row for row in found if row.pose_rate_hz == rate_hz}
         ours, mean = at_rate[WITH_IMU], at_rate[MEAN]

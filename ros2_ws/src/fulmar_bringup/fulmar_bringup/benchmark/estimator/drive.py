@@ -9,6 +9,7 @@ import numpy as np
 
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.goal import Goal
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
@@ -59,9 +60,9 @@ def drives(robot: Robot, *, count: int, seconds: float, seed: int) -> list[Drive
     return [_measured(robot, drive, rng) for drive in np.moveaxis(np.array(states), 1, 0)]
 
 
-def _turned_about(goal: object) -> object:
+def _turned_about(goal: Goal) -> Goal:
     """The goals on the other side of the origin."""
-    return dataclasses.replace(goal, targets=-np.asarray(goal.targets))  # type: ignore[type-var, attr-defined]
+    return dataclasses.replace(goal, targets=-np.asarray(goal.targets))
 
 
 def _measured(robot: Robot, states: np.ndarray, rng: np.random.Generator) -> Drive:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -52,14 +53,14 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
     goals, command = stack_goals([goal]), nominal.actuators.safe_command
     dt, substeps = nominal.timing.physics_dt, nominal.timing.substeps(controller.control_hz)
     with SampleBag(folder, nominal) as bag:
-        bag.odometry(sample.odometry, 0.0)
+        bag.odometry(sample.measured, 0.0)
         for tick in range(round(duration_s / dt)):
             if tick % substeps == 0:
-                seen = observer(stack_planar([planar_of(sample.odometry)]), goals, command[None])
+                seen = observer(stack_planar([planar_of(sample.measured)]), goals, command[None])
                 command = np.asarray(controller.act(np.asarray(seen)))[0]
                 bag.applied(command, tick * dt)
             sample = backend.step(command)
-            bag.odometry(sample.odometry, (tick + 1) * dt)
+            bag.odometry(sample.measured, (tick + 1) * dt)
     backend.close()
     return folder
 
@@ -112,4 +113,5 @@ def _world(machine: Machine, leg: Leg, nominal: World) -> World:
         "force_x": force_x,
         "force_y": force_y,
     }
-    return replace(nominal, **{name: np.asarray(value, dtype=float) for name, value in values.items()})
+    changed: dict[str, Any] = {name: np.asarray(value, dtype=float) for name, value in values.items()}
+    return replace(nominal, **changed)

@@ -116,16 +116,18 @@ def _boat(nominal: Robot, rng: np.random.Generator, delay: float) -> Machine:
     mass = nominal.body.mass * rng.uniform(0.9, 1.1)
     inertia = nominal.body.inertia[2] * rng.uniform(0.9, 1.04)
     truth = {"mass": mass, "yaw_inertia": inertia, "delay": delay}
-    dampings = {}
+    dampings = []
     for kind in ("linear", "quadratic"):
         values = list(getattr(water, f"{kind}_damping"))
         for axis, i in DRAGS:
             # A surge without any linear part gets some.
             values[i] = max(values[i], LEAST_DRAG) * rng.uniform(0.7, 1.3)
             truth[f"{axis}_{kind}_drag"] = values[i]
-        dampings[f"{kind}_damping"] = tuple(values)
+        dampings.append(tuple(values))
     return Machine(
-        robot=replace(nominal, hydrodynamics=replace(water, **dampings)),
+        robot=replace(
+            nominal, hydrodynamics=replace(water, linear_damping=dampings[0], quadratic_damping=dampings[1])
+        ),
         legs=(Leg("driven", mass, inertia, (0.0, 0.0)),),
         truth=truth,
         delay_s=delay,

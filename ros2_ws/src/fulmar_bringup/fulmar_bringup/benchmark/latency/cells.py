@@ -112,6 +112,7 @@ def _load(cell: Cell) -> Iterator[None]:
 def _required(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """What is asked of the executor that Fulmar runs with, at 50 Hz."""
     lines = []
+    limit: float
     for row in rows:
         if row["hz"] != REQUIRED_HZ or row["executor"] != "events":
             continue

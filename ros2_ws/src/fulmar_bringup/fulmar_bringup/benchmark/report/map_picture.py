@@ -38,7 +38,7 @@ def draw_map(runs: Sequence[View]) -> Figure:
         axes[0, 0].set_yticks((-180, -90, 0, 90, 180))
     bar = figure.colorbar(mesh, ax=list(axes[0]), pad=0.02, aspect=18)
     bar.set_label("mean share of the bound [%]" if shares else "failed episodes [%]")
-    bar.outline.set_edgecolor(FAINT)  # type: ignore[operator]
+    bar.outline.set_edgecolor(FAINT)
     return figure
 
 

@@ -92,7 +92,7 @@ def _steps(axes: Axes, values: np.ndarray, spread: _Spread, **look: object) -> N
     # A few hundred points draw the same line as thousands.
     pick = np.unique(np.linspace(0, known.size - 1, min(known.size, 300)).astype(int))
     x, y = np.concatenate((known[:1], known[pick])), np.concatenate(([0.0], share[pick]))
-    axes.step(x, y, where="post", linewidth=1.4, **look)  # type: ignore[arg-type]
+    axes.step(x, y, where="post", linewidth=1.4, **look)
 
 
 def _limit(run: View, figure: str) -> float | None:
