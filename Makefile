@@ -102,7 +102,7 @@ code=5; \
 run() { $(BIN)/python -m pytest "$$@" $(PYTEST_ARGS); }; \
 for part in "not real_time" real_time; do \
 	last=0; \
-	if [ $$part = real_time ]; then run tests/ros -m "$$part$(1)" || last=$$?; \
+	if [ "$$part" = real_time ]; then run tests/ros -m "$$part$(1)" || last=$$?; \
 	else run tests -n 2 --dist loadfile -m "$$part$(1)" || last=$$?; fi; \
 	if [ $$last != 5 ] && { [ $$code = 5 ] || [ $$code = 0 ]; }; then code=$$last; fi; \
 done; \
