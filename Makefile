@@ -112,7 +112,7 @@ else echo; echo "Some tests failed, or none was found. Once more, only those tha
 endef
 
 .PHONY: test
-test: dev ## Run the tests, but for closed loops over ROS that take long
+test: dev ## Run the tests, but for those that take more than ten seconds
 	@$(call run_tests, and not slow)
 
 .PHONY: test-all

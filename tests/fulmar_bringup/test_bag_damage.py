@@ -7,6 +7,7 @@ import json
 import random
 
 import pytest
+import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag2.enums import CompressionMode, StoragePlugin
@@ -16,6 +17,7 @@ from fulmar_bringup.bags.figures import describe
 from fulmar_core.errors import BagError, FulmarError
 from fulmar_core.paths import config_path
 from fulmar_core.topics import ODOMETRY
+from fulmar_ros.bag_ring import FAULTS
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
 from tests.fulmar_bringup.bag_commands import POLICY, answer, ask, file_of
@@ -175,6 +177,19 @@ def test_a_flipped_bit_in_the_run_record_is_named(tmp_path):
     file.write_bytes(file.read_bytes().replace(b'"seed": 7', b'"seed": 3'))
     (line,) = answer("info", tmp_path / "bag")["damage"]
     assert "metadata.yaml differ" in line
+
+
+def test_records_that_are_nested_too_deeply_tell_nothing(tmp_path):
+    BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"}).close()
+    path = tmp_path / "bag" / "metadata.yaml"
+    document = yaml.safe_load(path.read_text())
+    custom = document["rosbag2_bagfile_information"]["custom_data"]
+    assert custom
+    custom.update(dict.fromkeys([*custom, FAULTS], "[" * 100_000))
+    path.write_text(yaml.safe_dump(document))
+    bag = open_bag(tmp_path / "bag")
+    assert bag.faults == ()
+    assert bag.info["robot"] == "floating_platform"  # the file itself has it too
 
 
 def test_a_torn_bag_is_recovered_with_all_that_is_told_about_it(tmp_path):

@@ -162,14 +162,14 @@ def test_a_mistake_is_told_with_its_file_and_line(read, tmp_path, text, line, wo
     ("content", "words"),
     [
         (b"number: \xff\n", "is not UTF-8 text (byte 8)"),
-        (b"number: \x01\n", "not valid YAML: unacceptable character"),
-        (b"[" * 3000, "is nested too deeply"),
+        (b"number: \x01\n", "not valid YAML: unacceptable character #x0001"),
+        (b"[" * 3000, "not valid YAML: nested too deeply"),
     ],
 )
 def test_what_is_no_text_at_all_is_refused_in_one_line(read, tmp_path, content, words):
     with pytest.raises(ConfigError) as caught:
         read(content)
-    assert str(caught.value).startswith(f"{tmp_path / 'file.yaml'}: ")
+    assert str(caught.value).startswith(f"{tmp_path / 'file.yaml'}:1: ")
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 from mcap.reader import NonSeekingReader, make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
@@ -264,7 +265,43 @@ def test_recovery_of_a_whole_bag_changes_no_message(tmp_path):
     assert len(list((tmp_path / "bag").iterdir())) == 2
 
 
-@pytest.mark.parametrize("text", ["[" * 100_000, "- " * 100_000, "rosbag2_bagfile_information: [1", "- 1"])
+@pytest.mark.parametrize(
+    ("qos", "told"),
+    [
+        ("[" * 50_000, "nested too deeply"),
+        ("[1", "expected ','"),
+        ("!!timestamp x", "not what its tag says"),
+        ("5", "it is no list"),
+    ],
+)
+def test_recovery_tells_of_a_quality_of_service_that_cannot_be_read(tmp_path, qos, told):
+    path = tmp_path / "bag" / "bag_0.mcap"
+    path.parent.mkdir()
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2", library="test")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/words", "cdr", schema, {"offered_qos_profiles": qos})
+        writer.add_message(channel, 1, b"\0\1\0\0\2\0\0\0a\0", 1)
+        writer.finish()
+    (damage,) = recover(tmp_path / "bag")
+    assert damage.startswith(f"{path}: the QoS of /words cannot be read: ")
+    assert told in damage
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.message_count == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        "- " * 100_000,
+        "rosbag2_bagfile_information: [1",
+        "rosbag2_bagfile_information: {version: !!timestamp x}",
+        'rosbag2_bagfile_information: {version: !!int ""}',
+        "- 1",
+    ],
+)
 def test_metadata_that_cannot_be_read_tells_nothing(tmp_path, text):
     (tmp_path / "metadata.yaml").write_text(text)
     assert read_information(tmp_path) == {}

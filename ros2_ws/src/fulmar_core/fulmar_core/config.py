@@ -15,11 +15,10 @@ import typing
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from fulmar_core.errors import ConfigError, did_you_mean
-from fulmar_core.yaml_text import TooDeep, compose
+from fulmar_core.yaml_text import YamlError, compose, plain
 
 T = TypeVar("T")
 MOST_BYTES, MOST_VALUES = 1_000_000, 100_000  # of a file; anything beyond is no configuration
@@ -52,16 +51,12 @@ def _compose(path: Path) -> Node:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror or error}).") from error
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text (byte {error.start}).") from error
+        line = error.object[: error.start].count(b"\n") + 1
+        raise ConfigError(f"{path}:{line}: is not UTF-8 text (byte {error.start}).") from error
     try:
         root = compose(text)
-    except TooDeep as error:
-        raise ConfigError(f"{path}: {error}.") from error
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise ConfigError(f"{path}:{line}: not valid YAML: {error.problem or error.context}.") from error
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: not valid YAML: {_one_line(error)}.") from error
+    except YamlError as error:
+        raise ConfigError(f"{path}:{error.line}: not valid YAML: {error}.") from error
     if root is None:
         raise ConfigError(f"{path}:1: the file is empty.")
     return root
@@ -161,10 +156,9 @@ class _Builder:
         if not isinstance(node, ScalarNode):
             self.fail(node, f"{where} must be a single value.")
         try:
-            return yaml.SafeLoader("").construct_object(node)
-        except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
-            # PyYAML's own converters let slip whatever they stumble over, as in `!!bool maybe`.
-            self.fail(node, f"{where} = {node.value!r} cannot be read: {_one_line(error)}.")
+            return plain(node)
+        except YamlError as error:
+            self.fail(node, f"{where} = {node.value!r} cannot be read: {error}.")
 
     def _choice(self, allowed: tuple[Any, ...], value: Any, node: Node, where: str) -> Any:
         if value not in allowed:
@@ -184,10 +178,6 @@ class _Builder:
         if isinstance(value, float) and not math.isfinite(value):
             self.fail(node, f"{where} = {value!r} must be a finite number.")
         return value
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 # PyYAML follows YAML 1.1, which reads 1e-3 as text.

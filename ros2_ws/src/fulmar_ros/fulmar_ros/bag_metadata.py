@@ -91,7 +91,7 @@ def read_information(directory: Path) -> dict[str, Any]:
     """What the `metadata.yaml` of a folder tells, empty where there is none that can be read."""
     try:
         found = yaml_text.load((directory / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
+    except (OSError, UnicodeDecodeError, yaml_text.YamlError, KeyError, TypeError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
 

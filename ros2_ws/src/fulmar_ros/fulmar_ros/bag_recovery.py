@@ -7,14 +7,16 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-import yaml
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.well_known import Profile
 
+from fulmar_core import yaml_text
 from fulmar_core.errors import BagError
 from fulmar_ros.bag_file import BagFile, mcap_writer, sync_folder
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, read_custom, write_metadata
 from fulmar_ros.bag_records import bag_files, plain_name, read_records
+
+_QOS = "offered_qos_profiles"  # of a channel's metadata: YAML in a text
 
 
 def recover(directory: Path) -> tuple[str, ...]:
@@ -63,7 +65,7 @@ def _rewritten(path: Path, damage: list[str]) -> _Copy:
     new = path.with_name(f".{path.name}.new")
     new.unlink(missing_ok=True)
     try:
-        copy = _Copy(new)
+        copy = _Copy(new, path, damage)
         for record in read_records(path, damage):
             copy.add(record)
         copy.finish()
@@ -89,15 +91,16 @@ def _all_topics(copies: list[_Copy]) -> list[TopicCount]:
 
 
 class _Copy:
-    """A fresh MCAP file with the records of another one."""
+    """A fresh MCAP file with the records of another one, of which it tells what could not be read."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, old: Path, damage: list[str]) -> None:
         self.custom: dict[str, str] = {}
         self._file = BagFile(path)
         self._mcap = mcap_writer(self._file)
         self._mcap.start(profile=Profile.ROS2, library="fulmar")
         self._schemas: dict[int, tuple[int, str]] = {0: (0, "")}  # number there: number here and name
         self._channels: dict[int, tuple[int, str, Channel]] = {}
+        self._old, self._damage = old, damage
         self._counts: Counter[int] = Counter()
         self._times: list[int] = []
 
@@ -121,10 +124,23 @@ class _Copy:
     def _add_channel(self, channel: Channel) -> None:
         if channel.id not in self._channels and channel.schema_id in self._schemas:
             schema, type_name = self._schemas[channel.schema_id]
+            channel.metadata[_QOS] = self._readable_qos(channel)
             number = self._mcap.register_channel(
                 channel.topic, channel.message_encoding, schema, channel.metadata
             )
             self._channels[channel.id] = (number, type_name, channel)
+
+    def _readable_qos(self, channel: Channel) -> str:
+        """The text as it is, or none at all, which readers that stumble over such a text can do without."""
+        text: str = channel.metadata.get(_QOS) or "[]"
+        try:
+            if isinstance(yaml_text.load(text), list):
+                return text
+            reason = "it is no list"
+        except yaml_text.YamlError as error:
+            reason = str(error)
+        self._damage.append(f"{self._old}: the QoS of {channel.topic} cannot be read: {reason}")
+        return "[]"
 
     def _add_message(self, message: Message) -> None:
         if message.channel_id in self._channels:
@@ -149,7 +165,7 @@ class _Copy:
                 channel.topic,
                 type_name,
                 channel.metadata.get("topic_type_hash", ""),
-                yaml.safe_load(channel.metadata.get("offered_qos_profiles", "[]")),
+                yaml_text.load(channel.metadata[_QOS]),
                 self._counts[number],
             )
             for number, (_, type_name, channel) in self._channels.items()

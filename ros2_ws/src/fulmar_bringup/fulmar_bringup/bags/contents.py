@@ -290,7 +290,7 @@ def json_object(text: str) -> dict[str, Any] | None:
     """A JSON object, or None where the text is none."""
     try:
         value = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return value if isinstance(value, dict) else None
 
@@ -299,7 +299,7 @@ def _faults(text: str) -> tuple[Fault, ...]:
     """None where the text is not what a ring writes."""
     try:
         return tuple(Fault(int(each["time_ns"]), str(each["reason"])) for each in json.loads(text or "[]"))
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         return ()
 
 

@@ -87,7 +87,6 @@ class LqrDrift(Law):
             raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")
         self._valves, self._weights = robot.actuators, gains
         self._known: dict[tuple[int, int], np.ndarray] = {}
-        self._gain(0, 0)  # the first takes longest, and nothing moves yet
 
     def reset(self) -> None:
         """Forget the heading."""
