@@ -95,6 +95,27 @@ def test_waypoints_give_way_when_the_robot_is_at_them():
     assert told.distance(at(0.05)) == pytest.approx(2.95)
 
 
+@pytest.mark.parametrize("begins_at", [-0.5, 6.0])
+def test_gates_are_passed_by_the_way_between_two_observations(begins_at):
+    """From wherever the goal found the robot, near the world's origin or far off."""
+    told = mission("race_gates")
+    gates = [begins_at + ahead for ahead in (0.5, 2.1, 4.1)]
+    told.give(goal_at(*((x, 0.0, 0.0) for x in gates)), 1)
+    passed = []
+    for i, x in enumerate(np.arange(begins_at, begins_at + 5.0, 0.2)):
+        told.observe(at(x, 0.1), (i + 1) * S, STILL)
+        passed.append((x, told.done))
+    assert [done for _, done in passed] == [sum(x >= gate for gate in gates) for x, _ in passed]
+
+
+def test_a_gate_behind_the_robot_is_not_passed_by_where_it_was_before_the_goal():
+    told = mission("race_gates")
+    told.give(goal_at((0.2, 0.0, 0.0), (3.0, 0.0, 0.0)), 1)
+    for i, x in enumerate((0.4, 0.6)):
+        told.observe(at(x), (i + 1) * S, STILL)
+    assert told.done == 0
+
+
 def test_a_new_goal_begins_anew_and_a_streamed_one_only_where_it_differs():
     course = goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
     for streamed, done in ((False, 0), (True, 1)):

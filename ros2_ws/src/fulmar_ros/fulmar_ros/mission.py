@@ -37,7 +37,8 @@ class Mission:
         self._schedule: Schedule[Goal] | None = Schedule() if task.goal_topic == "goal_velocity" else None
         self._since_ns: int | None = None
         self._obstacles: np.ndarray | None = None if sees_obstacles(task) else np.zeros((0, 3))
-        self._block: np.ndarray | None = None if isinstance(task, PushBlock) else np.zeros(2)
+        self._pushes = isinstance(task, PushBlock)
+        self._block: np.ndarray | None = None
         self._block_stamp_ns = 0
         self._batched_of: tuple[object, object, object] = (None, None, None)
         self._planar_of: RigidBodyState | None = None
@@ -47,7 +48,9 @@ class Mission:
     @property
     def lacking(self) -> str:
         """What the task needs and nobody has told; empty if everything is known."""
-        parts = {"goal": self._goal, "obstacles": self._obstacles, "place of the block": self._block}
+        parts = {"goal": self._goal, "obstacles": self._obstacles}
+        if self._pushes:
+            parts["place of the block"] = self._block
         return next((name for name, part in parts.items() if part is None), "")
 
     @property
@@ -86,7 +89,7 @@ class Mission:
         """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""
         if self._schedule is not None:
             self._goal = self._schedule.at(stamp_ns)
-        if isinstance(self._task, PushBlock) and stamp_ns - self._block_stamp_ns > BLOCK_LASTS_NS:
+        if self._pushes and stamp_ns - self._block_stamp_ns > BLOCK_LASTS_NS:
             self._block = None
 
     def see_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
@@ -99,7 +102,7 @@ class Mission:
 
     def lacks_something_of(self, stamp_ns: int) -> bool:
         """Whether the block, or a streamed goal, of this stamp is still to come."""
-        block = isinstance(self._task, PushBlock) and self._block_stamp_ns != stamp_ns
+        block = self._pushes and self._block_stamp_ns != stamp_ns
         return block or (self._streamed and self.goal_stamp_ns != stamp_ns)
 
     def distance(self, state: RigidBodyState) -> float:
@@ -124,10 +127,17 @@ class Mission:
         body = self._batch(state)
         if self._since_ns is None:
             self._since_ns = stamp_ns
+            self._begin(body)
         else:
             time_s = np.array([(stamp_ns - self._since_ns) / 1e9])
             self._advance(body, time_s)
         return np.asarray(self._observer(body, self._batched(), previous_command[None]))[0]
+
+    def _begin(self, body: PlanarState) -> None:
+        """Tell the goal where the robot is, where it asks for that."""
+        begun = getattr(self._task, "begun", None)
+        if begun is not None:
+            self._goal = begun(self._batched(), body)[0]
 
     def _advance(self, body: PlanarState, time_s: np.ndarray) -> None:
         """Take the next goal, or keep the very one where it is the same."""
@@ -138,8 +148,10 @@ class Mission:
 
     def _batched(self) -> Goal:
         """Goal and surroundings as a batch of one; the same again while nothing of them changed."""
-        goal, obstacles, block = self._goal, self._obstacles, self._block
-        assert goal is not None and obstacles is not None and block is not None
+        goal, obstacles = self._goal, self._obstacles
+        assert goal is not None and obstacles is not None
+        block = self._block if self._pushes else goal.block
+        assert block is not None
         parts = (goal, obstacles, block)
         if any(new is not old for new, old in zip(parts, self._batched_of, strict=True)):
             batched = stack_goals([Goal(goal.targets, np.asarray(goal.done), obstacles, block)])

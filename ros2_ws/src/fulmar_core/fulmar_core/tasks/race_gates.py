@@ -55,15 +55,18 @@ class RaceGates(PassingTask):
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw a start at rest and a closed course."""
         start, goal = super().draw(draws, robot, training=training)
-        return start, replace(goal, block=np.stack((start.x, start.y), axis=-1))
+        return start, self.begun(goal, start)
+
+    def begun(self, goal: Goal, state: PlanarState) -> Goal:
+        """The goal with the place from which the next step leads; see `TaskProtocol`."""
+        return replace(goal, block=array_namespace(state.x).stack((state.x, state.y), axis=-1))
 
     def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
         """Whether the current gate is passed in its direction; see `PassingTask.reached`."""
         return crossings(goal.block[..., 0], goal.block[..., 1], state, goal.current, radius)[0]
 
     def _after(self, goal: Goal, state: PlanarState, reached: Array) -> Goal:
-        place = array_namespace(state.x).stack((state.x, state.y), axis=-1)
-        return replace(super()._after(goal, state, reached), block=place)
+        return self.begun(super()._after(goal, state, reached), state)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
