@@ -7,6 +7,7 @@ import numpy as np
 
 from fulmar_core.dynamics.pushing import Block
 from fulmar_core.episode import Episode
+from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.block import NAME as BLOCK
@@ -28,10 +29,19 @@ class Scene:
             robot: The robot.
             radii: Of the obstacles that there is room for [m].
             block: The thing to push; None for none.
+
+        Raises:
+            ConfigError: MuJoCo finds that there can be no such robot.
         """
         self._radii, self._block = radii, block
         self.machine: Machine = machine_of(robot)
-        self.model = _spec(robot, self.machine, radii, block).compile()
+        try:
+            self.model = _spec(robot, self.machine, radii, block).compile()
+        except ValueError as error:
+            raise ConfigError(
+                f"robot '{robot.name}': MuJoCo cannot build it: {' '.join(str(error).split())}. "
+                "Mass and inertia of the body less those of its wheels have to be those of a body that can exist."
+            ) from error
         self.machine.bind(self.model)
         self.data = mujoco.MjData(self.model)
 

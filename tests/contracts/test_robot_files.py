@@ -54,20 +54,6 @@ def test_it_has_a_title_and_actuators_with_names_of_their_own(robot):
 
 
 @EACH
-def test_its_nominal_body_lies_within_its_own_uncertainty(robot):
-    low, high = robot.uncertainty.mass
-    assert low <= robot.body.mass <= high
-    low, high = robot.uncertainty.yaw_inertia
-    assert low <= robot.body.inertia[2] <= high
-
-
-@EACH
-def test_every_body_of_its_uncertainty_can_exist(robot):
-    ixx, iyy, _ = robot.body.inertia
-    assert robot.uncertainty.yaw_inertia[1] <= ixx + iyy
-
-
-@EACH
 def test_its_radius_goes_around_its_footprint(robot):
     if robot.body.footprint is not None:
         assert robot.body.radius == pytest.approx(0.5 * np.hypot(*robot.body.footprint), abs=0.01)

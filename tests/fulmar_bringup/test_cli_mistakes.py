@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -128,6 +129,33 @@ def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, 
 def test_a_broken_file_is_told_with_its_line(fulmar, broken_configs, file, text, told):
     (broken_configs / file).write_text(text)
     assert told in complaint(fulmar(*EVALUATE, "--episodes", "1"))
+
+
+def test_a_robot_of_one_s_own_is_one_file_beside_those_that_come_with_fulmar(fulmar, tmp_path, monkeypatch):
+    """It runs at once with a law whose gains are another; what is missing is told with an example."""
+    monkeypatch.chdir(tmp_path)
+    shipped = config_directory()
+    (tmp_path / "mine" / "robots").mkdir(parents=True)
+    text = (shipped / "robots" / "turtlebot2.yaml").read_text().replace("name: turtlebot2", "name: mybot")
+    (tmp_path / "mine" / "robots" / "mybot.yaml").write_text(text)
+    assert "set FULMAR_CONFIGS=FOLDER, and say 'mybot'" in complaint(
+        fulmar("evaluate", "mine/robots/mybot.yaml", "go_to_position")
+    )
+    monkeypatch.setenv("FULMAR_CONFIGS", "mine")
+    assert {"mybot", "turtlebot2"} <= set(json.loads(fulmar("list", "robots", "--json")[1])["robots"])
+    words = ("evaluate", "mybot", "go_to_position", "--through", "batch", "--episodes", "4")
+    told = complaint(fulmar(*words))
+    assert (
+        "train one with `fulmar train mybot go_to_position`." in told
+    )  # there is no law with gains for it yet
+    told = complaint(fulmar(*words, "--controller", "classical"))
+    assert "controllers/mybot_polar.yaml beside robots/ of your own, as " in told
+    (tmp_path / "mine" / "controllers").mkdir()
+    shutil.copy(shipped / "controllers" / "turtlebot2_polar.yaml", "mine/controllers/mybot_polar.yaml")
+    code, out, _ = fulmar(*words, "--controller", "classical", "--json")
+    assert code == 0
+    assert json.loads(out)["success_rate"] == 1.0
+    assert "or use --controller classical." in complaint(fulmar(*words))
 
 
 def test_a_configuration_folder_that_is_none_is_told(fulmar, tmp_path, monkeypatch):

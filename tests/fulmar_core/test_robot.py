@@ -82,6 +82,33 @@ def test_a_body_whose_centre_of_mass_or_drag_is_impossible_is_refused():
         replace(ROBOT.uncertainty, drag=(1.1, 0.9))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("mass: [6.2, 6.8]", "mass: [3, 4]", r"mass: \[3, 4\], which does not hold the body's own 6.5"),
+        (
+            "[0.09, 0.115]",
+            "[0.11, 0.12]",
+            r"yaw_inertia: \[0.11, 0.12\], which does not hold the body's own 0.1018",
+        ),
+        ("[0.09, 0.115]", "[0.09, 0.5]", "no body has a moment beyond the sum of the two others, 0.293"),
+    ],
+)
+def test_a_robot_that_is_never_drawn_or_cannot_exist_is_refused(tmp_path, monkeypatch, old, new, words):
+    (tmp_path / "robots").mkdir()
+    text = (config_directory() / "robots" / "turtlebot2.yaml").read_text()
+    (tmp_path / "robots" / "turtlebot2.yaml").write_text(text.replace(old, new))
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    with pytest.raises(ConfigError, match=rf"robots/turtlebot2\.yaml: 'uncertainty' .*{words}"):
+        load_robot("turtlebot2")
+
+
+def test_wheels_outside_of_the_outline_are_refused():
+    robot = load_robot("turtlebot2")
+    with pytest.raises(ValueError, match="'track' = 23 m puts the wheels outside of the outline"):
+        replace(robot, actuators=replace(robot.actuators, track=23.0))
+
+
 def test_wheels_do_not_swim():
     with pytest.raises(ValueError, match="exclude one another"):
         replace(load_robot("turtlebot2"), hydrodynamics=load_robot("kingfisher").hydrodynamics)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
 from fulmar_core.robot import Rolling, load_robot
 
@@ -21,6 +22,17 @@ WHEELED = [name for name in EVERY if isinstance(ROBOTS[name].actuators, Rolling)
 FLOATING = [name for name in EVERY if name not in WHEELED]
 PLATFORM = ROBOTS["floating_platform"]
 FREE = replace(PLATFORM, body=replace(PLATFORM.body, planar=False, inertia=(0.1, 0.2, 0.3)))
+
+
+def test_a_body_that_is_lighter_than_its_wheels_is_told_with_the_robot_s_name():
+    robot = ROBOTS["turtlebot2"]
+    feather = replace(
+        robot,
+        body=replace(robot.body, mass=0.01, inertia=(1e-5, 1e-5, 1e-5)),
+        uncertainty=replace(robot.uncertainty, mass=(0.01, 0.02), yaw_inertia=(1e-5, 2e-5)),
+    )
+    with pytest.raises(ConfigError, match=r"^robot 'turtlebot2': MuJoCo cannot build it: .*Mass and inertia"):
+        build_model(feather)
 
 
 def whole(model):

@@ -17,7 +17,7 @@ import numpy as np
 
 from fulmar_bringup.extras import EXTRAS
 from fulmar_core.errors import FulmarError
-from fulmar_core.paths import config_directory, config_names
+from fulmar_core.paths import config_directories, config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
@@ -75,7 +75,7 @@ def _configs() -> Finding:
             load_task(name)
     except FulmarError as error:
         return Finding("configuration", False, str(error), "Mend the file that is named.")
-    return Finding("configuration", True, str(config_directory()))
+    return Finding("configuration", True, ", ".join(map(str, config_directories())))
 
 
 def _policies() -> Finding:

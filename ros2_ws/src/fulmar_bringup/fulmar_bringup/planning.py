@@ -25,6 +25,7 @@ from fulmar_bringup.system import (
     default_hardware,
     system_of,
 )
+from fulmar_core.controllers.classical import has_law
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
@@ -359,9 +360,10 @@ def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: fl
     """
     folder = policy or shipped_policy(robot.name, task.name)
     if folder is None:
+        otherwise = ", or use --controller classical" if has_law(robot, task) else ""
         raise BundleError(
-            f"no policy is shipped for '{robot.name}' and '{task.name}'. "
-            f"Train one with `fulmar train {robot.name} {task.name}`, or use --controller classical."
+            f"no policy is shipped for '{robot.name}' and '{task.name}'. Give one with --policy, "
+            f"train one with `fulmar train {robot.name} {task.name}`{otherwise}."
         )
     check_fit(read_passport(folder), robot, task, control_hz, where=str(folder))
     return folder

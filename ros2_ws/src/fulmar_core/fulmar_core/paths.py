@@ -7,12 +7,14 @@ from pathlib import Path
 
 from fulmar_core.errors import ConfigError, UnknownNameError
 
+OWN_FOLDERS = "FULMAR_CONFIGS"  # environment variable: folders of a user's own files, separated as in PATH
+
 
 def config_directory() -> Path:
-    """Folder with `robots/`, `tasks/` and so on.
+    """Folder of what Fulmar comes with: `robots/`, `tasks/` and so on.
 
-    Looked for in this order: the environment variable FULMAR_CONFIGS, a copy beside this package (an
-    installed wheel), an ament `share` folder (a colcon workspace), and a `configs` folder above (a checkout).
+    Looked for in this order: a copy beside this package (an installed wheel), an ament `share` folder (a colcon
+    workspace), and a `configs` folder above (a checkout).
 
     Returns:
         The folder.
@@ -21,38 +23,58 @@ def config_directory() -> Path:
         ConfigError: If none of the places has a `robots` folder.
     """
     here = Path(__file__).resolve()
-    asked = os.environ.get("FULMAR_CONFIGS")
-    if asked:
-        candidates = [Path(asked)]
-    else:
-        candidates = [here.parent / "configs"]
-        candidates += [parent / "share" / "fulmar_core" / "configs" for parent in here.parents]
-        candidates += [parent / "configs" for parent in here.parents]
+    candidates = [here.parent / "configs"]
+    candidates += [parent / "share" / "fulmar_core" / "configs" for parent in here.parents]
+    candidates += [parent / "configs" for parent in here.parents]
     for candidate in candidates:
         if (candidate / "robots").is_dir():
             return candidate.resolve()
-    raise ConfigError(
-        f"no configuration folder with 'robots/' in {candidates[0]}. Set FULMAR_CONFIGS to a folder that has one."
-    )
+    raise ConfigError(f"no configuration folder with 'robots/' in {candidates[0]}. Install Fulmar again.")
+
+
+def config_directories() -> tuple[Path, ...]:
+    """Folders to look into: those that FULMAR_CONFIGS names, and then what Fulmar comes with.
+
+    Raises:
+        ConfigError: A folder is named that has no configuration, or there is none at all.
+    """
+    shipped = config_directory()
+    families = sorted(path.name for path in shipped.iterdir() if path.is_dir())
+    own = [Path(part).resolve() for part in os.environ.get(OWN_FOLDERS, "").split(os.pathsep) if part]
+    for folder in own:
+        if not any((folder / family).is_dir() for family in families):
+            raise ConfigError(
+                f"{folder}: no configuration folder: it has none of {', '.join(f'{each}/' for each in families)}. "
+                f"Set {OWN_FOLDERS} to folders that have one, or unset it."
+            )
+    return (*own, shipped)
+
+
+def config_files(family: str) -> dict[str, Path]:
+    """All files of one family by their names; where two folders have a name, the first counts.
+
+    Args:
+        family: Folder below the configuration folders, such as `robots`.
+
+    Returns:
+        YAML files by their names without `.yaml`, sorted.
+    """
+    found: dict[str, Path] = {}
+    for folder in reversed(config_directories()):
+        found |= {path.stem: path for path in (folder / family).glob("*.yaml")}
+    return dict(sorted(found.items()))
 
 
 def config_names(family: str) -> list[str]:
-    """Names of all files in one family.
-
-    Args:
-        family: Folder below the configuration folder, such as `robots`.
-
-    Returns:
-        File names without `.yaml`, sorted.
-    """
-    return sorted(path.stem for path in (config_directory() / family).glob("*.yaml"))
+    """Names of all files in one family, sorted; arguments as of `config_files`."""
+    return list(config_files(family))
 
 
 def config_path(family: str, name: str) -> Path:
     """File that defines a name.
 
     Args:
-        family: Folder below the configuration folder, such as `robots`.
+        family: Folder below the configuration folders, such as `robots`.
         name: A known name.
 
     Returns:
@@ -60,11 +82,17 @@ def config_path(family: str, name: str) -> Path:
 
     Raises:
         UnknownNameError: If there is no such file.
+        ConfigError: If a path is given instead of a name.
     """
-    path = config_directory() / family / f"{name}.yaml"
-    if name not in config_names(family):
-        raise UnknownNameError(family.removesuffix("s"), name, config_names(family))
+    files = config_files(family)
+    if name not in files:
+        if Path(name).suffix in (".yaml", ".yml") and Path(name).is_file():
+            raise ConfigError(
+                f"{name}: is a file, and a name of {family} is asked for. Put it into FOLDER/{family}/, set "
+                f"{OWN_FOLDERS}=FOLDER, and say '{Path(name).stem}'."
+            )
+        raise UnknownNameError(family.removesuffix("s"), name, files)
     try:
-        return path.relative_to(Path.cwd())
+        return files[name].relative_to(Path.cwd())
     except ValueError:
-        return path
+        return files[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
@@ -179,7 +180,12 @@ class Robot:
     hydrodynamics: Hydrodynamics | None = None  # of a hull that swims
 
     def __post_init__(self) -> None:
-        """Refuse wheels that swim."""
+        """Refuse wheels that swim or stand outside of the body."""
+        if isinstance(self.actuators, Rolling) and self.actuators.track > 2.0 * self.body.radius:
+            raise ValueError(
+                f"'track' = {self.actuators.track:g} m puts the wheels outside of the outline, whose 'radius' is "
+                f"{self.body.radius:g} m."
+            )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
         gains = self.actuators.response.gain
@@ -205,5 +211,25 @@ def load_robot(name: str) -> Robot:
         raise ConfigError(
             f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
         )
+    _check_spans(robot, path)
     calibration = calibration_in_use()
     return robot if calibration is None or calibration.robot != name else calibrated(robot, calibration)
+
+
+def _check_spans(robot: Robot, path: Path) -> None:
+    """Refuse a body that training under uncertainty would never see: a span was left as it was for another body."""
+    spans, (roll, pitch, yaw) = robot.uncertainty, robot.body.inertia
+    for name, nominal, (low, high) in (
+        ("mass", robot.body.mass, spans.mass),
+        ("yaw_inertia", yaw, spans.yaw_inertia),
+    ):
+        if not low <= nominal <= high:
+            raise ConfigError(
+                f"{path}: 'uncertainty' has {name}: [{low:g}, {high:g}], which does not hold the body's own "
+                f"{nominal:g}."
+            )
+    if spans.yaw_inertia[1] > roll + pitch:
+        raise ConfigError(
+            f"{path}: 'uncertainty' has yaw_inertia up to {spans.yaw_inertia[1]:g}; no body has a moment beyond "
+            f"the sum of the two others, {roll + pitch:g}."
+        )

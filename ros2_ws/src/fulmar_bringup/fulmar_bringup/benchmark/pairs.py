@@ -14,7 +14,7 @@ from fulmar_bringup.benchmark.unit import Unit
 from fulmar_bringup.evaluation import Trial
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.errors import BundleError, ConfigError
-from fulmar_core.paths import config_directory
+from fulmar_core.paths import config_files
 from fulmar_core.policy_bundle import read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
@@ -143,7 +143,7 @@ def code_hash(way: str) -> str:
     files += sorted(
         path
         for family in ("robots", "tasks", "scenarios", "controllers", "goals")
-        for path in (config_directory() / family).glob("*.yaml")
+        for path in config_files(family).values()
     )
     return hash_of(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))
 

@@ -11,19 +11,25 @@ from fulmar_bringup.console import output, print_json
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.paths import config_names
 
-FAMILIES = ("robots", "tasks", "controllers", "systems", "policies", "goals", "hardware")
+FAMILIES = (
+    "robots", "tasks", "controllers", "systems", "policies", "goals", "hardware", "scenarios", "estimators",
+)  # fmt: skip
 
 
 def list_names(
     family: Annotated[
         str | None,
         typer.Argument(
-            metavar="[robots|tasks|controllers|systems|policies|goals|hardware]", help="All by default."
+            metavar="[robots|tasks|controllers|systems|policies|goals|hardware|scenarios|estimators]",
+            help="All by default.",
         ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the robots, tasks, controllers, systems, policies, goal files and hardware files there are."""
+    """Show the robots, tasks, controllers, policies, scenarios and files of other kinds there are.
+
+    Your own come with them: FULMAR_CONFIGS names folders that have `robots/`, `tasks/` and so on.
+    """
     if family is not None and family not in FAMILIES:
         raise UnknownNameError("family", family, FAMILIES)
     chosen = FAMILIES if family is None else (family,)
@@ -41,6 +47,8 @@ def list_names(
 def _entries(family: str) -> dict[str, str]:
     """Names and titles of one family."""
     from fulmar_bringup.system import CONTROLLERS, load_system
+    from fulmar_core.disturbances.scenario import load_scenario
+    from fulmar_core.estimation.settings import load_estimator
     from fulmar_core.goal_files import load_goals
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
@@ -56,6 +64,10 @@ def _entries(family: str) -> dict[str, str]:
         return {name: load_goals(name).title for name in config_names("goals")}
     if family == "hardware":
         return {name: load_hardware(name).title for name in config_names("hardware")}
+    if family == "scenarios":
+        return {name: load_scenario(name).title for name in config_names("scenarios")}
+    if family == "estimators":
+        return {name: load_estimator(name).title for name in config_names("estimators")}
     if family == "systems":
         return {name: load_system(name).title for name in config_names("systems")}
     if family == "policies":

@@ -80,10 +80,16 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
     if task.kind not in entry.tasks:
         raise ConfigError(
             f"no classical law does '{task.name}' on '{robot.name}' ({family}); there is one for: "
-            f"{', '.join(entry.tasks)}. Use --controller policy."
+            f"{', '.join(entry.tasks)}. Use --controller policy, which `fulmar train {robot.name} {task.name}` makes."
         )
     if law in OTHERS:
         _gains_of(robot, entry)
+
+
+def has_law(robot: Robot, task: Task) -> bool:
+    """Whether there is a classical law for a pair, and gains of it for the robot."""
+    entry = LAWS[robot.actuators.kind]
+    return task.kind in entry.tasks and f"{robot.name}_{entry.law.law}" in config_names("controllers")
 
 
 def load_classical(
@@ -123,8 +129,10 @@ def _gains_of(robot: Robot, entry: Entry) -> str:
     """Name of the file with a law's gains for a robot."""
     name = f"{robot.name}_{entry.law.law}"
     if name not in config_names("controllers"):
+        others = [each for each in config_names("controllers") if each.endswith(f"_{entry.law.law}")]
         raise ConfigError(
-            f"no gains of '{entry.law.law}' for '{robot.name}'. Write configs/controllers/{name}.yaml."
+            f"no gains of '{entry.law.law}' for '{robot.name}'. Write configs/controllers/{name}.yaml, or "
+            f"controllers/{name}.yaml beside robots/ of your own, as {config_path('controllers', others[0])} is."
         )
     return name
 
