@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from fulmar_bringup.planning import plan_run
+from fulmar_core.bundle_signature import make_keys, sign_bundle
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.paths import config_directory
 from fulmar_core.recording import Recording
@@ -195,6 +196,22 @@ def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan
 def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
     with pytest.raises(ConfigError, match="robots with thrusters"):
         plan(robot="turtlebot2", controller="classical", guards=dict(fallback="lqr"))
+
+
+def test_a_bundle_that_nobody_trusted_has_signed_is_refused_before_anything_starts(plan, tmp_path):
+    """And so are keys that are none; with a fallback the robot says it itself and goes on without the policy."""
+    make_keys(tmp_path / "private.pem", tmp_path / "public.pem")
+    asked = {"controller": "policy", "guards": {"trusted_keys": str(tmp_path / "public.pem")}}
+    with pytest.raises(BundleError, match="is not signed"):
+        plan(**asked)
+    nowhere = {"trusted_keys": str(tmp_path / "nope")}
+    for guards in (nowhere, {**nowhere, "fallback": "lqr"}):
+        with pytest.raises(ConfigError, match="nope: cannot be read"):
+            plan(controller="policy", guards=guards)
+    assert plan(controller="policy", guards={**asked["guards"], "fallback": "lqr"}).plan.policy
+    signed = shutil.copytree(shipped_policy("floating_platform", "go_to_pose"), tmp_path / "signed")
+    sign_bundle(signed, tmp_path / "private.pem")
+    assert plan(**asked, policy=signed).plan.policy == str(signed)
 
 
 def test_the_recorder_keeps_everything_unless_asked_otherwise(plan):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -148,6 +149,16 @@ def test_another_kind_of_file_is_refused(reached, tmp_path):
         write_report([read_run(reached)], tmp_path / "report.pdf")
     with pytest.raises(ConfigError, match="at least one bag"):
         write_report([], tmp_path / "report.html")
+
+
+def test_runs_of_two_tasks_are_not_compared(reached, tmp_path):
+    record = read_run(reached)
+    other = dataclasses.replace(record, path=Path("other"), info={**record.info, "task": "go_to_position"})
+    with pytest.raises(
+        ConfigError, match=r"^other is of task 'go_to_position', .* of 'go_to_pose'\..*one task"
+    ):
+        write_report([record, other], tmp_path / "report.html")
+    assert not (tmp_path / "report.html").exists()
 
 
 @pytest.mark.parametrize(

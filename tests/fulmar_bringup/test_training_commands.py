@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 
 import pytest
 import typer
+from rich.console import Console
 from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
@@ -104,6 +106,32 @@ def learned(monkeypatch):
     monkeypatch.setattr("training.jobs.learn", learn)
     monkeypatch.setattr("training.judge.judge_in_mujoco", lambda run, episodes: {"success_rate": 0.875})
     return jobs
+
+
+@pytest.mark.parametrize(
+    ("left", "told"),
+    [
+        ((), set()),
+        (("checkpoint.pkl",), {"--resume"}),
+        (("checkpoint.pkl", "run.json", "network.pt"), {"--resume", "export"}),
+    ],
+    ids=["at once", "before anything was checked", "in order"],
+)
+def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_path, left, told):
+    run, said = tmp_path / "run", io.StringIO()
+
+    def broken_off(job, watcher):
+        run.mkdir()
+        for name in left:
+            (run / name).write_bytes(b"")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("training.jobs.learn", broken_off)
+    monkeypatch.setattr("fulmar_bringup.commands.train.console", Console(file=said, width=500))
+    assert call(train, *PLATFORM, "--out", run)[0] != 0
+    assert f"run folder: {run}" in said.getvalue()
+    offers = {"--resume": f"fulmar train --resume {run}", "export": f"fulmar export {run} --out"}
+    assert {word for word, offer in offers.items() if offer in said.getvalue()} == told
 
 
 def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):

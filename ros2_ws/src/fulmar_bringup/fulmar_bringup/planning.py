@@ -25,6 +25,7 @@ from fulmar_bringup.system import (
     default_hardware,
     system_of,
 )
+from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
@@ -33,7 +34,7 @@ from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
-from fulmar_core.policy_bundle import check_fit, read_passport
+from fulmar_core.policy_bundle import check_fit, read_bundle, read_passport
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
@@ -126,6 +127,8 @@ def plan_run(
         default_guards(controller, backend, hardware), guards, the_robot, the_task, lockstep=lockstep
     )
     policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=watched.fallback)
+    if policy is not None and watched.trusted_keys is not None:
+        _check_signed(policy, Path(watched.trusted_keys), fallback=watched.fallback)
     if record.exists():
         raise ConfigError(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
@@ -350,6 +353,15 @@ def chosen_policy(
             f"controller '{controller}' runs no policy bundle. Leave --policy out, or use --controller policy."
         )
     return None
+
+
+def _check_signed(folder: Path, trusted: Path, *, fallback: str | None) -> None:
+    """Refuse a bundle that the node would refuse; with a fallback only keys that nobody can read."""
+    try:
+        verify_bundle(read_bundle(folder), trusted)
+    except BundleError:
+        if fallback is None:
+            raise
 
 
 def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: float) -> Path:

@@ -193,7 +193,12 @@ def _one(job: Job, *, as_json: bool) -> None:
     from training.judge import judge_in_mujoco
     from training.progress import LearningBar
 
-    record = learn(job, LearningBar())
+    console.print(f"run folder: {job.out}", markup=False, soft_wrap=True)
+    try:
+        record = learn(job, LearningBar())
+    except KeyboardInterrupt:
+        _tell_how_to_go_on(job.out)
+        raise
     parts = [record, record.get("specialist", {"steps": 0, "wall_s": 0.0})]
     steps, wall_s = (sum(part[key] for part in parts) for key in ("steps", "wall_s"))
     console.print(f"learned from {steps:,} steps in {wall_s:.0f} s; judging in MuJoCo")
@@ -206,6 +211,15 @@ def _one(job: Job, *, as_json: bool) -> None:
         f"next: fulmar export {job.out} --out DIR",
         markup=False,
     )
+
+
+def _tell_how_to_go_on(run: Path) -> None:
+    from training.run_folder import CHECKPOINT_FILE, NETWORK_FILE, RUN_FILE
+
+    if (run / CHECKPOINT_FILE).is_file():
+        console.print(f"go on with it: fulmar train --resume {run}", markup=False, soft_wrap=True)
+    if (run / RUN_FILE).is_file() and (run / NETWORK_FILE).is_file():
+        console.print(f"its best so far: fulmar export {run} --out DIR", markup=False, soft_wrap=True)
 
 
 def _executor(name: str, address: str | None) -> Executor:

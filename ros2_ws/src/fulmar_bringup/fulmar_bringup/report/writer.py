@@ -25,7 +25,7 @@ def write_report(records: Sequence[RunRecord], out: Path, title: str | None = No
         The file.
 
     Raises:
-        ConfigError: Another kind of file was asked for, or there is no run.
+        ConfigError: Another kind of file was asked for, there is no run, or the runs are of several tasks.
         BagError: A run names no task or no goal.
     """
     out = Path(out)
@@ -33,6 +33,7 @@ def write_report(records: Sequence[RunRecord], out: Path, title: str | None = No
         raise ConfigError(f"{out}: '{out.suffix}' cannot be drawn. Give a name that ends in .html or .png.")
     if not records:
         raise ConfigError("there is no run to report on. Give at least one bag.")
+    _check_alike(records)
     runs = views(records)
     title = title or _title(runs)
     with house_style():
@@ -52,3 +53,14 @@ def write_report(records: Sequence[RunRecord], out: Path, title: str | None = No
 def _title(runs: Sequence[View]) -> str:
     task = str(runs[0].summary["task"] or "run").replace("_", " ").capitalize()
     return f"{task}: {' and '.join(run.label for run in runs)}"
+
+
+def _check_alike(records: Sequence[RunRecord]) -> None:
+    """Refuse runs of several tasks, whose figures mean different things."""
+    first = records[0]
+    for record in records:
+        if record.info.get("task") != first.info.get("task"):
+            raise ConfigError(
+                f"{record.path} is of task '{record.info.get('task')}', {first.path} of '{first.info.get('task')}'. "
+                "A report compares runs of one task; make one for each."
+            )
