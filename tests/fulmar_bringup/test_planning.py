@@ -198,6 +198,42 @@ def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
         plan(robot="turtlebot2", controller="classical", guards=dict(fallback="lqr"))
 
 
+@pytest.mark.parametrize(
+    ("robot", "goals", "told"),
+    [
+        (
+            "kingfisher",
+            "velocities: [{velocity: [0.2, 0.5, 0.0], hold_s: 3.0}]",
+            "0.5 m/s sideways; 'kingfisher'",
+        ),
+        (
+            "kingfisher",
+            "velocities: [{velocity: [3.0, 0.0, 0.0], hold_s: 3.0}]",
+            "'kingfisher' goes at most 1.5 m/s",
+        ),
+        (
+            "turtlebot2",
+            "path: {kind: circle, radius: 2.0}\nspeed: 50.0\nlook_ahead: 0.5",
+            "ask for 50 m/s; 'turtle",
+        ),
+    ],
+)
+def test_velocities_that_no_controller_can_keep_are_refused(plan, tmp_path, robot, goals, told):
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"kind: {'path' if 'path' in goals else 'velocities'}\ntitle: too much\n{goals}\n")
+    asked = {"robot": robot, "task": "track_velocities", "controller": "classical", "control_hz": 10.0}
+    with pytest.raises(ConfigError, match=told):
+        plan(**asked, goals=str(path))
+
+
+def test_a_platform_may_be_asked_to_go_sideways(plan, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "kind: velocities\ntitle: sideways\nvelocities: [{velocity: [0.0, 0.1, 0.0], hold_s: 3.0}]\n"
+    )
+    assert plan(task="track_velocities", controller="classical", goals=str(path)).plan.duration_s > 3.0
+
+
 def test_a_bundle_that_nobody_trusted_has_signed_is_refused_before_anything_starts(plan, tmp_path):
     """And so are keys that are none; with a fallback the robot says it itself and goes on without the policy."""
     make_keys(tmp_path / "private.pem", tmp_path / "public.pem")

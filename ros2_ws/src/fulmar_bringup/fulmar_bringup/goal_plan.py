@@ -47,7 +47,7 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
     """A goal file that a task's controller can follow in a run.
 
     Raises:
-        ConfigError: Unknown name, a mistake in the file, or a task that takes other goals.
+        ConfigError: Unknown name, a mistake in the file, a task that takes other goals, or a robot that cannot.
     """
     file = load_goals(goals)
     as_path = is_path_of_places(task) and isinstance(file, Positions | Poses)
@@ -60,7 +60,33 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
             f"the goals '{goals}' are no goals of task '{task.name}'. "
             f"Leave --task out: they are for '{default_task(goals)}'."
         )
+    check_pace(file, goals, robot)
     return file
+
+
+def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
+    """Refuse velocities that the robot cannot have, whoever drives it.
+
+    Raises:
+        ConfigError: They are beyond its top speed, or sideways where it cannot go so.
+    """
+    if isinstance(file, FollowedPath):
+        ahead, sideways = file.speed, 0.0
+    elif isinstance(file, Velocities):
+        targets = file.targets()
+        ahead = float(np.linalg.norm(targets[:, :2], axis=1).max())
+        sideways = float(np.abs(targets[:, 1]).max())
+    else:
+        return
+    can = robot.performance
+    if sideways > 0.0 and can.lateral_speed == 0.0:
+        raise ConfigError(
+            f"the goals '{goals}' ask for {sideways:g} m/s sideways; '{robot.name}' cannot go sideways."
+        )
+    if ahead > can.top_speed:
+        raise ConfigError(
+            f"the goals '{goals}' ask for {ahead:g} m/s; '{robot.name}' goes at most {can.top_speed:g} m/s."
+        )
 
 
 def first_targets(file: GoalFile) -> np.ndarray:

@@ -49,15 +49,16 @@ def goals(
         return
     if robot is None:
         raise ConfigError(f"whose goals? Example: fulmar goals {name} --robot floating_platform")
+    from fulmar_bringup.goal_plan import check_pace
     from fulmar_bringup.node_table import goals_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.goal_files import load_goals
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
 
-    goal_sequence(
-        load_goals(name), load_robot(robot), as_path=as_path
-    )  # whatever is wrong is said in one line
+    file, the_robot = load_goals(name), load_robot(robot)
+    goal_sequence(file, the_robot, as_path=as_path)  # whatever is wrong is said in one line
+    check_pace(file, name, the_robot)
     spec = goals_spec(robot, name, as_path=as_path, control_hz=control_hz)
     from fulmar_ros.goal_node import GoalNode
     from fulmar_ros.runtime import run_node
