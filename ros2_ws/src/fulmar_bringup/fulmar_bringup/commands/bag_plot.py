@@ -33,19 +33,21 @@ def plot(
     without: its path, its speed, its actuators, and how late its messages came.
     """
     require("matplotlib")
+    from fulmar_bringup.bags.carried import knowing_what_it_carries
     from fulmar_bringup.bags.pictures import write_pictures
 
     opened = open_and_warn(bag)
     beside = bag if bag.is_dir() else bag.parent
     files = out or [beside / "plot.html", beside / "plot.png"]
-    if _has_a_task(bag) and odometry is None:
-        from fulmar_bringup.bag_reader import read_run
-        from fulmar_bringup.report import write_report
+    with knowing_what_it_carries(opened):
+        if _has_a_task(bag) and odometry is None:
+            from fulmar_bringup.bag_reader import read_run
+            from fulmar_bringup.report import write_report
 
-        record = read_run(bag)
-        written = [write_report([record], file) for file in files]
-    else:
-        written = [write_pictures(opened, file, odometry) for file in files]
+            record = read_run(bag)
+            written = [write_report([record], file) for file in files]
+        else:
+            written = [write_pictures(opened, file, odometry) for file in files]
     if as_json:
         print_json({"bag": str(bag), "files": [str(file) for file in written]})
     else:

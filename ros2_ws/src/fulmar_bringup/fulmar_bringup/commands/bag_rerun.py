@@ -81,6 +81,7 @@ def rerun(
     """
     from fulmar_bringup.bags.answers_file import check_answers_file, write_answers
     from fulmar_bringup.bags.calibration import calibrated_as
+    from fulmar_bringup.bags.carried import knowing_what_it_carries
     from fulmar_bringup.bags.cast import answers_of
     from fulmar_bringup.bags.comparison import as_json as lines
     from fulmar_bringup.bags.comparison import first_difference, read_tolerances
@@ -100,7 +101,7 @@ def rerun(
     opened = open_bag(bag)
     foreign = opened.info is None
     _check_effect(source, through, foreign=foreign, options={"--goal": goal, "--odometry": odometry})
-    with calibrated_as(opened):
+    with knowing_what_it_carries(opened), calibrated_as(opened):
         course = course_of(
             opened,
             robot=robot,

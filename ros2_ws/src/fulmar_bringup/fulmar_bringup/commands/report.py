@@ -19,6 +19,7 @@ def report(
 ) -> None:
     """Make a report with pictures from recorded runs."""
     from fulmar_bringup.bag_reader import read_run
+    from fulmar_bringup.bags.carried import knowing_what_they_carry
     from fulmar_bringup.report import write_report
 
     records = [read_run(bag) for bag in bags]
@@ -26,5 +27,6 @@ def report(
         for warning in record.warnings:
             console.print(f"warning: {warning}", markup=False, soft_wrap=True)
     first = bags[0] if bags[0].is_dir() else bags[0].parent
-    path = write_report(records, out or first / "report.html")
+    with knowing_what_they_carry({bag: record.info for bag, record in zip(bags, records, strict=True)}):
+        path = write_report(records, out or first / "report.html")
     output.print(str(path), markup=False, soft_wrap=True)

@@ -1,0 +1,53 @@
+"""What a bag carries along of a robot, task or scenario that nobody knows here."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from fulmar_bringup.bags.contents import Bag, open_bag
+from fulmar_bringup.environment import environment
+from fulmar_core.paths import OWN_FOLDERS, config_names
+
+FAMILIES = {
+    "robot": "robots",
+    "task": "tasks",
+    "scenario": "scenarios",
+}  # by what the record of a run calls it
+
+
+@contextlib.contextmanager
+def knowing_what_it_carries(*bags: Bag) -> Iterator[None]:
+    """Find names that only bags know in the files that they carry, here and in children; known ones stay."""
+    with tempfile.TemporaryDirectory(prefix="fulmar_carried_") as scratch:
+        for bag in bags:
+            for family, name in unknown(bag.info or {}):
+                carried = bag.attachments.get(f"{family.removesuffix('s')}.yaml")
+                if carried is not None:
+                    path = Path(scratch) / family / f"{name}.yaml"
+                    path.parent.mkdir(exist_ok=True)
+                    path.write_bytes(carried)
+        folders = [os.environ.get(OWN_FOLDERS, ""), *([scratch] if os.listdir(scratch) else [])]
+        with environment({OWN_FOLDERS: os.pathsep.join(filter(None, folders))}):
+            yield
+
+
+def unknown(info: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Families and names in the record of a run that nobody knows here; no name is a path."""
+    asked = [(family, info.get(key)) for key, family in FAMILIES.items()]
+    return [
+        (family, name)
+        for family, name in asked
+        if isinstance(name, str) and name == Path(name).name and name not in config_names(family)
+    ]
+
+
+@contextlib.contextmanager
+def knowing_what_they_carry(bags: Mapping[Path, Mapping[str, Any]]) -> Iterator[None]:
+    """The same for bags that are not open, by their records; only those with something unknown are opened."""
+    with knowing_what_it_carries(*(open_bag(path) for path, info in bags.items() if unknown(info))):
+        yield
