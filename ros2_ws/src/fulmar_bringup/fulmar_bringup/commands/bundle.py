@@ -26,15 +26,20 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
     if as_json:
         print_json(passport)
         return
-    width = max(map(len, passport))
-    for key, value in passport.items():
-        if key == "training":
-            continue
-        text = ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
-        output.print(f"{key:<{width}}  {text}", markup=False, soft_wrap=True)
-    for key, value in passport["training"].items():
-        if not isinstance(value, dict):
-            output.print(f"{'trained: ' + key:<{width}}  {value}", markup=False, soft_wrap=True)
+    training = passport.pop("training")
+    lines = {
+        key: ", ".join(map(str, value)) if isinstance(value, tuple) else value
+        for key, value in passport.items()
+    }
+    lines |= {
+        f"trained: {key}": value for key, value in training.items() if not isinstance(value, dict | list)
+    }
+    curve = [f"{check['success_rate']:.3f}" for check in training.get("curve", ())]
+    if curve:
+        lines["trained: success"] = f"{curve[0]} to {curve[-1]} in {len(curve)} checks"
+    width = max(map(len, lines))
+    for key, value in lines.items():
+        output.print(f"{key:<{width}}  {value}", markup=False, soft_wrap=True)
 
 
 @bundle.command()

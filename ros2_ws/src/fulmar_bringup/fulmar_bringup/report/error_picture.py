@@ -120,6 +120,12 @@ def _reached(axes: Axes, runs: Sequence[View]) -> None:
     axes.set_ylabel("targets reached")
 
 
+def _top(axes: Axes, strip: Strip) -> float:
+    """Above everything that is drawn, and above a mark that is near, so that the scale can be read off."""
+    drawn = float(axes.dataLim.y1)
+    return 1.1 * min((mark for mark in strip.marks if drawn <= mark < 2.0 * drawn), default=drawn)
+
+
 def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
     for run, judgement in judged(runs):
         axes.plot(judgement.time_s, strip.values(judgement), color=run.colour, linewidth=1.2, label=run.label)
@@ -129,7 +135,7 @@ def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
     axes.yaxis.set_major_locator(FixedLocator(list(strip.marks)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: strip.marks.get(value, "")))
     axes.yaxis.set_minor_locator(NullLocator())
-    axes.set_ylim(bottom=strip.lowest)
+    axes.set_ylim(strip.lowest, _top(axes, strip))
     axes.set_ylabel(strip.label)
     for _, judgement in judged(runs):
         if not judgement.counts:
