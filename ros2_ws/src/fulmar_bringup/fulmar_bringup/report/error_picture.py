@@ -120,9 +120,11 @@ def _reached(axes: Axes, runs: Sequence[View]) -> None:
     axes.set_ylabel("targets reached")
 
 
-def _top(axes: Axes, strip: Strip) -> float:
+def _top(axes: Axes, strip: Strip, limits: list[float]) -> float:
     """Above everything that is drawn, and above a mark that is near, so that the scale can be read off."""
-    drawn = float(axes.dataLim.y1)
+    drawn = max([float(axes.dataLim.y1), *limits])
+    if not strip.lowest < drawn < np.inf:  # nothing is drawn, or nothing that would be seen
+        return max(strip.marks)
     return 1.1 * min((mark for mark in strip.marks if drawn <= mark < 2.0 * drawn), default=drawn)
 
 
@@ -135,13 +137,13 @@ def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
     axes.yaxis.set_major_locator(FixedLocator(list(strip.marks)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: strip.marks.get(value, "")))
     axes.yaxis.set_minor_locator(NullLocator())
-    axes.set_ylim(strip.lowest, _top(axes, strip))
+    limits = [strip.tolerance(judgement.task.tolerance) for _, judgement in judged(runs)[:1]]
+    axes.set_ylim(strip.lowest, _top(axes, strip, limits))
     axes.set_ylabel(strip.label)
     for _, judgement in judged(runs):
         if not judgement.counts:
             axes.axvspan(judgement.window_start_s, judgement.duration_s, color=FAINT, alpha=0.12, linewidth=0)
-    for _, judgement in judged(runs)[:1]:
-        limit = strip.tolerance(judgement.task.tolerance)
+    for limit in limits:
         if limit > 0.0:
             _limit(axes, limit, f"tolerance {strip.limit.format(limit)}")
 
