@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from fulmar_bringup.processes import ProcessGroup
-from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor
+from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor
 from fulmar_core.errors import RunFailed
 
 CONTROLLER_AND_RECORDER = 2  # who has to know the goal before anything moves
@@ -30,7 +30,7 @@ def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], No
     def alive() -> None:
         raise_if_ended(group)
         if time.monotonic() - began_s > START_TIMEOUT_S:
-            plant, controller = (each.message or "nothing" for each in (overseer.plant, overseer.controller))
+            plant, controller = _said(overseer.plant), _said(overseer.controller)
             raise RunFailed(
                 f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the plant said: {plant}; "
                 f"the controller said: {controller}). "
@@ -38,3 +38,10 @@ def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], No
             )
 
     return alive
+
+
+def _said(report: Report) -> str:
+    """What a node said last, and when: one that is not heard any more is another fault than one that has nothing new."""
+    if not report.heard:
+        return "nothing"
+    return f"{report.message or report.level}, {time.monotonic() - report.heard:.1f} s ago"
