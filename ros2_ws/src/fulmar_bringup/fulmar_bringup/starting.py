@@ -41,7 +41,7 @@ def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], No
 
 
 def _said(report: Report) -> str:
-    """What a node said last, and when: one that is not heard any more is another fault than one that has nothing new."""
+    """What a node said last, and when: one that is heard no more is another fault than one that has nothing new."""
     if not report.heard:
         return "nothing"
     return f"{report.message or report.level}, {time.monotonic() - report.heard:.1f} s ago"
