@@ -47,8 +47,9 @@ class Speed:
 class LearningBar:
     """A progress bar on standard error; plain lines where that is no terminal."""
 
-    def __init__(self) -> None:
-        """Prepare, without drawing yet."""
+    def __init__(self, run: Path | None = None) -> None:
+        """Prepare, without drawing yet; with a run folder, say it first."""
+        self._run = run
         self._console = Console(stderr=True)
         self._bar = Progress(
             TextColumn("learning"),
@@ -65,6 +66,9 @@ class LearningBar:
 
     def begin(self) -> None:
         """Start drawing."""
+        if self._run is not None:
+            self._console.print(f"run folder: {self._run}", markup=False, highlight=False, soft_wrap=True)
+            self._run = None  # said once, also where a run has two parts
         self._bar.start()
 
     def advance(self, share: float, elapsed_s: float, steps: int) -> None:

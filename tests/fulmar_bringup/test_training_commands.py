@@ -18,6 +18,7 @@ from fulmar_bringup.commands.train import train
 from fulmar_core.calibration import Calibration, Measured, calibration_path, save_calibration
 from fulmar_core.errors import ConfigError
 from training.jobs import Outcome
+from training.progress import LearningBar
 from training.run_folder import write_start
 from training.settings import StopAtSuccess
 
@@ -108,6 +109,14 @@ def learned(monkeypatch):
     return jobs
 
 
+def test_where_a_run_lies_is_said_once_when_it_begins(capsys, tmp_path):
+    bar = LearningBar(tmp_path / "run")
+    for _ in ("the specialist", "the rest"):
+        bar.begin()
+        bar.end()
+    assert capsys.readouterr().err.count(f"run folder: {tmp_path / 'run'}\n") == 1
+
+
 @pytest.mark.parametrize(
     ("left", "told"),
     [
@@ -129,7 +138,6 @@ def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_pat
     monkeypatch.setattr("training.jobs.learn", broken_off)
     monkeypatch.setattr("fulmar_bringup.commands.train.console", Console(file=said, width=500))
     assert call(train, *PLATFORM, "--out", run)[0] != 0
-    assert f"run folder: {run}" in said.getvalue()
     offers = {"--resume": f"fulmar train --resume {run}", "export": f"fulmar export {run} --out"}
     assert {word for word, offer in offers.items() if offer in said.getvalue()} == told
 

@@ -34,7 +34,7 @@ from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
-from fulmar_core.errors import ConfigError, FulmarError, RunFailed
+from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
@@ -72,9 +72,8 @@ def conduct(request: RunRequest) -> RunOutcome:
         The outcome; a failed run has one too, with whatever was recorded.
 
     Raises:
-        ConfigError: Another run goes on in this ROS domain, or nothing can be recorded where it shall be.
+        ConfigError: Another run goes on in this ROS domain.
     """
-    _make_room(request.record.parent)
     with claimed_domain():
         failure, plant_steps = _run(request)
     ring = request.plan.recording.mode == "ring"
@@ -89,16 +88,6 @@ def conduct(request: RunRequest) -> RunOutcome:
     if not failure and not ring and plant_steps > summary["steps"]:
         failure = f"the bag lacks {plant_steps - summary['steps']} of {plant_steps} commands"
     return RunOutcome({**summary, "failure": failure or None}, failure)
-
-
-def _make_room(folder: Path) -> None:
-    """Make the folder in which the bag will lie."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(
-            f"{folder}: cannot be made ({error.strerror}). Give --record a folder elsewhere."
-        ) from error
 
 
 def _run(request: RunRequest) -> tuple[str, int]:

@@ -193,9 +193,8 @@ def _one(job: Job, *, as_json: bool) -> None:
     from training.judge import judge_in_mujoco
     from training.progress import LearningBar
 
-    console.print(f"run folder: {job.out}", markup=False, soft_wrap=True)
     try:
-        record = learn(job, LearningBar())
+        record = learn(job, LearningBar(job.out))
     except KeyboardInterrupt:
         _tell_how_to_go_on(job.out)
         raise
