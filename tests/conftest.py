@@ -27,6 +27,12 @@ def interruptible() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.fixture(autouse=True, scope="session")
+def unlogged_learners(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """A learner that is told of no log makes an empty folder for one, which goes with pytest's own folders here."""
+    os.environ["SB3_LOGDIR"] = str(tmp_path_factory.mktemp("learners"))
+
+
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosDomain]:
     """Give this test a domain; the test's own process gets its variables too.
