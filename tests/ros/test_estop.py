@@ -20,7 +20,7 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.plant_node import PlantNode
-from fulmar_ros.qos import publisher_qos
+from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar
@@ -60,6 +60,21 @@ def test_a_trigger_closes_the_valves_while_commands_go_on(
         time.sleep(0.02)
         assert not drive(neighbour)
     until(lambda: "e-stop: pressed" in neighbour.said["plant"][0])
+
+
+def test_an_e_stop_says_nothing_before_it_can_go_on_saying_it(neighbour: Neighbour) -> None:
+    """A word from a node that is still starting would be followed by silence, which takes goals away."""
+    heard: list[bool] = []
+    neighbour.node.create_subscription(
+        Bool, ESTOP.name, lambda message: heard.append(message.data), subscriber_qos(ESTOP, reliable=True)
+    )
+    node = EstopNode(lambda _code: None, cli_args=["--ros-args", "-r", f"__ns:={NAMESPACE}"])
+    until(lambda: neighbour.node.count_publishers(ESTOP.name) == 1)
+    time.sleep(0.3)
+    assert not heard
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: heard == [False] * len(heard) and len(heard) > 3)
+        node.stop()
 
 
 def test_a_reset_is_refused_while_commands_are_not_zero_and_done_when_they_are(

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
 import pytest
 import rclpy
+from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.srv import ChangeState
+from rclpy.node import Node
+from std_msgs.msg import Bool
 
-from fulmar_bringup.supervisor import supervisor
+from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.errors import RunFailed
+from fulmar_core.goal import goal_at
 from fulmar_core.tasks import load_task
+from fulmar_core.topics import ESTOP, GOAL_POSE
+from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
+from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
+from tests.ros.neighbour import NAMESPACE, until
 
 pytestmark = pytest.mark.real_time
 
@@ -34,3 +48,112 @@ def test_a_plant_that_refuses_to_start_fails_the_run_with_its_own_reason(
         with spinning(plant, overseer.fail), pytest.raises(RunFailed) as caught:
             overseer.start_plant(lambda: None, lambda: "no model")
     assert str(caught.value) == words
+
+
+class Button:
+    """An e-stop that says what a test wants, twenty times a second, or nothing."""
+
+    def __init__(self, node: Node) -> None:
+        self.pressed: bool | None = False
+        self._publisher = node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._over.wait(0.05):
+            if self.pressed is not None:
+                self._publisher.publish(Bool(data=self.pressed))
+
+    def stop(self) -> None:
+        self._over.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def operated(
+    ros_domain: RosDomain, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[tuple[Supervisor, Button, Node]]:
+    """A supervisor of an LQR node that needs an e-stop, the e-stop, and a node for more."""
+    monkeypatch.setattr(sys, "argv", ["lqr_node"])
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "estop:=true"]
+    with supervisor("floating_platform", load_task("go_to_pose")) as overseer:
+        controller = ControllerNode(make_lqr, lambda _code: None, cli_args=arguments)
+        other = rclpy.create_node("other", namespace=NAMESPACE)
+        button = Button(other)
+        with spinning(controller, overseer.fail):
+            until(lambda: "no odom yet" in reason(overseer))  # the e-stop is heard, and released
+            yield overseer, button, other
+            controller.stop()
+        button.stop()
+
+
+def reason(overseer: Supervisor) -> str:
+    return overseer.controller.values.get("reason", "")
+
+
+def give(overseer: Supervisor, failures: list[Exception], listeners: int = 1) -> threading.Thread:
+    """Give a goal from a thread, for at most 5 s."""
+    until_s = time.monotonic() + 5.0
+
+    def alive() -> None:
+        if time.monotonic() > until_s:
+            raise RunFailed("it was not taken")
+
+    def run() -> None:
+        try:
+            overseer.give_goal(goal_at((1.0, 0.0, 0.0)), time_ns=5, alive=alive, listeners=listeners)
+        except RunFailed as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread
+
+
+def test_a_goal_that_was_refused_for_a_silent_e_stop_is_told_again(
+    operated: tuple[Supervisor, Button, Node],
+) -> None:
+    overseer, button, _ = operated
+    button.pressed = None
+    until(lambda: "e-stop: silent" in reason(overseer))
+    failures: list[Exception] = []
+    giving = give(overseer, failures)
+    until(lambda: "e-stop: silent" in overseer.controller.values.get("goal_refused", ""))
+    button.pressed = False
+    giving.join()
+    assert not failures
+    assert overseer.controller.values["goal_stamp_ns"] == "5"
+    assert overseer.controller.values["goal_refused"] == ""
+
+
+def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_told_again(
+    operated: tuple[Supervisor, Button, Node],
+) -> None:
+    overseer, button, other = operated
+    failures: list[Exception] = []
+    giving = give(overseer, failures, listeners=2)
+    until(lambda: overseer.controller.values.get("goal_stamp_ns") == "5")
+    button.pressed = None
+    until(lambda: overseer.controller.values["goal_stamp_ns"] == "0")
+    button.pressed = False
+    other.create_subscription(PoseStamped, GOAL_POSE.name, lambda _: None, subscriber_qos(GOAL_POSE))
+    giving.join()
+    assert not failures
+    assert overseer.controller.values["goal_stamp_ns"] == "5"
+
+
+def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_told_again_by_itself(
+    operated: tuple[Supervisor, Button, Node],
+) -> None:
+    overseer, button, _ = operated
+    button.pressed = True
+    until(lambda: "e-stop: pressed" in reason(overseer))
+    failures: list[Exception] = []
+    giving = give(overseer, failures)
+    until(lambda: overseer.controller.values.get("goal_refused") == "e-stop: pressed")
+    button.pressed = False
+    until(lambda: "no odom yet" in reason(overseer))
+    giving.join()
+    assert failures
+    assert overseer.controller.values["goal_stamp_ns"] == "0"

@@ -44,4 +44,6 @@ def _said(report: Report) -> str:
     """What a node said last, and when: one that is heard no more is another fault than one that has nothing new."""
     if not report.heard:
         return "nothing"
-    return f"{report.message or report.level}, {time.monotonic() - report.heard:.1f} s ago"
+    refused = report.values.get("goal_refused")
+    more = f" (it refused the goal: {refused})" if refused else ""
+    return f"{report.message or report.level}{more}, {time.monotonic() - report.heard:.1f} s ago"

@@ -8,8 +8,9 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -21,6 +22,7 @@ from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
+from fulmar_core.safety.estop import SILENT
 from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
@@ -30,6 +32,7 @@ from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
 START_TIMEOUT_S = 30.0
+TELL_AGAIN_S = 0.5  # after an e-stop was silent, before the goal is told once more
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
 
 
@@ -92,6 +95,9 @@ class Supervisor:
         Velocities that follow one another are all sent now, stamped with the time when each begins: what a controller
         tracks then hangs on the plant's clock alone.
 
+        An e-stop that was silent for a moment, as on a busy computer that starts many nodes, makes the controller
+        refuse the goal or forget it. Nobody pressed anything, and nothing has moved yet: it is told again.
+
         Args:
             goal: The goal, without a batch axis.
             time_ns: Its stamp, by which the controller names it; for velocities also when the first begins [ns].
@@ -99,15 +105,44 @@ class Supervisor:
             listeners: How many nodes have to have found this operator, the controller among them.
         """
         self.give_obstacles(goal, time_ns=time_ns, alive=alive)
-        for part, stamp in self._timed(goal, time_ns):
-            self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
-            self.wait_until(self._knows(stamp), alive)
-        told = [wire for wire in (self._goal, self._obstacles) if wire is not None]
-        self.wait_until(lambda: all(wire.get_subscription_count() >= listeners for wire in told), alive)
+        parts = self._timed(goal, time_ns)
+        wires = [wire for wire in (self._goal, self._obstacles) if wire is not None]
+        stamps = [stamp for _, stamp in parts]
 
-    def _knows(self, stamp_ns: int) -> Callable[[], bool]:
+        def found() -> bool:
+            return all(wire.get_subscription_count() >= listeners for wire in wires)
+
+        while not (self._told(parts, alive) and self._before_silence(found, stamps, alive)):
+            self.wait_until(lambda: not self.controller.values.get("reason", "").startswith(SILENT), alive)
+            time.sleep(TELL_AGAIN_S)
+
+    def _told(self, parts: Sequence[tuple[Goal, int]], alive: Callable[[], None]) -> bool:
+        """Publish goals, each when the controller has the one before; False if a silent e-stop came between."""
+        for part, stamp in parts:
+            self.controller.values.pop("goal_refused", None)  # of what was told before
+            self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
+            known = partial(self._has, stamp)
+            if not self._before_silence(known, [stamp for _, stamp in parts], alive):
+                return False
+        return True
+
+    def _has(self, stamp_ns: int) -> bool:
         """Whether the controller says that it has the goal of a time."""
-        return lambda: self.controller.values.get("goal_stamp_ns") == str(stamp_ns)
+        return self.controller.values.get("goal_stamp_ns") == str(stamp_ns)
+
+    def _before_silence(
+        self, condition: Callable[[], bool], stamps_ns: Sequence[int], alive: Callable[[], None]
+    ) -> bool:
+        """Wait for something; False if a silent e-stop cost the controller one of these goals first."""
+        refused = {str(stamp) for stamp in stamps_ns}
+
+        def lost() -> bool:
+            values = self.controller.values
+            silent = values.get("goal_refused", "").startswith(SILENT)
+            return silent and values.get("goal_refused_stamp_ns") in refused
+
+        self.wait_until(lambda: lost() or condition(), alive)
+        return not lost()
 
     def give_obstacles(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
         """The obstacles alone, if the task has any; arguments as of `give_goal`."""

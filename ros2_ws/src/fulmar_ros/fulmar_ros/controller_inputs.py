@@ -22,6 +22,14 @@ from fulmar_ros.message_reader import block_of, goal_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 
 
+@dataclasses.dataclass(frozen=True, slots=True)
+class Refusal:
+    """A goal that does not count."""
+
+    stamp_ns: int = 0
+    reason: str = ""  # of the e-stop; empty if the newest goal counts
+
+
 class ControllerInputs:
     """Where every message to a controller ends, and what a control step begins with.
 
@@ -34,6 +42,7 @@ class ControllerInputs:
         mission: Goal, obstacles and block, and how far it has come.
         newest: The newest usable measurement since the activation.
         acted: Control steps with a command of the controller's own since the activation.
+        refusal: What became of the newest goal, if the e-stop refused it or took it away.
     """
 
     def __init__(self, robot: Robot, task: Task, settings: ControllerSettings) -> None:
@@ -42,6 +51,7 @@ class ControllerInputs:
         self.mission = Mission(robot, task, streamed=settings.goals_streamed)
         self.newest: Measurement | None = None
         self.acted = 0
+        self.refusal = Refusal()
         self._settings = settings
         self._control_ns = round(1e9 / settings.control_rate(robot))
         self._flags = settings.flags(robot)
@@ -85,6 +95,8 @@ class ControllerInputs:
         now = time.monotonic_ns()
         stopped = self._estop.reason(now)
         if stopped and self._estop.heard:
+            if self.mission.goal_stamp_ns:
+                self.refusal = Refusal(self.mission.goal_stamp_ns, stopped)
             self.mission.drop()
             self._follow_mission()
             self._change(outside=self._outside())
@@ -108,9 +120,12 @@ class ControllerInputs:
         if goal is None:
             return problem
         with self.lock:
-            if self._estop.heard and self._estop.reason(time.monotonic_ns()):
-                return "the e-stop holds. Reset it first."
-            if self.mission.give(goal, stamp_ns(message.header.stamp)):
+            stamp, stopped = stamp_ns(message.header.stamp), self._estop.reason(time.monotonic_ns())
+            if self._estop.heard and stopped:
+                self.refusal = Refusal(stamp, stopped)
+                return f"{stopped}. Give the goal again once the e-stop is released."
+            self.refusal = Refusal()
+            if self.mission.give(goal, stamp):
                 self._anew = True
                 if not self._settings.goals_streamed:
                     # Somebody has looked: he who left may go on, if he is back.

@@ -203,6 +203,7 @@ class ControllerNode(LifecycleNode):
     def _on_goal(self, message: GoalMessage) -> None:
         if problem := self.inputs.take_goal(message):
             self.get_logger().warning(f"goal refused: {problem}")
+            self._tell_status(self.inputs.decide())
             return
         self._tell_status(self.inputs.decide())
         self._go_on()
@@ -367,4 +368,5 @@ class ControllerNode(LifecycleNode):
             self._beat.deadlines,
             epoch=self.inputs.epoch,
             last_input_ns=self.inputs.flags.last_input_ns,
+            refusal=self.inputs.refusal,
         )

@@ -6,6 +6,7 @@ import time
 
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.succession import Succession
+from fulmar_ros.controller_inputs import Refusal
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.health import Health
 from fulmar_ros.mission import Mission
@@ -44,6 +45,7 @@ class ControllerStatus:
         *,
         epoch: int,
         last_input_ns: int | None,
+        refusal: Refusal,
     ) -> None:
         """Publish, if it is time to.
 
@@ -54,6 +56,7 @@ class ControllerStatus:
             deadlines: The beat.
             epoch: Jumps of the measurements so far.
             last_input_ns: When the newest measurement came, on the steady clock [ns].
+            refusal: Of the newest goal.
         """
         mission, standby = self._mission, succession.current
         changed = (
@@ -61,6 +64,7 @@ class ControllerStatus:
             decision.reason.split(" (")[0][:24],
             not self._goals_streamed and mission.goal_stamp_ns,
             mission.obstacles_stamp_ns,
+            refusal.stamp_ns,
             succession.rejections,
             standby.sha256,
             succession.fell_back,
@@ -83,6 +87,8 @@ class ControllerStatus:
             "epoch": str(epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
             "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),
+            "goal_refused": refusal.reason,
+            "goal_refused_stamp_ns": str(refusal.stamp_ns),
             "goals_done": str(mission.done),
             "steps": str(self.steps),
             "observation_age_ms": f"{age_ms:.1f}",

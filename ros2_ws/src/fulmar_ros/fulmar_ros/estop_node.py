@@ -80,8 +80,9 @@ class EstopNode(Node):
         self.create_service(Trigger, ESTOP_TRIGGER, self._trigger)
         self.create_service(Trigger, ESTOP_RESET, self._reset)
         self._prior = False
+        # The first word comes with the first beat: one from here, before anybody spins us, would be followed by a
+        # silence that takes goals away.
         self.create_timer(1.0 / REPUBLISH_HZ, self._beat, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._tell()
 
     def _on_command(self, source: str, message: JointState) -> None:
         zero = not any(message.effort)  # ends at the first value that is not

@@ -8,6 +8,7 @@ from __future__ import annotations
 TIMEOUT_NS = 500_000_000  # republished at 10 Hz, so that four may get lost
 QUIET_NS = 500_000_000  # commands older than this no longer count against a reset
 REPUBLISH_HZ = 10.0
+SILENT = "e-stop: silent"  # how the reason begins where nobody pressed anything
 
 
 class EstopWatch:
@@ -58,7 +59,7 @@ class EstopWatch:
             return "e-stop: none is heard, and one is required" if self._required else ""
         silent_ns = now_ns - self._heard_ns
         if silent_ns > self._timeout_ns:
-            return f"e-stop: silent for {silent_ns / 1e6:.0f} ms (limit {self._timeout_ns / 1e6:.0f} ms)"
+            return f"{SILENT} for {silent_ns / 1e6:.0f} ms (limit {self._timeout_ns / 1e6:.0f} ms)"
         if self._orphaned:
             return "e-stop: it was pressed when it fell silent. Reset it: fulmar estop --reset"
         return "" if self._released else "e-stop: pressed"
