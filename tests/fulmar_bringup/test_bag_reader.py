@@ -8,13 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.records import Channel, Message, Schema
+from rclpy.serialization import serialize_message
 
 from fulmar_bringup.bag_reader import read_run
 from fulmar_core.errors import BagError
+from fulmar_core.goal import goal_at
 from fulmar_core.robot import load_robot
+from fulmar_core.topics import GOAL_WIRES
 from fulmar_ros.bag_records import read_records
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
+from fulmar_ros.goal_messages import goal_message
 
 
 def file_of(bag: Path) -> Path:
@@ -97,6 +101,21 @@ def test_a_goal_point_is_a_goal_too(tmp_path):
     bag = write_run(tmp_path / "bag", Plan(task="go_to_position", duration_s=1.0, goal=(1.0, 2.0, 0.0)))
     (goal,) = read_run(bag).goals
     assert goal.targets.tolist() == [[1.0, 2.0, 0.0]]
+
+
+def test_a_goal_on_a_topic_that_the_task_does_not_hear_is_left_out_and_named(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "track_velocities"})
+    for wire, targets in (("goal_velocity", (0.1, 0.0, 0.0)), ("goal_pose", (2.5, -1.5, 0.0))):
+        message = goal_message(goal_at(targets), wire, 1)
+        kind = GOAL_WIRES[wire].type
+        bag.add_topic(f"/floating_platform/{wire}", kind, "latched")
+        bag.write(f"/floating_platform/{wire}", serialize_message(message), log_ns=1)
+    bag.close()
+    record = read_run(tmp_path / "bag")
+    assert [goal.targets.tolist() for goal in record.goals] == [[[0.1, 0.0, 0.0]]]
+    assert record.warnings == (
+        "1 messages of /floating_platform/goal_pose are left out: no goals of the task 'track_velocities'.",
+    )
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.999])

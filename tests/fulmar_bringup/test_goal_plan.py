@@ -100,6 +100,24 @@ def test_what_does_not_go_together_is_refused(plan, goals, change, words):
         plan(goals, **{"task": "track_velocities"} | change)
 
 
+@pytest.mark.parametrize(
+    ("robot", "velocity", "words"),
+    [
+        ("turtlebot2", "[0.0, 0.0, 1000.0]", r"1000 deg/s; 'turtlebot2' turns with at most"),
+        ("floating_platform", "[0.0, 0.0, 1000.0]", r"1000 deg/s; 'floating_platform' turns with at most"),
+        (
+            "leatherback",
+            "[0.0, 0.0, 20.0]",
+            r"20 deg/s at 0 m/s; 'leatherback' turns in no circle of less than",
+        ),
+    ],
+)
+def test_turn_rates_that_the_robot_cannot_have_are_refused(plan, file, robot, velocity, words):
+    goals = file(f"kind: velocities\ntitle: spin\nvelocities: [{{velocity: {velocity}, hold_s: 5.0}}]\n")
+    with pytest.raises(ConfigError, match=words):
+        plan(goals, robot=robot)
+
+
 def test_places_beyond_the_geofence_of_each_other_are_refused(plan, file):
     with pytest.raises(ConfigError, match=r"targets 1 and 2 are 30\.0 m apart"):
         plan(file(FAR))

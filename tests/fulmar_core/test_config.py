@@ -101,7 +101,8 @@ def test_null_is_none_where_a_field_may_be_absent(read):
 
 
 @pytest.mark.parametrize(
-    ("text", "value"), [("1e-3", 1e-3), ("1.5E+2", 150.0), ("-2e0", -2.0), (".5e1", 5.0), ("1.e2", 100.0)]
+    ("text", "value"),
+    [("1e-3", 1e-3), ("1.5E+2", 150.0), ("-2e0", -2.0), (".5e1", 5.0), ("1.e2", 100.0), ("-.5", -0.5)],
 )
 def test_exponents_without_a_dot_or_a_sign_are_numbers(read, text, value):
     assert read(f"number: 0\nmaybe: {text}\n").maybe == value

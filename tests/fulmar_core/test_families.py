@@ -123,6 +123,18 @@ def test_a_slew_of_the_wrong_length_is_refused(actuators):
         replace(actuators, response=Response(slew=(1.0, 1.0, 1.0)))
 
 
+def test_what_slews_has_no_lag_beside_it_but_for_the_servos_of_wheels():
+    both = Response(slew=(1.0, 1.0), lag_s=0.5)
+    assert replace(DRIVE, response=both).response == both
+    with pytest.raises(ValueError, match="not both"):
+        replace(PROPELLERS, response=both)
+
+
+def test_propellers_that_push_when_told_0_are_refused():
+    with pytest.raises(ValueError, match="'curve' must be 0 in its middle"):
+        replace(PROPELLERS, curve=(0.0, 10.0, 20.0))
+
+
 @pytest.mark.parametrize("change", [{"delay_s": -0.1}, {"lag_s": -0.1}, {"slew": (0.0, 1.0)}])
 def test_responses_without_meaning_are_refused(change):
     with pytest.raises(ValueError, match="must"):

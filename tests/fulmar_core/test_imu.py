@@ -52,6 +52,8 @@ def test_readings_are_cut_and_come_in_steps():
     unit = begun(ImuSpec(Channel(limit=8.0, quantum=0.25)))
     truth = ImuSample(np.array([0.3, -3.1, 9.81]), np.zeros(3))
     np.testing.assert_allclose(force(unit, (0.0,), truth)[0], [0.25, -3.0, 8.0])
+    between = begun(ImuSpec(Channel(limit=7.9, quantum=0.25)))
+    np.testing.assert_allclose(force(between, (0.0,), truth)[0], [0.25, -3.0, 7.75])
 
 
 def readings_of(spec, times):

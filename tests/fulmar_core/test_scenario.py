@@ -21,7 +21,7 @@ from fulmar_core.disturbances.scenario import (
     load_scenario,
 )
 from fulmar_core.disturbances.world import FIELDS
-from fulmar_core.errors import UnknownNameError
+from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.holding import stranding_losses
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
@@ -79,17 +79,17 @@ ENTRIES = {
     "actuation.gain": (STILL, {"actuation": Actuation(gain=(0.8, 0.9))}, {"gain"}),
     "actuation.delay_s": (STILL, {"actuation": Actuation(delay_s=0.1)}, {"action_delay"}),
     "actuation.failures": (
-        replace(STILL, actuation=Actuation(failure_chance=1.0)),
-        {"actuation": Actuation(failures=1, failure_chance=1.0)},
+        replace(STILL, actuation=Actuation(failures=1, failure_chance=0.5)),
+        {"actuation": Actuation(failures=3, failure_chance=0.5)},
         {"alive"},
     ),
     "actuation.failure_chance": (
-        replace(STILL, actuation=Actuation(failures=1)),
+        replace(STILL, actuation=Actuation(failures=1, failure_chance=0.1)),
         {"actuation": Actuation(failures=1, failure_chance=0.9)},
         {"alive"},
     ),
     "actuation.stranding": (
-        replace(STILL, actuation=Actuation(failures=2)),
+        replace(STILL, actuation=Actuation(failures=2, failure_chance=0.1)),
         {"actuation": Actuation(failures=2, failure_chance=1.0, stranding=True)},
         {"alive"},
     ),
@@ -245,7 +245,9 @@ def test_each_actuator_has_a_gain_of_its_own_within_the_span():
 
 @pytest.mark.parametrize("most", [0, 1, 3])
 def test_no_more_actuators_fail_than_may_and_each_candidate_with_its_chance(most):
-    alive = worlds(replace(STILL, actuation=Actuation(failures=most, failure_chance=0.5))).alive
+    alive = worlds(
+        replace(STILL, actuation=Actuation(failures=most, failure_chance=0.5 if most else 0.0))
+    ).alive
     failed = 8.0 - alive.sum(axis=0)
     assert failed.max() == most
     assert failed.mean() == pytest.approx(0.5 * most, abs=4 * np.sqrt(most * 0.25 / COUNT) + 1e-12)
@@ -329,11 +331,30 @@ def test_a_world_of_a_batch_is_picked_written_and_cast_whole():
         (lambda: Kick(every_s=(0.0, 1.0)), "greater than 0"),
         (lambda: Sensing(noise=-1.0), "must not be negative"),
         (lambda: Sensing(dropout=1.5), "at most 1"),
+        (lambda: Actuation(failures=2), "need one another"),
+        (lambda: Actuation(failure_chance=0.5), "need one another"),
+        (lambda: replace(STILL, sensing=Sensing(delay_s=0.4)), "do nothing where 'sensor_noise' is false"),
+        (lambda: replace(STILL, sensing=Sensing(dropout=0.9)), "do nothing where 'sensor_noise' is false"),
     ],
 )
 def test_entries_without_meaning_are_refused(build, words):
     with pytest.raises(ValueError, match=words):
         build()
+
+
+@pytest.mark.parametrize(
+    ("actuation", "words"),
+    [
+        (
+            Actuation(delay_s=0.5),
+            "up to 0.5 s late .* at most one control step, 0.2 s of 'floating_platform'",
+        ),
+        (Actuation(delay_s=0.15, opening_delay_s=(0.0, 0.1)), "up to 0.25 s late"),
+    ],
+)
+def test_what_a_robot_cannot_have_is_refused_instead_of_cut(actuation, words):
+    with pytest.raises(ConfigError, match=words):
+        worlds(replace(STILL, actuation=actuation))
 
 
 def test_an_unknown_scenario_gets_the_nearest_name():

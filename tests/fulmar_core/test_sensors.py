@@ -152,6 +152,29 @@ def test_between_two_readings_of_a_slow_sensor_the_last_one_stays():
     assert seen == pytest.approx([0, 0, 0, 3, 3, 3, 6, 6])
 
 
+@pytest.mark.parametrize("rate_hz", [9.0, 7.0, 4.0, 3.0, 0.6, 25.0])
+def test_a_rate_that_is_no_whole_part_of_the_calls_is_kept_on_average(rate_hz):
+    bench = Bench(replace(OdometrySpec(), rate_hz=rate_hz), 1)
+    seen = [bench.measure(growing=True)[0, 0] for _ in range(1000)]
+    assert len(set(seen)) == pytest.approx(min(rate_hz, 1.0 / DT) * 1000 * DT, abs=1)
+
+
+def test_a_heading_s_error_of_scale_and_limit_are_of_the_angle_and_not_of_all_turns():
+    turned = 20 * np.pi + 0.5  # as a batch counts it, which MuJoCo does not
+    for channel in (Channel(scale_std=0.1), Channel(limit=3.2)):
+        spec, world = OdometrySpec(heading=channel), worlds(2, sensor_scale=1.0)
+        truth = PlanarState(*(np.full(2, turned if name == "yaw" else 0.0) for name in COLUMNS))
+        odometer = Odometer(spec, seed=3, period=DT)
+        begun = np.zeros(2, int)
+        measured = odometer.measure(truth, world, np.arange(2), begun, begun)
+        assert measured.yaw == pytest.approx(0.5 * (1.0 + channel.scale_std), abs=1e-9)
+
+
+def test_a_limit_between_two_quanta_is_not_exceeded():
+    spec = OdometrySpec(position=Channel(limit=0.26, quantum=0.1))
+    assert Bench(spec, 2).measure()[:2, 0].tolist() == pytest.approx([0.2, -0.2])
+
+
 def test_a_lost_measurement_leaves_the_last_one_and_the_first_is_never_lost():
     bench = Bench(OdometrySpec(), MANY, world=worlds(MANY, dropout=0.25))
     assert not (bench.measure(growing=True)[0] - VALUES[0]).any()

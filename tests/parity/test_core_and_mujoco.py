@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.disturbances.scenario import Actuation, load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.observation import slewed
@@ -211,6 +211,23 @@ def test_mujoco_moves_under_each_disturbance_of_drift_as_the_batch_does(scenario
     np.testing.assert_allclose(ours.position_error, batch.position_error, rtol=0, atol=5e-3)
     np.testing.assert_allclose(np.sin(ours.heading_error - batch.heading_error), 0.0, atol=5e-3)
     assert np.ptp(batch.position_error, axis=1).min() > 0.1  # they did move
+
+
+def test_valves_that_open_by_degrees_do_not_suck_in_mujoco_either():
+    robot, task = load_robot("modular_freeflyer"), replace(load_task("go_to_position"), episode_s=8.0)
+    noisy = replace(load_scenario("ideal"), actuation=Actuation(noise=0.05, least_noise=1.0))
+    given = {"task": task, "scenario": noisy, "episodes": 4, "seed": 3}
+    batch = roll_out_in_batch(Closed(robot), robot, **given)
+    ours = roll_out_in_backends(Closed(robot), lambda: MujocoBackend(robot), **given)
+    np.testing.assert_allclose(ours.position_error, batch.position_error, rtol=0, atol=5e-3)
+    assert np.ptp(batch.position_error, axis=1).min() > 1e-3  # the noise did move them
+
+
+class Closed(Swaying):
+    """Every valve closed."""
+
+    def act(self, observation):
+        return np.zeros((len(observation), len(self.robot.actuators.names)))
 
 
 @pytest.mark.parametrize("scenario", ["nominal", "randomised", "drift_velocity_noise_4", "lab_mocap"])

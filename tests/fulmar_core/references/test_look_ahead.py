@@ -136,8 +136,23 @@ def test_who_shall_stand_still_does_not_turn():
         ({"speed": 0.0}, "'speed' and 'look_ahead' must be greater than 0."),
         ({"look_ahead": -0.1}, "'speed' and 'look_ahead' must be greater than 0."),
         ({"loops": -1}, "'loops' must not be negative"),
+        (
+            {"look_ahead": 4.0},
+            "'look_ahead' = 4 m is too far for this path: at most a quarter of its length, 2.3",
+        ),
     ],
 )
 def test_what_leads_nowhere_is_refused(wrong, words):
     with pytest.raises(ValueError, match=words):
         LookAhead(**({"points": CIRCLE.points(10), "closed": True, "speed": 0.2, "look_ahead": 0.1} | wrong))
+
+
+def test_an_open_path_is_not_over_for_a_robot_that_is_only_nearest_to_its_end():
+    planner = follow(Sine("sine", 4.0, 0.5, 2.0), speed=0.25, look_ahead=0.3)
+    aside, progress = np.array([10.0, 0.0]), Progress()
+    for _ in range(100):
+        velocity, progress = planner.aim(progress, aside)
+    assert not planner.is_done(progress)
+    assert velocity[0] < 0.0
+    _, progress = planner.aim(progress, planner.points[-1] + 0.1)
+    assert planner.is_done(progress)

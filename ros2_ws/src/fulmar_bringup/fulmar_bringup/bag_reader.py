@@ -19,8 +19,9 @@ from fulmar_bringup.bags.decode import (
     twist_vectors,
 )
 from fulmar_bringup.run_record import Actuation, GivenGoal, HealthSample, Motion, Places, RunRecord
-from fulmar_core.errors import BagError
+from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.rotation import rotate
+from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     BLOCK,
@@ -79,7 +80,7 @@ class _Reader:
             odom=_motion(self._odometries(ODOMETRY)),
             applied=_actuation(self._vectors(ACTUATORS_STATE)),
             commanded=_actuation(self._commands()),
-            goals=tuple(sorted(self._goals(), key=lambda goal: goal.log_s)),
+            goals=tuple(sorted(self._goals(info.get("task")), key=lambda goal: goal.log_s)),
             obstacles=self._obstacles(),
             block=_places(self._messages(BLOCK)),
             controller=next((text for text in reversed(texts) if text), {}),
@@ -114,9 +115,14 @@ class _Reader:
         self._lost(VELOCITY_COMMAND)
         return twist_vectors(self._bag.of(VELOCITY_COMMAND))
 
-    def _goals(self) -> list[GivenGoal]:
+    def _goals(self, task: object) -> list[GivenGoal]:
+        """What the controller was told; it hears the topic of its task alone."""
         goals = []
+        heard = _goal_wires_of(task)
         for wire in GOAL_WIRES.values():
+            if wire not in heard:
+                self._warn_of_others(wire, task)
+                continue
             for log_ns, message in self._messages(wire):
                 goal, problem = goal_of(message)
                 if goal is None:
@@ -124,6 +130,13 @@ class _Reader:
                     continue
                 goals.append(GivenGoal(stamp_of(message) / NS, log_ns / NS, goal.targets))
         return goals
+
+    def _warn_of_others(self, wire: Wire, task: object) -> None:
+        count = len(self._bag.of(wire))
+        if count:
+            self._warnings.append(
+                f"{count} messages of {self._bag.topic_name(wire)} are left out: no goals of the task '{task}'."
+            )
 
     def _obstacles(self) -> np.ndarray:
         """Obstacles of the last message, shape (m, 3)."""
@@ -135,6 +148,14 @@ class _Reader:
         if discs is None:
             self._warnings.append(f"the obstacles cannot be used: {problem}.")
         return nothing if discs is None else discs
+
+
+def _goal_wires_of(task: object) -> list[Wire]:
+    """Where goals of a task are told; anywhere, of a task that nobody knows here."""
+    try:
+        return [GOAL_WIRES[load_task(str(task)).goal_topic]]
+    except ConfigError:
+        return list(GOAL_WIRES.values())
 
 
 def _motion(found: Odometries) -> Motion:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities, load_goals
 from fulmar_core.goal_sequence import goal_sequence
@@ -68,12 +70,13 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
     """Refuse velocities that the robot cannot have, whoever drives it.
 
     Raises:
-        ConfigError: They are beyond its top speed, or sideways where it cannot go so.
+        ConfigError: They are beyond its top speed or turn rate, or sideways or on the spot where it cannot go so.
     """
     if isinstance(file, FollowedPath):
         ahead, sideways = file.speed, 0.0
     elif isinstance(file, Velocities):
         targets = file.targets()
+        _check_turning(targets, goals, robot)
         ahead = float(np.linalg.norm(targets[:, :2], axis=1).max())
         sideways = float(np.abs(targets[:, 1]).max())
     else:
@@ -87,6 +90,27 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
         raise ConfigError(
             f"the goals '{goals}' ask for {ahead:g} m/s; '{robot.name}' goes at most {can.top_speed:g} m/s."
         )
+
+
+def _check_turning(targets: np.ndarray, goals: str, robot: Robot) -> None:
+    """The same of turn rates; targets of shape (n, 3)."""
+    drive = robot.actuators
+    most = drive.max_yaw_rate if isinstance(drive, DifferentialDrive) else robot.limits.yaw_rate
+    asked = float(np.abs(targets[:, 2]).max())
+    if asked > most:
+        raise ConfigError(
+            f"the goals '{goals}' ask for {math.degrees(asked):g} deg/s; '{robot.name}' turns with at most "
+            f"{math.degrees(most):.1f} deg/s."
+        )
+    if isinstance(drive, Ackermann):
+        curvature = math.tan(drive.max_steering) / drive.wheelbase
+        tightest = np.abs(targets[:, 2]) - curvature * np.abs(targets[:, 0])
+        if tightest.max() > 1e-9:
+            speed, _, rate = targets[int(np.argmax(tightest))].tolist()
+            raise ConfigError(
+                f"the goals '{goals}' ask for {math.degrees(rate):g} deg/s at {speed:g} m/s; '{robot.name}' turns in "
+                f"no circle of less than {1.0 / curvature:.2f} m."
+            )
 
 
 def first_targets(file: GoalFile) -> np.ndarray:

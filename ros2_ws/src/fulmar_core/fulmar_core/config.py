@@ -180,6 +180,6 @@ class _Builder:
         return value
 
 
-# PyYAML follows YAML 1.1, which reads 1e-3 as text.
-_YAML_1_2_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+")
+# PyYAML follows YAML 1.1, which reads 1e-3 and -.5 as text.
+_YAML_1_2_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+|[-+]\.[0-9]+")
 _PLAIN_NAME = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

@@ -188,6 +188,12 @@ class Robot:
             )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
+        response, control_s = self.actuators.response, 1.0 / self.timing.control_hz
+        if response.delay_s + response.opening_delay_s > control_s + 1e-9:
+            raise ValueError(
+                f"'delay_s' and 'opening_delay_s' add up to {response.delay_s + response.opening_delay_s:g} s; at most "
+                f"one control step, {control_s:g} s."
+            )
         gains = self.actuators.response.gain
         if gains and len(gains) != len(self.actuators.names):
             raise ValueError(f"'gain' needs {len(self.actuators.names)} values, one for each actuator.")
@@ -213,7 +219,12 @@ def load_robot(name: str) -> Robot:
         )
     _check_spans(robot, path)
     calibration = calibration_in_use()
-    return robot if calibration is None or calibration.robot != name else calibrated(robot, calibration)
+    if calibration is None or calibration.robot != name:
+        return robot
+    try:
+        return calibrated(robot, calibration)
+    except ValueError as error:
+        raise ConfigError(f"the calibration of '{name}': {error}") from None
 
 
 def _check_spans(robot: Robot, path: Path) -> None:

@@ -37,7 +37,9 @@ def run(
         ),
     ] = None,
     controller: ControllerOption = "policy",
-    backend: Annotated[str, typer.Option(metavar="B", help="mujoco, mock or hardware.")] = "mujoco",
+    backend: Annotated[
+        str, typer.Option(metavar="B", help="mujoco, mock (our own dynamics, perfect sensors) or hardware.")
+    ] = "mujoco",
     hardware: Annotated[
         str | None,
         typer.Option(

@@ -42,6 +42,9 @@ class Propellers:
             raise ValueError("'curve' needs at least two thrusts, none less than the one before.")
         if self.response.slew and len(self.response.slew) != len(self.propellers):
             raise ValueError(f"'slew' needs {len(self.propellers)} values, one for each propeller.")
+        self.response.refuse_lag_beside_slew()
+        if self.thrust(self.safe_command).any():
+            raise ValueError("'curve' must be 0 in its middle: a propeller that is told 0 stands still.")
 
     binary = False
 

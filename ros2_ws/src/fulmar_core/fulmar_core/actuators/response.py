@@ -22,6 +22,15 @@ class Response:
         if any(rate <= 0.0 for rate in (*self.slew, *self.gain)):
             raise ValueError("every slew and every gain must be greater than 0.")
 
+    def refuse_lag_beside_slew(self) -> None:
+        """Of actuators that follow either way, not both; the servos of wheels have both.
+
+        Raises:
+            ValueError: Both are given.
+        """
+        if self.slew and self.lag_s > 0.0:
+            raise ValueError("give 'slew' or 'lag_s', not both: what slews has no lag here.")
+
     @property
     def remembers(self) -> bool:
         """Whether what an actuator does depends on more than the newest command."""

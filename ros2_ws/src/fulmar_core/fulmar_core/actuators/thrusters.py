@@ -55,6 +55,7 @@ class Thrusters:
             raise ValueError("'nozzles' must not be empty, and each needs a name of its own.")
         if self.response.slew and len(self.response.slew) != len(self.nozzles):
             raise ValueError(f"'slew' needs {len(self.nozzles)} values, one for each nozzle.")
+        self.response.refuse_lag_beside_slew()
 
     @property
     def binary(self) -> bool:
@@ -107,9 +108,14 @@ class Thrusters:
         Returns:
             Thrusts, shape (..., n) [N].
         """
+        command = self._opening(command)
         if not self.shared_pressure:
             return self.thrust * command
         return self.thrust * command / clip(command.sum(-1)[..., None], 1.0, None)
+
+    def _opening(self, applied: Array) -> Array:
+        """How far valves are open: whatever errors add, a valve does not suck."""
+        return clip(applied, 0.0, 1.0) if self.continuous else applied
 
     def wrench_in_body(self, command: Array) -> tuple[Array, Array]:
         """Total force and torque of a command.
@@ -135,8 +141,7 @@ class Thrusters:
         Returns:
             Force ahead [N], to the left [N], and yaw moment [N·m], shapes (...,).
         """
-        if self.continuous:
-            applied = clip(applied, 0.0, 1.0)  # whatever errors add, a valve does not suck
+        applied = self._opening(applied)
         thrust = applied * gain
         every: Row = ((1.0, list(range(len(self.nozzles))), []),)
         share = 1.0 / clip(_weighted(applied, every), 1.0, None) if self.shared_pressure else 1.0

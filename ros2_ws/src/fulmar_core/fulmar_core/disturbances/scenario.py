@@ -14,6 +14,7 @@ from fulmar_core.config import load_config
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.errors import ConfigError
 from fulmar_core.holding import stranding_losses
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot
@@ -107,7 +108,7 @@ class Actuation:
     noise: float = 0.0  # largest error at each control step, uniform, as a share of full command [-]
     least_noise: float = 0.0  # smallest of these, as a share of the largest [-]
     gain: Range = (1.0, 1.0)  # each actuator's own factor, for a whole episode [-]
-    delay_s: float = 0.0  # largest delay of commands [s]
+    delay_s: float = 0.0  # largest delay of commands; with that of opening at most one control step [s]
     opening_delay_s: Range = (0.0, 0.0)  # by which closed valves open late; closing does not wait [s]
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
@@ -122,6 +123,10 @@ class Actuation:
             raise ValueError("'gain' must be [low, high] with low <= high, 'failure_chance' at most 1.")
         if not 0.0 <= self.opening_delay_s[0] <= self.opening_delay_s[1]:
             raise ValueError("'opening_delay_s' must be [low, high] with 0 <= low <= high.")
+        if (self.failures > 0) != (self.failure_chance > 0.0):
+            raise ValueError(
+                "'failures' and 'failure_chance' need one another: how many may fail, and how often."
+            )
         if self.stranding and not self.failures:
             raise ValueError("'stranding' needs 'failures', the number of those that are lost together.")
         if not 0.0 <= self.least_noise <= 1.0:
@@ -130,11 +135,12 @@ class Actuation:
 
 @dataclass(frozen=True)
 class Sensing:
-    """What may be wrong with the sensors, beyond what the robot's YAML says of them."""
+    """What may be wrong with the odometry, beyond what the robot's YAML says; an inertial unit is as it says."""
 
     noise: float = 1.0  # factor on the robot's own noise [-]
-    bias: float = 1.0  # factor on the robot's own biases [-]
-    delay_s: float = 0.0  # largest delay beyond the robot's own [s]
+    bias: float = 1.0  # factor on the robot's own biases and errors of scale [-]
+    # Largest delay beyond the robot's own. It counts in whole readings: in training half a control step is none [s].
+    delay_s: float = 0.0
     dropout: float = 0.0  # largest chance that a measurement is lost [-]
     # Beside the noise of the robot's own sensors, and where these are perfect too; uniform, anew each time.
     velocity_noise: Range = (0.0, 0.0)  # largest error of each measured velocity, for a whole episode [m/s]
@@ -171,6 +177,31 @@ class Scenario:
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
 
+    def __post_init__(self) -> None:
+        """Refuse what would do nothing."""
+        its = self.sensing
+        if not self.sensor_noise and (its.noise, its.bias, its.delay_s, its.dropout) != (1.0, 1.0, 0.0, 0.0):
+            raise ValueError(
+                "noise, bias, delay_s and dropout of 'sensing' do nothing where 'sensor_noise' is false. "
+                "Set it to true, or leave them out."
+            )
+
+
+def check_fit(robot: Robot, scenario: Scenario) -> None:
+    """Refuse a scenario that a robot could not have as it is written.
+
+    Raises:
+        ConfigError: Commands would be late by more than a control step.
+    """
+    faults, response, control_s = scenario.actuation, robot.actuators.response, 1.0 / robot.timing.control_hz
+    opening_s = faults.opening_delay_s[1] if isinstance(robot.actuators, Thrusters) else 0.0
+    late = faults.delay_s + opening_s + response.delay_s + response.opening_delay_s
+    if late > control_s + 1e-9:
+        raise ConfigError(
+            f"scenario '{scenario.title}': commands would be up to {late:g} s late ('delay_s' and 'opening_delay_s' of "
+            f"'actuation', with the robot's own); at most one control step, {control_s:g} s of '{robot.name}'."
+        )
+
 
 def load_scenario(name: str) -> Scenario:
     """Read `configs/scenarios/<name>.yaml`.
@@ -195,7 +226,11 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
 
     Returns:
         Worlds of as many episodes as `draws` has.
+
+    Raises:
+        ConfigError: The robot cannot have this scenario; see `check_fit`.
     """
+    check_fit(robot, scenario)
     count = len(robot.actuators.names)
     uncertain = strength if scenario.body == "uncertain" else 0.0
     spans = robot.uncertainty

@@ -15,6 +15,7 @@ import numpy as np
 from fulmar_core.references import ReferencePath
 from fulmar_core.rotation import wrap_angle
 
+MOST_LOOK_AHEAD = 0.25  # of a path's length: the nearest point is searched over twice as much
 POINTS = 3600  # of a path: RANS mujoco_envs/controllers/hl_controllers.py
 
 
@@ -42,6 +43,12 @@ class LookAhead:
             raise ValueError("'speed' and 'look_ahead' must be greater than 0.")
         if self.loops < 0:
             raise ValueError("'loops' must not be negative; 0 means for ever.")
+        most = MOST_LOOK_AHEAD * self.spacing * len(self.points)
+        if not self.look_ahead <= most:
+            raise ValueError(
+                f"'look_ahead' = {self.look_ahead:g} m is too far for this path: at most a quarter of its length, "
+                f"{most:.3g} m."
+            )
 
     @cached_property
     def spacing(self) -> float:
@@ -60,7 +67,8 @@ class LookAhead:
         """Velocity towards the aim.
 
         The nearest point is searched from the last one on, no further than twice the look-ahead distance: progress
-        never goes back, and a path that crosses itself is followed in its own order.
+        never goes back, and a path that crosses itself is followed in its own order. An open path is over once its end
+        is no farther than the look-ahead distance.
 
         Args:
             progress: Result of the last call, or where to begin.
@@ -75,12 +83,13 @@ class LookAhead:
         if not self.closed:
             window = np.minimum(window, count - 1)
         offsets = self.points[window % count] - position_xy
-        index = int(window[np.argmin(np.sum(offsets * offsets, axis=1))])
+        squared = np.sum(offsets * offsets, axis=1)
+        index = int(window[np.argmin(squared)])
         if self.closed:
             progress = Progress(index % count, progress.laps + index // count)
             target = self.points[(index + ahead) % count]
         else:
-            progress = Progress(index, int(index == count - 1))
+            progress = Progress(index, int(index == count - 1 and squared.min() <= self.look_ahead**2))
             target = self.points[min(index + ahead, count - 1)]
         way = target - position_xy
         distance = float(np.linalg.norm(way))

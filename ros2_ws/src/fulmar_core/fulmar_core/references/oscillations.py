@@ -9,9 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fulmar_core.references.spacing import Point, along_curve, on_circle, positive
-
-MOST_TURNS = 100  # of a hypotrochoid before it closes
+from fulmar_core.references.spacing import MOST_TURNS, Point, along_curve, few, on_circle, positive
 
 
 @dataclass(frozen=True)
@@ -29,17 +27,33 @@ class Lissajous:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse lines and figures that repeat."""
+        """Refuse lines, arcs that are driven there and back, and figures that repeat."""
         positive(
             half_width=self.half_width,
             half_height=self.half_height,
             x_cycles=self.x_cycles,
             y_cycles=self.y_cycles,
         )
+        few(x_cycles=self.x_cycles, y_cycles=self.y_cycles)
         if math.gcd(self.x_cycles, self.y_cycles) > 1:
             raise ValueError(
                 f"'x_cycles' and 'y_cycles' must have no common factor, found {self.x_cycles} and {self.y_cycles}."
             )
+        if self._turns_back:
+            raise ValueError(
+                f"'phase_deg' = {self.phase_deg:g} makes an arc that is driven there and back of {self.x_cycles} to "
+                f"{self.y_cycles} cycles. Give another."
+            )
+
+    @property
+    def _turns_back(self) -> bool:
+        """Whether x and y have an extreme at the same time: from there the curve comes back the way it came."""
+        for extreme in range(2 * self.y_cycles):
+            turns = self.x_cycles * (2 * extreme + 1) / (4 * self.y_cycles) + self.phase_deg / 360.0
+            halves = 2.0 * (turns - 0.25)
+            if abs(halves - round(halves)) < 1e-6:
+                return True
+        return False
 
     def points(self, count: int) -> np.ndarray:
         """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
@@ -108,6 +122,7 @@ class Sine:
     def __post_init__(self) -> None:
         """Refuse lines."""
         positive(length=self.length, amplitude=self.amplitude, cycles=self.cycles)
+        few(cycles=self.cycles)
 
     def points(self, count: int) -> np.ndarray:
         """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fulmar_core.references.spacing import Point, along_corners, on_circle, positive
+from fulmar_core.references.spacing import Point, along_corners, few, on_circle, positive
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class Ngon:
         positive(radius=self.radius)
         if self.corners < 3:
             raise ValueError("'corners' must be 3 or more.")
+        few(corners=self.corners)
 
     def points(self, count: int) -> np.ndarray:
         """Equally spaced points, shape (count, 2) [m]; see `along_corners`."""

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fulmar_core.references.spacing import Point, along_curve, on_circle, positive
+from fulmar_core.references.spacing import LARGEST, Point, along_curve, few, on_circle, positive
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,11 @@ class Spiral:
     def __post_init__(self) -> None:
         """Refuse circles and negative radii."""
         positive(turns=self.turns)
+        few(turns=self.turns)
         if min(self.start_radius, self.end_radius) < 0.0:
             raise ValueError("'start_radius' and 'end_radius' must not be negative.")
+        if max(self.start_radius, self.end_radius) > LARGEST:
+            raise ValueError(f"'start_radius' and 'end_radius' must be at most {LARGEST:g}.")
         if self.start_radius == self.end_radius:
             raise ValueError("'start_radius' and 'end_radius' must differ; kind 'circle' has one radius.")
 

@@ -9,12 +9,14 @@ import numpy as np
 
 Point = tuple[float, float]  # x, y [m]
 
+LARGEST = 10_000.0  # size of a path [m]
+MOST_TURNS = 100  # of a path before it ends or closes
 _FINEST = 40  # samples of a curve for each point asked for
 _LEAST = 4000
 
 
 def positive(**sizes: float) -> None:
-    """Refuse sizes that are not greater than 0.
+    """Refuse sizes that are not greater than 0, and such as no robot drives.
 
     Raises:
         ValueError: Names the first such size.
@@ -22,6 +24,19 @@ def positive(**sizes: float) -> None:
     for name, size in sizes.items():
         if size <= 0.0:
             raise ValueError(f"'{name}' must be greater than 0.")
+        if size > LARGEST:
+            raise ValueError(f"'{name}' must be at most {LARGEST:g}.")
+
+
+def few(**turns: float) -> None:
+    """Refuse more turns, cycles or corners than the points of a path can show.
+
+    Raises:
+        ValueError: Names the first such number.
+    """
+    for name, number in turns.items():
+        if number > MOST_TURNS:
+            raise ValueError(f"'{name}' must be at most {MOST_TURNS}.")
 
 
 def along_curve(

@@ -86,5 +86,6 @@ class InertialUnit:
         reading = reading * self._scale + self._bias + self._std * self._rng.standard_normal(6)
         most = np.where(self._limit > 0.0, self._limit, np.inf)
         step = np.where(self._quantum > 0.0, self._quantum, 1.0)
+        most = np.where(self._quantum > 0.0, np.floor(most / step + 1e-6) * step, most)
         reading = np.clip(reading, -most, most)
         return np.where(self._quantum > 0.0, np.round(reading / step) * step, reading)

@@ -21,7 +21,7 @@ from fulmar_core.counter_rng import (
 from fulmar_core.disturbances.world import World
 from fulmar_core.moving import Moves
 from fulmar_core.planar import COLUMNS, PlanarState
-from fulmar_core.rotation import Array
+from fulmar_core.rotation import Array, wrap_angle
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,11 @@ class Odometer(Moves):
         spec = spec if noisy else OdometrySpec()
         self._spec, self._seed, self._noisy, self._period = spec, seed, noisy, period
         self._blurred = blurred
-        self._every = max(1, round(1.0 / (spec.rate_hz * period))) if spec.rate_hz else 1
+        self._share = (
+            min(1.0, spec.rate_hz * period) if spec.rate_hz else 1.0
+        )  # of the calls bring a new reading
+        # An error of scale, or a limit, is of the angle that a sensor gives, not of all turns so far.
+        self._wraps = max(spec.heading.scale_std, spec.heading.limit) > 0.0
         longest = spec.delay_s + max_delay_s if noisy else 0.0
         self._depth = int(np.ceil(longest / period - 1e-9)) + 1 if longest > 0.0 else 1
         self._constants: dict[str, Array] = {}
@@ -147,8 +151,9 @@ class Odometer(Moves):
         if self._depth > 1:
             reading = self._delayed(reading, world)
         lost = uniform_from(bits[6], columns.dtype) < (world.dropout if self._noisy else 0.0)
-        if self._every > 1:
-            lost = lost | (steps % self._every != 0)
+        if self._share < 1.0:
+            due = xp.astype(steps, columns.dtype) * self._share + 1e-4
+            lost = lost | (xp.floor(due) == xp.floor(due - self._share))
         if self._held is not None:
             reading = xp.where(lost & (steps != 0), self._held, reading)
         self._held = reading
@@ -201,6 +206,8 @@ class Odometer(Moves):
     def _disturbed(self, columns: Array, world: World, bits: Array) -> Array:
         """Columns, shape (6, n), with the errors that worlds have, and with random bits."""
         xp = array_namespace(columns)
+        if self._wraps:
+            columns = xp.stack([wrap_angle(column) if i == 2 else column for i, column in enumerate(columns)])
         if "scale_std" in self._used:
             columns = columns * (1.0 + self._constant("scale_std", columns) * world.sensor_scale)
         if "bias_std" in self._used:
@@ -219,14 +226,23 @@ class Odometer(Moves):
                 (*(columns[i] for i in range(3)), *(columns[3 + i] + error[i] for i in range(3)))
             )
         if "limit" in self._used:
-            limit = self._constant("limit", columns)
-            most = xp.where(limit > 0.0, limit, xp.full_like(limit, xp.inf))
+            most = self._most(columns)
             columns = clip(columns, -most, most)
         if "quantum" in self._used:
             quantum = self._constant("quantum", columns)
             safe = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
             columns = xp.where(quantum > 0.0, xp.round(columns / safe) * safe, columns)
         return columns
+
+    def _most(self, like: Array) -> Array:
+        """Largest reading of each channel: a whole multiple of the quantum where there is one, shape (6, 1)."""
+        xp = array_namespace(like)
+        limit, quantum = self._constant("limit", like), self._constant("quantum", like)
+        safe = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
+        limit = xp.where(
+            quantum > 0.0, xp.where(limit > 0.0, xp.floor(limit / safe + 1e-6) * safe, limit), limit
+        )
+        return xp.where(self._constant("limit", like) > 0.0, limit, xp.full_like(limit, xp.inf))
 
     def _delayed(self, reading: Array, world: World) -> Array:
         """Reading of some measurements ago; before the first one, the first."""
