@@ -18,6 +18,7 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.errors import ConfigError
+from fulmar_core.whole_files import whole_file
 from training.learners import learner_class
 from training.settings import Algorithm
 from training.vec_env import BatchVecEnv
@@ -50,10 +51,8 @@ def save_checkpoint(path: Path, learner: BaseAlgorithm, more: dict[str, Any]) ->
         "first_actions": learner.action_space.np_random.bit_generator.state,
         "more": more,
     }
-    new = path.with_suffix(".new")
-    with new.open("wb") as file:
+    with whole_file(path) as file:
         pickle.dump(content, file)
-    new.replace(path)
 
 
 def load_checkpoint(

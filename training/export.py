@@ -20,6 +20,7 @@ from fulmar_core.policy_bundle import FORMAT, Golden, Passport, action_of, write
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
+from training.interrupt import polite_interrupt
 from training.network import DeployedNetwork, load_network
 from training.run_folder import NETWORK_FILE, read_run_record
 
@@ -108,16 +109,19 @@ def _to_onnx(network: DeployedNetwork) -> bytes:
         warnings.filterwarnings(
             "ignore", message=".*axis name: worlds will not be used"
         )  # both inputs share it
-        program = torch.onnx.export(
-            network,
-            tuple(example),
-            input_names=["observation", *(["memory"] if memory else [])],
-            output_names=["command", "logits", *(["next_memory"] if memory else [])],
-            dynamic_shapes=tuple({0: worlds} for _ in example),
-            opset_version=OPSET,
-            dynamo=True,
-            verbose=False,
-        )
+        with polite_interrupt() as interrupt:  # the exporter takes Ctrl-C for an error of its own
+            program = torch.onnx.export(
+                network,
+                tuple(example),
+                input_names=["observation", *(["memory"] if memory else [])],
+                output_names=["command", "logits", *(["next_memory"] if memory else [])],
+                dynamic_shapes=tuple({0: worlds} for _ in example),
+                opset_version=OPSET,
+                dynamo=True,
+                verbose=False,
+            )
+    if interrupt.is_set():
+        raise KeyboardInterrupt
     assert program is not None
     model = program.model_proto
     _strip_metadata(model)

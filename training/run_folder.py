@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.errors import ConfigError
+from fulmar_core.whole_files import write_whole
 
 SETTINGS_FILE = "settings.yaml"
 START_FILE = "start.json"
@@ -82,9 +83,9 @@ def read_start(run: Path) -> dict[str, Any]:
 
 def write_start(run: Path, start: dict[str, Any]) -> None:
     """Write what `read_start` reads."""
-    (run / START_FILE).write_text(json.dumps(start, indent=2) + "\n", encoding="utf-8")
+    write_whole({run / START_FILE: (json.dumps(start, indent=2) + "\n").encode()})
 
 
 def write_run_record(run: Path, record: dict[str, Any]) -> None:
     """Write what `read_run_record` reads."""
-    (run / RUN_FILE).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    write_whole({run / RUN_FILE: (json.dumps(record, indent=2) + "\n").encode()})

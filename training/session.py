@@ -145,15 +145,18 @@ class Session(BaseCallback):
             rate = self.model.learning_rate
             assert isinstance(rate, KlAdaptiveRate)
             rate.target = self._settings.target_kl(progress)
-        over = progress >= 1.0 or self._asked_to_stop()
-        if over or progress >= self._next_check:
+        over, stopped = progress >= 1.0, self._asked_to_stop()
+        due = over or progress >= self._next_check
+        if due:
             self._check()
             self._plan_check(progress)
             over = over or self._learned()
-        if over or self.elapsed_s >= self._next_checkpoint:
+        if over or stopped or self.elapsed_s >= self._next_checkpoint:
             self.save()
             self._next_checkpoint = self.elapsed_s + self._settings.checkpoint_every_s
-        if over:
+        if stopped and not due:
+            self._check()  # of what is kept now; after the checkpoint, as who goes on from there is not to know of it
+        if over or stopped:
             raise RunIsOver
 
     def _plan_check(self, progress: float) -> None:

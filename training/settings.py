@@ -17,6 +17,24 @@ from fulmar_core.symmetry import Symmetry
 from fulmar_core.tasks import Task
 
 
+def _at_least_1(**sizes: int | tuple[int, ...]) -> None:
+    for name, size in sizes.items():
+        if min(size if isinstance(size, tuple) else (size,), default=1) < 1:
+            raise ValueError(f"'{name}' must be at least 1.")
+
+
+def _positive(**numbers: float) -> None:
+    for name, number in numbers.items():
+        if number <= 0.0:
+            raise ValueError(f"'{name}' must be greater than 0.")
+
+
+def _shares(**numbers: float) -> None:
+    for name, number in numbers.items():
+        if not 0.0 < number <= 1.0:
+            raise ValueError(f"'{name}' must lie in (0, 1].")
+
+
 @dataclass(frozen=True, kw_only=True)
 class OnPolicy:
     """Hyper-parameters of PPO (Schulman et al., arXiv 1707.06347), in its own terms."""
@@ -34,6 +52,20 @@ class OnPolicy:
     hidden: tuple[int, ...]  # sizes of the hidden layers, of policy and value alike
     entropy: float = 0.0  # weight of the entropy in the loss
     log_std: float = 0.0  # logarithm of the first standard deviation of continuous actions
+
+    def __post_init__(self) -> None:
+        """Refuse what no learner can do."""
+        _at_least_1(steps=self.steps, minibatch=self.minibatch, epochs=self.epochs, hidden=self.hidden)
+        low, high = self.learning_rate_range
+        if not 0.0 < low <= high:
+            raise ValueError("'learning_rate_range' must be [low, high] with 0 < low <= high.")
+        _positive(
+            learning_rate=self.learning_rate,
+            target_kl=self.target_kl,
+            clip_range=self.clip_range,
+            max_grad_norm=self.max_grad_norm,
+        )
+        _shares(gamma=self.gamma, gae_lambda=self.gae_lambda)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +85,11 @@ class RecurrentPpo(OnPolicy):
     kind: Literal["recurrent_ppo"] = "recurrent_ppo"
     memory: int  # units of the LSTM
 
+    def __post_init__(self) -> None:
+        """The same, and memories of nothing."""
+        super().__post_init__()
+        _at_least_1(memory=self.memory)
+
 
 @dataclass(frozen=True, kw_only=True)
 class OffPolicy:
@@ -66,6 +103,19 @@ class OffPolicy:
     tau: float  # how fast the target networks follow [-]
     gamma: float
     hidden: tuple[int, ...]  # sizes of the hidden layers
+
+    def __post_init__(self) -> None:
+        """Refuse what no learner can do."""
+        _at_least_1(
+            buffer=self.buffer,
+            minibatch=self.minibatch,
+            gradient_steps=self.gradient_steps,
+            hidden=self.hidden,
+        )
+        if self.first_steps < 0:
+            raise ValueError("'first_steps' must not be negative.")
+        _positive(learning_rate=self.learning_rate)
+        _shares(tau=self.tau, gamma=self.gamma)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,6 +287,7 @@ class TrainingSettings:
             )
         if min(self.worlds, self.threads) < 1 or self.time_limit_s <= 0.0:
             raise ValueError("'worlds' and 'threads' must be at least 1, 'time_limit_s' greater than 0.")
+        _positive(evaluate_every_s=self.evaluate_every_s, checkpoint_every_s=self.checkpoint_every_s)
 
     def learner_of(self, robot: Robot) -> Robot:
         """The robot as it learns: with the rate of the commands that is asked for.

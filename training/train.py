@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import platform
-import signal
-import threading
-import types
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -26,6 +21,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint
 from training.checks import held_out_judge
+from training.interrupt import polite_interrupt
 from training.learners import build_learner, callbacks_of
 from training.network import save_network
 from training.progress import LearningBar, Watcher
@@ -147,7 +143,7 @@ def train(
         env = VecNormalize(worlds, norm_reward=False, gamma=settings.algorithm.gamma)
         learner = build_learner(settings.algorithm, env, seed=seed)
     _log_to(learner, out / TENSORBOARD_FOLDER, curves)
-    with _polite_interrupt() as interrupt:
+    with polite_interrupt() as interrupt:
         session = Session(
             story,
             judge=held_out_judge(robot, task, scenario),
@@ -160,8 +156,13 @@ def train(
             checkpoint=out / CHECKPOINT_FILE,
             asked_to_stop=interrupt.is_set,
         )
+        unsaved: OSError | None = None
         try:
             interrupted = _learn(learner, session, settings) or interrupt.is_set()
+        except OSError as error:  # a full disk has room for the network sooner than for a checkpoint
+            if story.best is None:
+                raise
+            unsaved, interrupted = error, True
         finally:
             learner.logger.close()
     assert story.best is not None
@@ -186,6 +187,8 @@ def train(
         | {"python": platform.python_version()},
     }
     write_run_record(out, record)
+    if unsaved is not None:
+        raise unsaved
     if interrupted:
         raise KeyboardInterrupt
     return record
@@ -214,23 +217,3 @@ def _log_to(learner: BaseAlgorithm, folder: Path, curves: KVWriter | None) -> No
     if curves is not None:
         logger.output_formats.append(curves)
     learner.set_logger(logger)
-
-
-@contextmanager
-def _polite_interrupt() -> Iterator[threading.Event]:
-    """Let the first Ctrl-C ask for an end between two updates, and a second one break off at once."""
-    asked = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield asked
-        return
-
-    def ask(number: int, frame: types.FrameType | None) -> None:
-        if asked.is_set():
-            raise KeyboardInterrupt
-        asked.set()
-
-    before = signal.signal(signal.SIGINT, ask)
-    try:
-        yield asked
-    finally:
-        signal.signal(signal.SIGINT, before)

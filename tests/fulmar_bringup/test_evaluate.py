@@ -46,6 +46,17 @@ def test_waypoints_are_told_with_what_physics_allows(monkeypatch):
     assert "rad/s" in found["bound"]
 
 
+def test_an_episode_too_short_to_hold_anything_in_is_refused():
+    with pytest.raises(
+        ConfigError, match="an episode of 1 s is shorter than the 4 s that 'track_velocities'"
+    ):
+        CliRunner().invoke(
+            app,
+            ["evaluate", "turtlebot2", "track_velocities", "--controller", "classical", "--episode-s", "1"],
+            catch_exceptions=False,
+        )
+
+
 def test_a_length_said_twice_and_worlds_elsewhere_are_refused():
     with pytest.raises(ConfigError, match="Give one of them"):
         CliRunner().invoke(app, f"{POSE} --steps 20 --episode-s 4".split(), catch_exceptions=False)

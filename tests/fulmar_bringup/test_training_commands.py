@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 
@@ -19,7 +20,8 @@ from fulmar_core.calibration import Calibration, Measured, calibration_path, sav
 from fulmar_core.errors import ConfigError
 from training.jobs import Outcome
 from training.progress import LearningBar
-from training.run_folder import write_start
+from training.run_folder import read_start, write_start
+from training.run_lock import learning_in
 from training.settings import StopAtSuccess
 
 PLATFORM = ("floating_platform", "go_to_pose")
@@ -88,6 +90,13 @@ def test_a_seed_that_fails_is_told_and_the_command_fails(asked, tmp_path):
         ((*PLATFORM, "--executor", "slurm"), "--executor slurm: must be local or ray"),
         ((*PLATFORM, "--settings", "sac"), "sac needs actuators that move by degrees"),
         (("--resume", "/nowhere"), "/nowhere: no training run to resume"),
+        ((*PLATFORM, "--resume", "/nowhere"), "goes on with what the run began with; leave ROBOT"),
+        (("--resume", "/nowhere", "--seed", 9), "leave ROBOT, TASK, --seed"),
+        (("--resume", "/nowhere", "--out", "/elsewhere"), "leave ROBOT, TASK, --seed"),
+        ((*PLATFORM, "--executor", "ray"), "are for campaigns: give --seeds N"),
+        ((*PLATFORM, "--address", "nowhere:1"), "are for campaigns: give --seeds N"),
+        ((*PLATFORM, "--stop-at-success", 0), "must be greater than 0"),
+        ((*PLATFORM, "--seeds", 3, "--seed", 2025), "seed 2026 must not be negative, nor"),
     ],
 )
 def test_what_cannot_be_trained_is_told(words, told):
@@ -130,7 +139,6 @@ def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_pat
     run, said = tmp_path / "run", io.StringIO()
 
     def broken_off(job, watcher):
-        run.mkdir()
         for name in left:
             (run / name).write_bytes(b"")
         raise KeyboardInterrupt
@@ -178,6 +186,39 @@ def test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tm
     assert (same.robot, same.seed, same.settings, same.out) == ("turtlebot2", 5, settings, tmp_path)
     assert (same.time_limit_s, same.updates) == (90.0, None)
     assert (longer.time_limit_s, longer.updates) == (None, 9)
+    assert read_start(tmp_path) == start | {
+        "time_limit_s": None,
+        "updates": 9,
+    }  # for who resumes it once more
+
+
+def test_two_trainings_do_not_learn_in_one_folder(learned, tmp_path):
+    test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    runs, files = len(learned), set(tmp_path.iterdir())
+    with (
+        learning_in(tmp_path),
+        pytest.raises(ConfigError, match="another `fulmar train` is learning there"),
+    ):
+        call(train, "--resume", tmp_path)
+    assert len(learned) == runs
+    assert set(tmp_path.iterdir()) == files
+
+
+def test_who_comes_second_to_a_folder_does_not_go_on_with_what_the_first_began(
+    learned, tmp_path, monkeypatch
+):
+    from training import run_lock
+
+    @contextlib.contextmanager
+    def late(run):
+        run.mkdir()
+        (run / "start.json").write_text("{}")
+        yield
+
+    monkeypatch.setattr(run_lock, "learning_in", late)
+    with pytest.raises(ConfigError, match="another training began there"):
+        call(train, *PLATFORM, "--out", tmp_path / "run")
+    assert not learned
 
 
 def test_a_run_is_resumed_with_the_calibration_it_began_with_and_no_other(learned, tmp_path, monkeypatch):

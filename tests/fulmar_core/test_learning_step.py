@@ -83,6 +83,12 @@ def test_where_the_block_went_counts_and_where_it_is_may_be_outside():
     assert judged(PUSH, 3.0, goal=start, ended=far)[1]
 
 
+def test_a_robot_that_leaves_its_block_behind_is_outside_too():
+    start = goal_at(block=(2.0, 0.0))
+    assert not judged(PUSH, BASE.limits.geofence - 0.1, goal=start)[1]
+    assert judged(PUSH, BASE.limits.geofence + 0.1, goal=start)[1]
+
+
 @pytest.mark.parametrize("name", config_names("tasks"))
 def test_torch_judges_as_numpy_does(name):
     torch = pytest.importorskip("torch")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import pickle
 from dataclasses import asdict, replace
@@ -73,6 +74,17 @@ def test_writing_twice_gives_the_same_hash(folder, tmp_path):
     again = write_bundle(tmp_path / "again", b"not really a network", VECTORS, BLANK)
     assert again.network_sha256 == read_passport(folder).network_sha256
     assert write_bundle(tmp_path / "other", b"another network", VECTORS, BLANK).sha256 != again.sha256
+
+
+def test_a_bundle_that_cannot_be_replaced_stays_as_it_was(folder, monkeypatch):
+    def full(file):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    monkeypatch.setattr("fulmar_core.whole_files._settle", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_bundle(folder, b"another network", VECTORS, BLANK)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
 @pytest.mark.parametrize("name", [PASSPORT, NETWORK, GOLDEN])

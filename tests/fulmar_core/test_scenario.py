@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -360,3 +361,9 @@ def test_what_a_robot_cannot_have_is_refused_instead_of_cut(actuation, words):
 def test_an_unknown_scenario_gets_the_nearest_name():
     with pytest.raises(UnknownNameError, match=r"^unknown scenario 'nominall'\. Did you mean 'nominal'\?$"):
         load_scenario("nominall")
+
+
+def test_docs_tell_of_every_entry():
+    text = (Path(__file__).parents[2] / "docs/scenarios.md").read_text(encoding="utf-8")
+    names = {field.name for part in (Scenario, *PARTS.values()) for field in fields(part)}
+    assert {name for name in names if f"`{name}`" not in text} == set()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
 import os
 import signal
@@ -135,20 +136,21 @@ def test_a_run_stops_early_once_several_checks_in_a_row_are_good_enough(tmp_path
     assert record["interrupted"] is False
 
 
+class Impatient:
+    """A person who presses Ctrl-C after the second update."""
+
+    def begin(self): ...
+
+    def advance(self, share, elapsed_s, steps):
+        if steps == 2 * 8 * 16:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def verdict(self, elapsed_s, success): ...
+
+    def end(self): ...
+
+
 def test_ctrl_c_leaves_a_finished_run_that_can_be_resumed(tmp_path, quick_judge):
-    class Impatient:
-        """A person who presses Ctrl-C after the second update."""
-
-        def begin(self): ...
-
-        def advance(self, share, elapsed_s, steps):
-            if steps == 2 * 8 * 16:
-                os.kill(os.getpid(), signal.SIGINT)
-
-        def verdict(self, elapsed_s, success): ...
-
-        def end(self): ...
-
     settings, before = small("differential_drive"), signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=50, watcher=Impatient())
@@ -158,6 +160,49 @@ def test_ctrl_c_leaves_a_finished_run_that_can_be_resumed(tmp_path, quick_judge)
     assert record["updates"] == 2
     again = train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=4, resume=True)
     assert (again["updates"], again["interrupted"]) == (4, False)
+
+
+def test_a_run_that_a_person_broke_off_goes_on_as_if_nobody_had(tmp_path, monkeypatch):
+    """What it is worth when it is broken off is looked at, and must not count later."""
+
+    def judge_of(*_):
+        scores = itertools.count(1.0, -0.1)  # so that the first check of a part is its best one
+
+        def judge(network):
+            score = next(scores)
+            return 0.5, score
+
+        return judge
+
+    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    settings = replace(small("differential_drive"), evaluate_every_s=4.0, time_limit_s=10.0)
+    settings = replace(settings, stop_at_success=StopAtSuccess(0.5, checks=2))
+    with pytest.raises(KeyboardInterrupt):
+        broken = replace(settings, evaluate_every_s=3.9)  # not yet due after two updates
+        train(TURTLEBOT, TASK, broken, seed=1, out=tmp_path, updates=10, watcher=Impatient())
+    assert [check["steps"] // 128 for check in read_run_record(tmp_path)["curve"]] == [2]
+    record = train(TURTLEBOT, TASK, broken, seed=1, out=tmp_path, updates=10, resume=True)
+    assert [check["steps"] // 128 for check in record["curve"]] == [4, 8]
+    assert record["best"]["steps"] // 128 == 4
+
+
+@pytest.mark.parametrize("left", ["nothing", "a check"])
+def test_a_disk_that_has_no_room_for_a_checkpoint_costs_not_the_network(
+    tmp_path, quick_judge, monkeypatch, left
+):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device", "checkpoint.pkl")
+
+    monkeypatch.setattr("training.session.save_checkpoint", full)
+    settings = small("differential_drive")
+    if left == "nothing":
+        settings = replace(settings, checkpoint_every_s=1e-9)
+    with pytest.raises(OSError, match="No space left"):
+        train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=3)
+    assert (tmp_path / "network.pt").is_file() is (left == "a check")
+    if left == "a check":
+        record = read_run_record(tmp_path)
+        assert (record["updates"], record["interrupted"]) == (3, True)
 
 
 def test_the_curriculum_reaches_the_worlds(tmp_path, quick_judge, monkeypatch):

@@ -129,11 +129,36 @@ def test_without_a_curriculum_the_scenario_is_whole_from_the_start():
         ({"worlds": 100}, "3200 must be a multiple of 'minibatch'"),
         ({"threads": 0}, "'worlds' and 'threads' must be at least 1"),
         ({"time_limit_s": 0.0}, "'time_limit_s' greater than 0"),
+        ({"evaluate_every_s": 0.0}, "'evaluate_every_s' must be greater than 0"),
+        ({"checkpoint_every_s": -1.0}, "'checkpoint_every_s' must be greater than 0"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(change, words):
     with pytest.raises(ValueError, match=words):
         replace(load_training_settings(PLATFORM, TASK), **change)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("thrusters", {"minibatch": 0}, "'minibatch' must be at least 1"),
+        ("thrusters", {"steps": 0}, "'steps' must be at least 1"),
+        ("thrusters", {"epochs": 0}, "'epochs' must be at least 1"),
+        ("thrusters", {"hidden": (64, 0)}, "'hidden' must be at least 1"),
+        ("thrusters", {"learning_rate": -1.0}, "'learning_rate' must be greater than 0"),
+        ("thrusters", {"learning_rate_range": (0.1, 0.01)}, "0 < low <= high"),
+        ("thrusters", {"gamma": 1.5}, r"'gamma' must lie in \(0, 1\]"),
+        ("recurrent_ppo", {"memory": 0}, "'memory' must be at least 1"),
+        ("recurrent_ppo", {"epochs": 0}, "'epochs' must be at least 1"),
+        ("sac", {"tau": 0.0}, r"'tau' must lie in \(0, 1\]"),
+        ("td3", {"buffer": 0}, "'buffer' must be at least 1"),
+        ("td3", {"first_steps": -1}, "'first_steps' must not be negative"),
+    ],
+)
+def test_hyper_parameters_that_no_learner_can_do_with_are_refused(name, change, words):
+    settings = load_training_settings(load_robot("turtlebot2"), TASK, name)
+    with pytest.raises(ValueError, match=words):
+        replace(settings.algorithm, **change)
 
 
 @pytest.mark.parametrize("values", [(-0.1, 0.5), (0.5, 0.0), (0.5, 1.5)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from array_api_compat import device
 
 from fulmar_core.arrays import array_namespace, is_numpy, sum_of
+from fulmar_core.geofence import distance_from_goal
 from fulmar_core.goal import Goal
 from fulmar_core.observation import shares
 from fulmar_core.planar import PlanarState
@@ -50,7 +51,7 @@ def learning_step(
         reward = reward - penalty(after, goal, robot)
     xp = array_namespace(after.x)
     over = xp.zeros(after.x.shape, dtype=xp.bool, device=device(after.x))
-    away = task.errors(after, ended).position
+    away = distance_from_goal(task, after, ended)
     if away is not None:
         over = away > robot.limits.geofence
     touching = task.collides(after, goal, robot)

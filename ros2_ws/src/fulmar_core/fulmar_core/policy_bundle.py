@@ -27,6 +27,7 @@ from fulmar_core.errors import BundleError, did_you_mean
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.whole_files import write_whole
 
 FORMAT = 2
 NETWORK = "policy.onnx"
@@ -102,7 +103,7 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
     """Write a bundle; hashes are filled in here.
 
     Args:
-        folder: Made if need be; files of the same names are replaced.
+        folder: Made if need be; a bundle in it is replaced when the new one is complete.
         network: ONNX model.
         golden: Vectors computed with this very model.
         passport: Its hashes are ignored.
@@ -111,17 +112,23 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
         The sealed passport.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / NETWORK).write_bytes(network)
-    with (folder / GOLDEN).open("wb") as file:
-        np.savez(file, **{f.name: getattr(golden, f.name) for f in fields(golden)})
+    vectors = io.BytesIO()
+    np.savez(vectors, **{f.name: getattr(golden, f.name) for f in fields(golden)})
     values = asdict(passport) | {
         "network_sha256": _sha256(network),
-        "golden_sha256": _sha256((folder / GOLDEN).read_bytes()),
+        "golden_sha256": _sha256(vectors.getvalue()),
         "sha256": "",
     }
     sealed = _passport_of(values, folder / PASSPORT).sealed()
+    text = json.dumps(asdict(sealed), indent=2) + "\n"
+    write_whole(
+        {
+            folder / NETWORK: network,
+            folder / GOLDEN: vectors.getvalue(),
+            folder / PASSPORT: text.encode(),
+        }
+    )
     (folder / SIGNATURE).unlink(missing_ok=True)  # it was for what was here before
-    (folder / PASSPORT).write_text(json.dumps(asdict(sealed), indent=2) + "\n", encoding="utf-8")
     return sealed
 
 

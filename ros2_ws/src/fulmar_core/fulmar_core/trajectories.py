@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fulmar_core.geofence import distance_from_goal
 from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.planar import PlanarState, stack_planar
 from fulmar_core.robot import Robot
@@ -111,7 +112,8 @@ class TrajectoryLog:
 def _step_columns(robot: Robot, task: Task, state: PlanarState, goal: Goal) -> dict[str, np.ndarray]:
     errors, touching = task.errors(state, goal), task.collides(state, goal, robot)
     unasked, none = np.asarray(np.nan), np.asarray(False)
-    far = none if errors.position is None else np.asarray(errors.position > robot.limits.geofence)
+    away = distance_from_goal(task, state, goal)
+    far = none if away is None else np.asarray(away > robot.limits.geofence)
     return {
         "x": state.x,
         "y": state.y,

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fulmar_core.geofence import distance_from_goal
 from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.observation import Observer
 from fulmar_core.planar import PlanarState, planar_of
@@ -109,8 +110,8 @@ class Mission:
         """From a state to the current target; 0 where the task has none, infinite before everything is known [m]."""
         if not self.complete:
             return math.inf
-        error = self._task.errors(self._batch(state), self._batched()).position
-        return 0.0 if error is None else float(error[0])
+        distance = distance_from_goal(self._task, self._batch(state), self._batched())
+        return 0.0 if distance is None else float(distance[0])
 
     def observe(self, state: RigidBodyState, stamp_ns: int, previous_command: np.ndarray) -> np.ndarray:
         """Go on to the next target if the current one is reached, and observe.

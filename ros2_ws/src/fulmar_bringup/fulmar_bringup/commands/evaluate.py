@@ -103,6 +103,12 @@ def evaluate(
         raise ConfigError("--worlds belongs to --through batch.")
     control_dt = the_robot.timing.substeps(hz) * the_robot.timing.physics_dt
     duration_s = episode_s or (steps * control_dt if steps else the_task.episode_s)
+    window_s = the_task.tolerance.hold_s
+    if duration_s < window_s:
+        raise ConfigError(
+            f"an episode of {duration_s:g} s is shorter than the {window_s:g} s that '{task}' is held in the end. "
+            "Make it longer."
+        )
     policy = chosen_policy(controller, policy, the_robot, the_task, hz)
     require(*modules_of(controller, "mock" if through == "batch" else "mujoco"))
     plan = RunPlan(

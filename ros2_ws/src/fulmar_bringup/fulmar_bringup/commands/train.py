@@ -99,6 +99,12 @@ def train(
         require("wandb")
     if executor not in ("local", "ray"):
         raise ConfigError(f"--executor {executor}: must be local or ray.")
+    if resume and (robot or task or settings or out or seed != 1):
+        raise ConfigError(
+            "--resume goes on with what the run began with; leave ROBOT, TASK, --seed, --settings and --out out."
+        )
+    if stop_at_success == 0.0:
+        raise ConfigError("--stop-at-success 0 would stop at once; it must be greater than 0, and at most 1.")
     if control_hz is not None and resume:
         raise ConfigError("--resume goes on at the rate that the run began with; leave --control-hz out.")
     if calibration is not None:
@@ -111,6 +117,10 @@ def train(
                 "--calibration is a file of this machine; --executor ray does not carry it. Use local."
             )
         use_calibration(calibration, robot or "")
+    if (executor == "ray" or address) and seeds == 1:
+        raise ConfigError(
+            "--executor ray and --address are for campaigns: give --seeds N, or leave them out."
+        )
     job = Job(
         name="",
         **(_resumed(resume) if resume else _asked(robot, task, seed, settings, out, campaign=seeds > 1)),
@@ -121,6 +131,8 @@ def train(
     )
     if time_limit is not None or updates is not None:
         job = replace(job, time_limit_s=time_limit, updates=updates)
+        if resume:
+            _remember_limits(job)
     if stop_at_success is not None:
         from training.settings import StopAtSuccess
 
@@ -134,9 +146,17 @@ def train(
             "--resume and --seeds exclude one another: resume the runs of a campaign one by one."
         )
     if seeds == 1:
-        _one(job, as_json=as_json)
+        _one(job, resumes=resume is not None, as_json=as_json)
     else:
         _campaign(job, seeds, _executor(executor, address), as_json=as_json)
+
+
+def _remember_limits(job: Job) -> None:
+    """For who resumes the run once more."""
+    from training.run_folder import read_start, write_start
+
+    limits = {"time_limit_s": job.time_limit_s, "updates": job.updates}
+    write_start(job.out, read_start(job.out) | limits)
 
 
 def _commanded_at(job: Job, control_hz: float) -> Job:
@@ -188,16 +208,21 @@ def _revision() -> str:
     return git_revision()
 
 
-def _one(job: Job, *, as_json: bool) -> None:
+def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     from training.jobs import learn
     from training.judge import judge_in_mujoco
     from training.progress import LearningBar
+    from training.run_folder import START_FILE
+    from training.run_lock import learning_in
 
-    try:
-        record = learn(job, LearningBar(job.out))
-    except KeyboardInterrupt:
-        _tell_how_to_go_on(job.out)
-        raise
+    with learning_in(job.out):
+        if not resumes and (job.out / START_FILE).exists():  # since we looked
+            raise ConfigError(f"{job.out}: another training began there. Give --out another folder.")
+        try:
+            record = learn(job, LearningBar(job.out))
+        except KeyboardInterrupt:
+            _tell_how_to_go_on(job.out)
+            raise
     parts = [record, record.get("specialist", {"steps": 0, "wall_s": 0.0})]
     steps, wall_s = (sum(part[key] for part in parts) for key in ("steps", "wall_s"))
     console.print(f"learned from {steps:,} steps in {wall_s:.0f} s; judging in MuJoCo")
@@ -235,11 +260,14 @@ def _executor(name: str, address: str | None) -> Executor:
 def _campaign(job: Job, seeds: int, executor: Executor, *, as_json: bool) -> None:
     from training.campaign import run_campaign
     from training.job_bars import JobBars
+    from training.train import check_seed
 
     jobs = [
         replace(job, name=f"seed {seed}", seed=seed, out=job.out / f"seed_{seed}")
         for seed in range(job.seed, job.seed + seeds)
     ]
+    for each in jobs:
+        check_seed(each.seed)  # all of them before any begins
     with JobBars(jobs) as bars:
         told = run_campaign(jobs, executor, job.out, bars)
     if as_json:

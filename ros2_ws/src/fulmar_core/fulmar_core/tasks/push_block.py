@@ -157,6 +157,12 @@ class PushBlock:
         """Distance of the block from its place."""
         return Errors(position=self._way(goal)[2])
 
+    def distance_from_goal(self, state: PlanarState, goal: Goal) -> Array:
+        """Of robot or block from the block's place, whichever is farther; see `fulmar_core.geofence` [m]."""
+        xp, target = array_namespace(state.x), goal.current
+        robot = xp.hypot(target[..., 0] - state.x, target[..., 1] - state.y)
+        return xp.maximum(robot, self._way(goal)[2])
+
     def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
         """Touching the block is the task."""
         return None

@@ -1,0 +1,56 @@
+"""Files that are there whole or not at all, whatever happens while they are written."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+UNFINISHED = ".new"
+
+
+def write_whole(contents: Mapping[Path, bytes]) -> None:
+    """Write files; those of the same names are replaced only when all of the new ones are complete.
+
+    Args:
+        contents: What goes into each; their folders are there.
+
+    Raises:
+        OSError: One could not be written, with its name; nothing of it is left, and what was there stays.
+    """
+    with contextlib.ExitStack() as all_of_them:
+        for path, content in contents.items():
+            file = all_of_them.enter_context(whole_file(path))
+            file.write(content)
+            _settle(file)  # here, since none may take its place before all are complete
+
+
+@contextlib.contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """One such file, to write into until the context ends; errors as of `write_whole`."""
+    new = path.with_name(path.name + UNFINISHED)
+    try:
+        with _named(path), new.open("wb") as file:
+            yield file
+            _settle(file)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def _settle(file: BinaryIO) -> None:
+    file.flush()
+    os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Errors of a full disk name no file by themselves."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
