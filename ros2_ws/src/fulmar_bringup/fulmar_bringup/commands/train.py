@@ -214,7 +214,9 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     from training.progress import LearningBar
     from training.run_folder import START_FILE
     from training.run_lock import learning_in
+    from training.train import check_seed
 
+    check_seed(job.seed)  # before anything is made
     with learning_in(job.out):
         if not resumes and (job.out / START_FILE).exists():  # since we looked
             raise ConfigError(f"{job.out}: another training began there. Give --out another folder.")
