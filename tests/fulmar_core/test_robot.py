@@ -109,6 +109,13 @@ def test_wheels_outside_of_the_outline_are_refused():
         replace(robot, actuators=replace(robot.actuators, track=23.0))
 
 
+def test_actuators_that_are_later_than_a_control_step_are_refused():
+    platform = load_robot("floating_platform")
+    late = replace(platform.actuators.response, delay_s=0.15, opening_delay_s=0.1)
+    with pytest.raises(ValueError, match=r"add up to 0\.25 s; at most one control step, 0\.2 s"):
+        replace(platform, actuators=replace(platform.actuators, response=late))
+
+
 def test_wheels_do_not_swim():
     with pytest.raises(ValueError, match="exclude one another"):
         replace(load_robot("turtlebot2"), hydrodynamics=load_robot("kingfisher").hydrodynamics)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import inspect
 import json
+import os
 import shutil
+import signal
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from fulmar_core.episode import HELD_OUT_SEED, JUDGE_SEED
 from fulmar_core.errors import ConfigError
@@ -207,6 +210,22 @@ def test_a_run_interrupted_before_its_first_check_leaves_nothing_that_looks_fini
         train(robot, task, replace(small_settings, evaluate_every_s=0.01), seed=3, out=tmp_path / "run")
     with pytest.raises(ConfigError, match="no finished training run"):
         read_run_record(tmp_path / "run")
+
+
+def test_ctrl_c_during_an_export_ends_it_when_the_exporter_is_done(run_copy, tmp_path, monkeypatch):
+    """The exporter would take it for an error of its own."""
+    exported, done = torch.onnx.export, []
+
+    def pressed(*given, **options):
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append(exported(*given, **options))
+        return done[0]
+
+    monkeypatch.setattr(torch.onnx, "export", pressed)
+    with pytest.raises(KeyboardInterrupt):
+        export(run_copy, tmp_path / "bundle")
+    assert len(done) == 1
+    assert not (tmp_path / "bundle").exists()
 
 
 def test_the_passport_carries_the_verdict_of_mujoco(run_copy, tmp_path):
