@@ -8,8 +8,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
-UNFINISHED = ".new"
-
 
 def write_whole(contents: Mapping[Path, bytes]) -> None:
     """Write files; those of the same names are replaced only when all of the new ones are complete.
@@ -30,14 +28,28 @@ def write_whole(contents: Mapping[Path, bytes]) -> None:
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
     """One such file, to write into until the context ends; errors as of `write_whole`."""
-    new = path.with_name(path.name + UNFINISHED)
+    new = path.with_name(f".{path.name}.{os.getpid()}.new")  # of each process its own, should two write it
     try:
         with _named(path), new.open("wb") as file:
             yield file
             _settle(file)
         new.replace(path)
+        sync_folder(path.parent)
     finally:
         new.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names in a folder to the disk: a new name is lost with the power until then.
+
+    Raises:
+        OSError: The disk refuses.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _settle(file: BinaryIO) -> None:

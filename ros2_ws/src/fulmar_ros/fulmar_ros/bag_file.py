@@ -15,6 +15,8 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC, Writer
 
+from fulmar_core.whole_files import sync_folder
+
 
 def _provisional_end() -> bytes:
     builder = RecordBuilder()
@@ -25,19 +27,6 @@ def _provisional_end() -> bytes:
 
 PROVISIONAL_END = _provisional_end()
 BEGUN = ".begun"  # ending of a file without content; a power cut may leave it to one with content
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk: a new name is lost with the power until then.
-
-    Raises:
-        OSError: The disk refuses.
-    """
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def mcap_writer(file: BagFile, **options: Any) -> Writer:

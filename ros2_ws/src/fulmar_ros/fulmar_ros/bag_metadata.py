@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import yaml
 
 from fulmar_core import yaml_text
-from fulmar_ros.bag_file import sync_folder
+from fulmar_core.whole_files import write_whole
 
 METADATA_FILE = "metadata.yaml"
 # Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.
@@ -84,7 +83,7 @@ def write_metadata(
     # A deep copy of its own for each place, because other YAML readers need not know aliases.
     document = {"rosbag2_bagfile_information": _without_sharing(information)}
     text = yaml.dump(document, Dumper=_DUMPER, sort_keys=False, width=10**6)
-    replace_file(directory / METADATA_FILE, text.encode())
+    write_whole({directory / METADATA_FILE: text.encode()})
 
 
 def read_information(directory: Path) -> dict[str, Any]:
@@ -117,25 +116,6 @@ def _together(spans: Iterable[BagSpan]) -> BagSpan:
         start_ns=min((span.start_ns for span in some), default=0),
         end_ns=max((span.end_ns for span in some), default=0),
     )
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a file so that it holds all of the new bytes or all of the old ones.
-
-    Raises:
-        OSError: The disk refuses; what was there stays.
-    """
-    new = path.with_name(f".{path.name}.new")
-    try:
-        with new.open("wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        new.replace(path)
-        sync_folder(path.parent)
-    except OSError:
-        new.unlink(missing_ok=True)
-        raise
 
 
 def _without_sharing(value: object) -> object:

@@ -12,7 +12,8 @@ from mcap.well_known import Profile
 
 from fulmar_core import yaml_text
 from fulmar_core.errors import BagError
-from fulmar_ros.bag_file import BagFile, mcap_writer, sync_folder
+from fulmar_core.whole_files import sync_folder
+from fulmar_ros.bag_file import BagFile, mcap_writer
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, read_custom, write_metadata
 from fulmar_ros.bag_records import bag_files, plain_name, read_records
 

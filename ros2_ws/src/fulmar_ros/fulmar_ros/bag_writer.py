@@ -12,7 +12,7 @@ from typing import Any
 
 from fulmar_core.errors import BagError
 from fulmar_core.topics import Delivery
-from fulmar_ros.bag_file import sync_folder
+from fulmar_core.whole_files import sync_folder
 from fulmar_ros.bag_metadata import BagSpan, TopicCount, write_metadata
 from fulmar_ros.bag_part import BagPart, Topic
 from fulmar_ros.bag_types import message_type, offered_qos

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import fulmar_core.bounds
 from fulmar_bringup.evaluation import Trial
 from fulmar_core.episode import Episode
 from fulmar_core.waypoint_score import WaypointBound, waypoint_bound
+from fulmar_core.whole_files import whole_file
 
 
 def cached_bound(trial: Trial, drawn: Episode, duration_s: float, folder: Path) -> WaypointBound:
@@ -38,10 +38,8 @@ def cached_bound(trial: Trial, drawn: Episode, duration_s: float, folder: Path) 
     if bound.goals_at_top_speed is not None:
         kept["goals_at_top_speed"] = bound.goals_at_top_speed
     folder.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(f".{os.getpid()}.part")
-    with unfinished.open("wb") as file:
+    with whole_file(path) as file:
         np.savez(file, **kept)
-    unfinished.replace(path)
     return bound
 
 

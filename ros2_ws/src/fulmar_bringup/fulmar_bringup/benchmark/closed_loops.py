@@ -21,6 +21,7 @@ from typing import Any, Protocol
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_core.tasks import load_task
+from fulmar_core.whole_files import write_whole
 
 REQUIRED = 0.95  # share of episodes that reach their goal
 SLACK_S = 120.0  # what starting and stopping may take on a busy machine
@@ -138,9 +139,7 @@ def _run(case: Case, seed: int, campaign: Campaign, free: queue.SimpleQueue[int]
         free.put(domain)
     if kept is not None:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = kept.with_suffix(".new")
-        unfinished.write_text(json.dumps(asdict(episode)), encoding="utf-8")
-        unfinished.replace(kept)
+        write_whole({kept: json.dumps(asdict(episode)).encode()})
     return episode
 
 

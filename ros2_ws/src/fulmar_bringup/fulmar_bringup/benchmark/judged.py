@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from fulmar_core.whole_files import whole_file
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of what is kept over time
 FIGURE, MORE = "figure:", "more:"  # prefixes of figures and of further arrays in a file
@@ -36,10 +37,8 @@ class Judged:
         arrays |= {FIGURE + name: values for name, values in self.figures.items()}
         arrays |= {MORE + name: values for name, values in self.more.items()}
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_suffix(f".{os.getpid()}.part")
-        with unfinished.open("wb") as file:
+        with whole_file(path) as file:
             np.savez_compressed(file, about=np.array(json.dumps(self.about)), **arrays)
-        unfinished.replace(path)
 
     @classmethod
     def load(cls, path: Path) -> Judged:
