@@ -17,9 +17,9 @@ from fulmar_core.calibration import (
     use_calibration,
 )
 from fulmar_core.counter_rng import WORLD, Draws
-from fulmar_core.disturbances.scenario import draw_world, load_scenario
+from fulmar_core.disturbances.scenario import draw_world, load_scenario, longest_delay
 from fulmar_core.errors import ConfigError
-from fulmar_core.motion import longest_delay, may_be_off_centre
+from fulmar_core.motion import may_be_off_centre
 from fulmar_core.robot import load_robot
 
 

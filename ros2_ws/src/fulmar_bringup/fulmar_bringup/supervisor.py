@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -107,22 +107,23 @@ class Supervisor:
         self.give_obstacles(goal, time_ns=time_ns, alive=alive)
         parts = self._timed(goal, time_ns)
         wires = [wire for wire in (self._goal, self._obstacles) if wire is not None]
-        stamps = [stamp for _, stamp in parts]
+        stamps = {stamp for _, stamp in parts}
 
         def found() -> bool:
             return all(wire.get_subscription_count() >= listeners for wire in wires)
 
-        while not (self._told(parts, alive) and self._before_silence(found, stamps, alive)):
+        while not (self._told(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
             self.wait_until(lambda: not self.controller.values.get("reason", "").startswith(SILENT), alive)
             time.sleep(TELL_AGAIN_S)
 
-    def _told(self, parts: Sequence[tuple[Goal, int]], alive: Callable[[], None]) -> bool:
+    def _told(
+        self, parts: Sequence[tuple[Goal, int]], stamps_ns: Set[int], alive: Callable[[], None]
+    ) -> bool:
         """Publish goals, each when the controller has the one before; False if a silent e-stop came between."""
         for part, stamp in parts:
             self.controller.values.pop("goal_refused", None)  # of what was told before
             self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
-            known = partial(self._has, stamp)
-            if not self._before_silence(known, [stamp for _, stamp in parts], alive):
+            if not self._before_silence(partial(self._has, stamp), stamps_ns, alive):
                 return False
         return True
 
@@ -131,7 +132,7 @@ class Supervisor:
         return self.controller.values.get("goal_stamp_ns") == str(stamp_ns)
 
     def _before_silence(
-        self, condition: Callable[[], bool], stamps_ns: Sequence[int], alive: Callable[[], None]
+        self, condition: Callable[[], bool], stamps_ns: Set[int], alive: Callable[[], None]
     ) -> bool:
         """Wait for something; False if a silent e-stop cost the controller one of these goals first."""
         refused = {str(stamp) for stamp in stamps_ns}

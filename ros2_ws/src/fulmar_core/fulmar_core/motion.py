@@ -36,14 +36,6 @@ def actuation_of(robot: Robot, safe: Array, *, opens_late: bool = True) -> Actua
     )
 
 
-def longest_delay(robot: Robot, scenario: Scenario) -> float:
-    """Until the latest command of any world acts [s]."""
-    actuation = scenario.actuation
-    response = robot.actuators.response
-    own = response.delay_s + response.opening_delay_s
-    return own + actuation.delay_s + actuation.opening_delay_s[1]
-
-
 def may_open_late(robot: Robot, scenario: Scenario) -> bool:
     """Whether closed valves open later than open ones close in any world."""
     return max(robot.actuators.response.opening_delay_s, scenario.actuation.opening_delay_s[1]) > 0.0

@@ -119,6 +119,15 @@ class Timing:
             raise ValueError("physics_dt and control_hz must be greater than 0.")
         self.substeps(self.control_hz)
 
+    @property
+    def control_s(self) -> float:
+        """A control step at the default rate [s]."""
+        return 1.0 / self.control_hz
+
+    def is_over_within(self, time_s: float) -> bool:
+        """Whether a control step is over before a time has passed [s]."""
+        return time_s > self.control_s + 1e-9
+
     def substeps(self, control_hz: float) -> int:
         """Physics steps in one control step.
 
@@ -188,11 +197,11 @@ class Robot:
             )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
-        response, control_s = self.actuators.response, 1.0 / self.timing.control_hz
-        if response.delay_s + response.opening_delay_s > control_s + 1e-9:
+        late_s = self.actuators.response.latest_s
+        if self.timing.is_over_within(late_s):
             raise ValueError(
-                f"'delay_s' and 'opening_delay_s' add up to {response.delay_s + response.opening_delay_s:g} s; at most "
-                f"one control step, {control_s:g} s."
+                f"'delay_s' and 'opening_delay_s' add up to {late_s:g} s; at most one control step, "
+                f"{self.timing.control_s:g} s."
             )
         gains = self.actuators.response.gain
         if gains and len(gains) != len(self.actuators.names):

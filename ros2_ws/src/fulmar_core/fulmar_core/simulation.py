@@ -11,11 +11,11 @@ from array_api_compat import is_numpy_namespace
 
 from fulmar_core.arrays import array_namespace
 from fulmar_core.counter_rng import Keys, keys_at, uniform_from, words, world_keys, write_keys
-from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.disturbances.scenario import Scenario, longest_delay
 from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.episode import draw_episodes
 from fulmar_core.goal import Goal
-from fulmar_core.motion import actuation_of, control_step, longest_delay, may_be_off_centre, may_open_late
+from fulmar_core.motion import actuation_of, control_step, may_be_off_centre, may_open_late
 from fulmar_core.moving import Moves
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import COLUMNS, PlanarState

@@ -85,7 +85,7 @@ def evaluate(
     from fulmar_bringup.planning import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, modules_of
     from fulmar_core.calibration import use_calibration
-    from fulmar_core.disturbances.scenario import check_fit, load_scenario
+    from fulmar_core.disturbances.scenario import check_delays, load_scenario
     from fulmar_core.robot import load_robot
     from fulmar_core.rollout import WORLDS
     from fulmar_core.tasks import load_task
@@ -95,7 +95,7 @@ def evaluate(
     use_calibration(calibration, robot)
     check_names(robot, task, controller, "mujoco")
     the_robot, the_task = load_robot(robot), load_task(task)
-    check_fit(the_robot, load_scenario(scenario))  # so that mistakes are told before anything is started
+    check_delays(the_robot, load_scenario(scenario))  # so that mistakes are told before anything is started
     hz = checked_rate(the_robot, control_hz or the_robot.timing.control_hz)
     if episode_s is not None and steps is not None:
         raise ConfigError("--episode-s and --steps say the same thing. Give one of them.")

@@ -94,6 +94,7 @@ def train(
     fulmar train floating_platform go_to_pose --control-hz 50 --updates 20
     """
     from training.jobs import Job
+    from training.train import check_seed
 
     if wandb:
         require("wandb")
@@ -145,6 +146,8 @@ def train(
         raise ConfigError(
             "--resume and --seeds exclude one another: resume the runs of a campaign one by one."
         )
+    for each in range(job.seed, job.seed + seeds):
+        check_seed(each)  # all of them, before anything is made
     if seeds == 1:
         _one(job, resumes=resume is not None, as_json=as_json)
     else:
@@ -214,9 +217,7 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     from training.progress import LearningBar
     from training.run_folder import START_FILE
     from training.run_lock import learning_in
-    from training.train import check_seed
 
-    check_seed(job.seed)  # before anything is made
     with learning_in(job.out):
         if not resumes and (job.out / START_FILE).exists():  # since we looked
             raise ConfigError(f"{job.out}: another training began there. Give --out another folder.")
@@ -262,14 +263,11 @@ def _executor(name: str, address: str | None) -> Executor:
 def _campaign(job: Job, seeds: int, executor: Executor, *, as_json: bool) -> None:
     from training.campaign import run_campaign
     from training.job_bars import JobBars
-    from training.train import check_seed
 
     jobs = [
         replace(job, name=f"seed {seed}", seed=seed, out=job.out / f"seed_{seed}")
         for seed in range(job.seed, job.seed + seeds)
     ]
-    for each in jobs:
-        check_seed(each.seed)  # all of them before any begins
     with JobBars(jobs) as bars:
         told = run_campaign(jobs, executor, job.out, bars)
     if as_json:

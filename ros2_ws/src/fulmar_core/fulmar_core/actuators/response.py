@@ -32,6 +32,11 @@ class Response:
             raise ValueError("give 'slew' or 'lag_s', not both: what slews has no lag here.")
 
     @property
+    def latest_s(self) -> float:
+        """Until the latest command acts [s]."""
+        return self.delay_s + self.opening_delay_s
+
+    @property
     def remembers(self) -> bool:
         """Whether what an actuator does depends on more than the newest command."""
         return bool(self.slew) or self.lag_s > 0.0

@@ -187,19 +187,25 @@ class Scenario:
             )
 
 
-def check_fit(robot: Robot, scenario: Scenario) -> None:
-    """Refuse a scenario that a robot could not have as it is written.
+def longest_delay(robot: Robot, scenario: Scenario) -> float:
+    """Until the latest command of any world acts; only valves open late [s]."""
+    actuation = scenario.actuation
+    opening_s = actuation.opening_delay_s[1] if isinstance(robot.actuators, Thrusters) else 0.0
+    return robot.actuators.response.latest_s + actuation.delay_s + opening_s
+
+
+def check_delays(robot: Robot, scenario: Scenario) -> None:
+    """Refuse a scenario in which a robot would obey later than it is told anew.
 
     Raises:
         ConfigError: Commands would be late by more than a control step.
     """
-    faults, response, control_s = scenario.actuation, robot.actuators.response, 1.0 / robot.timing.control_hz
-    opening_s = faults.opening_delay_s[1] if isinstance(robot.actuators, Thrusters) else 0.0
-    late = faults.delay_s + opening_s + response.delay_s + response.opening_delay_s
-    if late > control_s + 1e-9:
+    late_s = longest_delay(robot, scenario)
+    if robot.timing.is_over_within(late_s):
         raise ConfigError(
-            f"scenario '{scenario.title}': commands would be up to {late:g} s late ('delay_s' and 'opening_delay_s' of "
-            f"'actuation', with the robot's own); at most one control step, {control_s:g} s of '{robot.name}'."
+            f"scenario '{scenario.title}': commands would be up to {late_s:g} s late ('delay_s' and 'opening_delay_s' "
+            f"of 'actuation', with the robot's own); at most one control step, {robot.timing.control_s:g} s of "
+            f"'{robot.name}'."
         )
 
 
@@ -228,9 +234,9 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
         Worlds of as many episodes as `draws` has.
 
     Raises:
-        ConfigError: The robot cannot have this scenario; see `check_fit`.
+        ConfigError: The robot cannot have this scenario; see `check_delays`.
     """
-    check_fit(robot, scenario)
+    check_delays(robot, scenario)
     count = len(robot.actuators.names)
     uncertain = strength if scenario.body == "uncertain" else 0.0
     spans = robot.uncertainty

@@ -10,7 +10,7 @@ import numpy as np
 Point = tuple[float, float]  # x, y [m]
 
 LARGEST = 10_000.0  # size of a path [m]
-MOST_TURNS = 100  # of a path before it ends or closes
+MOST_TURNS = 100  # or cycles or corners of a path; of a hypotrochoid before it closes
 _FINEST = 40  # samples of a curve for each point asked for
 _LEAST = 4000
 

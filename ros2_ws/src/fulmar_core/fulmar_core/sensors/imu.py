@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.counter_rng import NOISE
-from fulmar_core.sensors.odometer import Channel
+from fulmar_core.sensors.odometer import Channel, largest_reading
 
 INERTIAL = 4  # tells the unit's random numbers from those of the odometry
 
@@ -84,8 +84,7 @@ class InertialUnit:
     def _read(self, truth: ImuSample) -> np.ndarray:
         reading = np.concatenate((truth.specific_force, truth.angular_velocity))
         reading = reading * self._scale + self._bias + self._std * self._rng.standard_normal(6)
-        most = np.where(self._limit > 0.0, self._limit, np.inf)
+        most = largest_reading(self._limit, self._quantum)
         step = np.where(self._quantum > 0.0, self._quantum, 1.0)
-        most = np.where(self._quantum > 0.0, np.floor(most / step + 1e-6) * step, most)
         reading = np.clip(reading, -most, most)
         return np.where(self._quantum > 0.0, np.round(reading / step) * step, reading)

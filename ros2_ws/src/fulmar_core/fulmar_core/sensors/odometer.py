@@ -40,6 +40,14 @@ class Channel:
             raise ValueError("std, bias_std, scale_std, limit and quantum must not be negative.")
 
 
+def largest_reading(limit: Array, quantum: Array) -> Array:
+    """The last whole quantum within the limit, for channels of any shape; 0 of either is none."""
+    xp = array_namespace(limit)
+    step = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
+    within = xp.where(quantum > 0.0, xp.floor(limit / step + 1e-6) * step, limit)
+    return xp.where(limit > 0.0, within, xp.full_like(limit, xp.inf))
+
+
 @dataclass(frozen=True)
 class OdometrySpec:
     """What the odometry reports, and when."""
@@ -107,9 +115,8 @@ class Odometer(Moves):
         spec = spec if noisy else OdometrySpec()
         self._spec, self._seed, self._noisy, self._period = spec, seed, noisy, period
         self._blurred = blurred
-        self._share = (
-            min(1.0, spec.rate_hz * period) if spec.rate_hz else 1.0
-        )  # of the calls bring a new reading
+        # Of the calls that bring a new reading.
+        self._share = min(1.0, spec.rate_hz * period) if spec.rate_hz else 1.0
         # An error of scale, or a limit, is of the angle that a sensor gives, not of all turns so far.
         self._wraps = max(spec.heading.scale_std, spec.heading.limit) > 0.0
         longest = spec.delay_s + max_delay_s if noisy else 0.0
@@ -235,14 +242,8 @@ class Odometer(Moves):
         return columns
 
     def _most(self, like: Array) -> Array:
-        """Largest reading of each channel: a whole multiple of the quantum where there is one, shape (6, 1)."""
-        xp = array_namespace(like)
-        limit, quantum = self._constant("limit", like), self._constant("quantum", like)
-        safe = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
-        limit = xp.where(
-            quantum > 0.0, xp.where(limit > 0.0, xp.floor(limit / safe + 1e-6) * safe, limit), limit
-        )
-        return xp.where(self._constant("limit", like) > 0.0, limit, xp.full_like(limit, xp.inf))
+        """Largest reading of each channel, shape (6, 1)."""
+        return largest_reading(self._constant("limit", like), self._constant("quantum", like))
 
     def _delayed(self, reading: Array, world: World) -> Array:
         """Reading of some measurements ago; before the first one, the first."""

@@ -20,6 +20,7 @@ class TaskProtocol(Protocol):
     - `required: int`: targets that make an episode a success, where not a closing window but their number counts.
     - `counted(goal, state, radius) -> Goal`: as `advance`, for judges: a target counts within a radius of theirs [m].
     - `begun(goal, state) -> Goal`: a goal that was told, for a robot that is somewhere, before its first step.
+    - `distance_from_goal(state, goal) -> Array`: what the geofence limits, where that is not the position's error [m].
     - `penalty(state, goal, robot) -> Array`: what a state costs a learner beside the reward.
     - `pushed(goal, before, after, robot) -> (Goal, PlanarState)`: where the block is after a step in the core's batch,
       and the robot once the block has held it up; simulators with contacts move the block themselves.
