@@ -12,27 +12,10 @@ import yaml
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
+from fulmar_core.ranges import at_least_1, positive, shares
 from fulmar_core.robot import Robot
 from fulmar_core.symmetry import Symmetry
 from fulmar_core.tasks import Task
-
-
-def _at_least_1(**sizes: int | tuple[int, ...]) -> None:
-    for name, size in sizes.items():
-        if min(size if isinstance(size, tuple) else (size,), default=1) < 1:
-            raise ValueError(f"'{name}' must be at least 1.")
-
-
-def _positive(**numbers: float) -> None:
-    for name, number in numbers.items():
-        if number <= 0.0:
-            raise ValueError(f"'{name}' must be greater than 0.")
-
-
-def _shares(**numbers: float) -> None:
-    for name, number in numbers.items():
-        if not 0.0 < number <= 1.0:
-            raise ValueError(f"'{name}' must lie in (0, 1].")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,17 +38,17 @@ class OnPolicy:
 
     def __post_init__(self) -> None:
         """Refuse what no learner can do."""
-        _at_least_1(steps=self.steps, minibatch=self.minibatch, epochs=self.epochs, hidden=self.hidden)
+        at_least_1(steps=self.steps, minibatch=self.minibatch, epochs=self.epochs, hidden=self.hidden)
         low, high = self.learning_rate_range
         if not 0.0 < low <= high:
             raise ValueError("'learning_rate_range' must be [low, high] with 0 < low <= high.")
-        _positive(
+        positive(
             learning_rate=self.learning_rate,
             target_kl=self.target_kl,
             clip_range=self.clip_range,
             max_grad_norm=self.max_grad_norm,
         )
-        _shares(gamma=self.gamma, gae_lambda=self.gae_lambda)
+        shares(gamma=self.gamma, gae_lambda=self.gae_lambda)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +71,7 @@ class RecurrentPpo(OnPolicy):
     def __post_init__(self) -> None:
         """The same, and memories of nothing."""
         super().__post_init__()
-        _at_least_1(memory=self.memory)
+        at_least_1(memory=self.memory)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +89,7 @@ class OffPolicy:
 
     def __post_init__(self) -> None:
         """Refuse what no learner can do."""
-        _at_least_1(
+        at_least_1(
             buffer=self.buffer,
             minibatch=self.minibatch,
             gradient_steps=self.gradient_steps,
@@ -114,8 +97,8 @@ class OffPolicy:
         )
         if self.first_steps < 0:
             raise ValueError("'first_steps' must not be negative.")
-        _positive(learning_rate=self.learning_rate)
-        _shares(tau=self.tau, gamma=self.gamma)
+        positive(learning_rate=self.learning_rate)
+        shares(tau=self.tau, gamma=self.gamma)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -287,7 +270,7 @@ class TrainingSettings:
             )
         if min(self.worlds, self.threads) < 1 or self.time_limit_s <= 0.0:
             raise ValueError("'worlds' and 'threads' must be at least 1, 'time_limit_s' greater than 0.")
-        _positive(evaluate_every_s=self.evaluate_every_s, checkpoint_every_s=self.checkpoint_every_s)
+        positive(evaluate_every_s=self.evaluate_every_s, checkpoint_every_s=self.checkpoint_every_s)
 
     def learner_of(self, robot: Robot) -> Robot:
         """The robot as it learns: with the rate of the commands that is asked for.

@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fulmar_core import ranges
+
 Point = tuple[float, float]  # x, y [m]
 
 LARGEST = 10_000.0  # size of a path [m]
@@ -21,9 +23,8 @@ def positive(**sizes: float) -> None:
     Raises:
         ValueError: Names the first such size.
     """
+    ranges.positive(**sizes)
     for name, size in sizes.items():
-        if size <= 0.0:
-            raise ValueError(f"'{name}' must be greater than 0.")
         if size > LARGEST:
             raise ValueError(f"'{name}' must be at most {LARGEST:g}.")
 
