@@ -157,3 +157,23 @@ def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_told_again_by_itsel
     giving.join()
     assert failures
     assert overseer.controller.values["goal_stamp_ns"] == "0"
+
+
+def test_a_press_that_silence_hid_ends_the_giving_and_a_reset_moves_nothing(
+    operated: tuple[Supervisor, Button, Node],
+) -> None:
+    overseer, button, _ = operated
+    for pressed, words in ((True, "e-stop: pressed"), (None, "e-stop: silent")):
+        button.pressed = pressed
+        until(lambda words=words: words in reason(overseer))
+    failures: list[Exception] = []
+    giving = give(overseer, failures)
+    until(lambda: "e-stop: silent" in overseer.controller.values.get("goal_refused", ""))
+    button.pressed = False  # started anew, it knows nothing of the press
+    giving.join()
+    assert "it was pressed when it fell silent" in str(failures[0])
+    button.pressed = True  # a reset says so first
+    until(lambda: "e-stop: pressed" in reason(overseer))
+    button.pressed = False
+    until(lambda: "no odom yet" in reason(overseer))
+    assert overseer.controller.values["goal_stamp_ns"] == "0"

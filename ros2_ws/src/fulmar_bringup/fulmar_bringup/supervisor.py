@@ -22,7 +22,7 @@ from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
-from fulmar_core.safety.estop import SILENT
+from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
@@ -103,6 +103,9 @@ class Supervisor:
             time_ns: Its stamp, by which the controller names it; for velocities also when the first begins [ns].
             alive: Called while waiting; raises to give up.
             listeners: How many nodes have to have found this operator, the controller among them.
+
+        Raises:
+            RunFailed: The e-stop was pressed before it fell silent, or since.
         """
         self.give_obstacles(goal, time_ns=time_ns, alive=alive)
         parts = self._timed(goal, time_ns)
@@ -113,8 +116,20 @@ class Supervisor:
             return all(wire.get_subscription_count() >= listeners for wire in wires)
 
         while not (self._told(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
-            self.wait_until(lambda: not self.controller.values.get("reason", "").startswith(SILENT), alive)
+            self.wait_until(lambda: not self._reason.startswith(SILENT), alive)
+            self._raise_if_pressed()
             time.sleep(TELL_AGAIN_S)
+            self._raise_if_pressed()
+
+    @property
+    def _reason(self) -> str:
+        """Why the controller does not act."""
+        return self.controller.values.get("reason", "")
+
+    def _raise_if_pressed(self) -> None:
+        """Give up where silence turns out to hide a press: after a reset nothing moves by itself."""
+        if self._reason.startswith(HOLDS) and not self._reason.startswith(SILENT):
+            raise RunFailed(f"the controller refused the goal: {self._reason}")
 
     def _told(
         self, parts: Sequence[tuple[Goal, int]], stamps_ns: Set[int], alive: Callable[[], None]

@@ -8,7 +8,8 @@ from __future__ import annotations
 TIMEOUT_NS = 500_000_000  # republished at 10 Hz, so that four may get lost
 QUIET_NS = 500_000_000  # commands older than this no longer count against a reset
 REPUBLISH_HZ = 10.0
-SILENT = "e-stop: silent"  # how the reason begins where nobody pressed anything
+HOLDS = "e-stop:"  # how every reason begins
+SILENT = f"{HOLDS} silent"  # and how the one does that nobody may have given by a press
 
 
 class EstopWatch:
@@ -56,13 +57,13 @@ class EstopWatch:
     def reason(self, now_ns: int) -> str:
         """Why nothing may move at this time of the same clock; empty if it may [ns]."""
         if self._heard_ns is None:
-            return "e-stop: none is heard, and one is required" if self._required else ""
+            return f"{HOLDS} none is heard, and one is required" if self._required else ""
         silent_ns = now_ns - self._heard_ns
         if silent_ns > self._timeout_ns:
             return f"{SILENT} for {silent_ns / 1e6:.0f} ms (limit {self._timeout_ns / 1e6:.0f} ms)"
         if self._orphaned:
-            return "e-stop: it was pressed when it fell silent. Reset it: fulmar estop --reset"
-        return "" if self._released else "e-stop: pressed"
+            return f"{HOLDS} it was pressed when it fell silent. Reset it: fulmar estop --reset"
+        return "" if self._released else f"{HOLDS} pressed"
 
 
 class EstopButton:
