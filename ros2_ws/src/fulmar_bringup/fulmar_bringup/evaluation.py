@@ -89,6 +89,8 @@ def runs_of(
         return
     robot, scenario, controller = trial.robot, load_scenario(plan.scenario), trial.controller()
     if trial.through == "batch":
+        from fulmar_bringup.system import CONTROLLERS
+
         yield from batches(
             controller,
             robot,
@@ -96,7 +98,7 @@ def runs_of(
             scenario,
             episodes=trial.episodes,
             seed=plan.seed,
-            worlds=trial.worlds,
+            worlds=min(trial.worlds, CONTROLLERS[plan.controller].together or trial.worlds),
             progress=progress,
         )
         return

@@ -90,7 +90,7 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "wait_for_subscribers": subscribers,
     }
     guards = plan.guards
-    if plan.controller == "policy":
+    if CONTROLLERS[plan.controller].runs_bundle:
         texts = {
             "policy": plan.policy,
             "fallback": guards.fallback or "",

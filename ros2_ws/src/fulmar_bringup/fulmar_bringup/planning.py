@@ -341,7 +341,7 @@ def chosen_policy(
         ConfigError: A bundle was given to a controller that runs none.
         BundleError: None is shipped, or the bundle is damaged or made for something else.
     """
-    if controller == "policy":
+    if CONTROLLERS[controller].runs_bundle:
         try:
             return checked_policy(policy, robot, task, control_hz)
         except BundleError:

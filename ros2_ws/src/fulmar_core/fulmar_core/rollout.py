@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.course import tell_course
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
 from fulmar_core.health.informer import Informer
@@ -82,6 +83,7 @@ def batches(
         steps, informer = episode_steps(task, dt), Informer(robot, controller)
         for step in range(steps):
             informer.see(simulation.measured, simulation.command, dt)
+            tell_course(controller, simulation.goal)
             simulation.step(np.asarray(controller.act(simulation.observe())))
             log.add(simulation.truth, judge.see(simulation.truth, simulation.goal.block), simulation.command)
             progress(first * steps + (step + 1) * count)
@@ -162,6 +164,7 @@ def _side_by_side(
             goal = dataclasses.replace(goal, block=block)
         goal = task.advance(goal, measured, np.asarray(step * control_dt)) if step else goal
         informer.see(measured, command, control_dt)
+        tell_course(controller, goal)
         action = np.asarray(controller.act(observer(measured, goal, command)))
         command = slewed(robot.actuators.limited(action), command, robot, control_dt)
         samples = [backend.step(each, substeps) for backend, each in zip(backends, command, strict=False)]

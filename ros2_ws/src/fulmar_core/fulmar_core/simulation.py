@@ -166,6 +166,20 @@ class BatchSimulation(Moves):
         self.command[index] = self._safe[:, 0]
         self.measured = self._odometer.restart(self.truth, index, coming.reading)
 
+    def put(self, state: PlanarState, goal: Goal, command: Array) -> None:
+        """Put every world's robot somewhere else, for drives that begin under way.
+
+        Args:
+            state: Where it is and how it moves, shapes (worlds,).
+            goal: What it shall do.
+            command: What its actuators do, within their limits, shape (worlds, n).
+        """
+        self.truth = PlanarState(*(self._real(getattr(state, name)) for name in COLUMNS))
+        self.goal = Goal(*(self._real(getattr(goal, name)) for name in Goal.__slots__))
+        self.command = self._real(command)
+        self._actuation.hold(self._xp.asarray(self.command.T, copy=True))
+        self._measure()
+
     def step(self, command: Array) -> None:
         """Apply one command for one control step.
 

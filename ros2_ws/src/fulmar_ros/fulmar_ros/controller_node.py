@@ -15,6 +15,7 @@ from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.health.informer import Informer
@@ -314,7 +315,11 @@ class ControllerNode(LifecycleNode):
         if measurement.stamp_ns - self._answered_ns > self._pause_ns:
             self._answer = self.robot.actuators.safe_command
             self.controller.reset()
-        return self.inputs.mission.observe(measurement.state, measurement.stamp_ns, self._answer)
+        mission = self.inputs.mission
+        observation = mission.observe(measurement.state, measurement.stamp_ns, self._answer)
+        assert mission.goal is not None
+        tell_course(self.controller, mission.goal)
+        return observation
 
     def _act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:
         """The command, the controller's action that it is made of, and why it is the safe one instead."""

@@ -60,6 +60,11 @@ class Mission:
         return not self.lacking
 
     @property
+    def goal(self) -> Goal | None:
+        """The goal with all its targets; None before there is one."""
+        return self._goal
+
+    @property
     def done(self) -> int:
         """Targets reached since the goal was given."""
         return 0 if self._goal is None else int(self._goal.done)

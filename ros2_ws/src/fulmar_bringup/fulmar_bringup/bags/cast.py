@@ -33,7 +33,7 @@ def answers_of(
         return CONTROLLERS[name].load(course.robot, course.task, hz, bundle)
 
     law, fallback = course.settings.fallback, None
-    if name == "policy" and law:  # nothing else has one in the node
+    if CONTROLLERS[name].runs_bundle and law:  # nothing else has one in the node
         law_of = None if law == "classical" else law
         fallback = load_classical(course.robot, course.task, control_hz=hz, law=law_of)
     loaded = load(folder)

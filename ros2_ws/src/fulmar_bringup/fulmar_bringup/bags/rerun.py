@@ -15,6 +15,7 @@ from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.guarded import RecordedEstop
 from fulmar_bringup.bags.told import ABSENT
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import BagError, FulmarError, RunFailed
 from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
@@ -166,6 +167,7 @@ class _Rerun:
             try:
                 self._inform(step)
                 if acted[step]:
+                    self._tell_course()
                     actions[step] = self._act(shown[step])
             except Exception as error:  # noqa: BLE001 - whatever a controller raises, as in the node
                 reasons[step] = self._give_up(step, error)
@@ -260,6 +262,11 @@ class _Rerun:
             informer.reset()
         self._seen_ns = stamp
         informer.see(planar_of(self._states[sample]), self._answer, passed_ns / 1e9)
+
+    def _tell_course(self) -> None:
+        """Tell the controller the whole course, if it wants to know and there is one."""
+        if self._mission.goal is not None:
+            tell_course(self._controller, self._mission.goal)
 
     def _act(self, observation: np.ndarray) -> np.ndarray:
         action = np.asarray(self._controller.act(observation), dtype=float)

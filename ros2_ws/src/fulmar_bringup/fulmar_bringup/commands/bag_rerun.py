@@ -183,7 +183,7 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
         raise ConfigError(f"{bag.path}: the bag does not say which controller drove. Give --controller.")
     if name not in CONTROLLERS:
         raise UnknownNameError("controller", name, CONTROLLERS)
-    if name != "policy":
+    if not CONTROLLERS[name].runs_bundle:
         if policy is not None:
             raise ConfigError(
                 f"--policy is for --controller policy, not for '{name}'. Leave one of them out."

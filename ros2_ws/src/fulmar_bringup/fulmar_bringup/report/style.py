@@ -25,10 +25,11 @@ CONTROLLER_COLOURS = {
     "lqr": "#d9780f",
     "mpc": "#a23b9e",
     "lqr_drift": "#8a6d3b",
+    "planner": "#c2477f",
     "classical": "#1a9e84",
     "excite": "#777777",
 }
-OTHER_COLOURS = ("#8d62d9", "#3f9e4d", "#b8860b", "#c2477f", "#5f7a8c")
+OTHER_COLOURS = ("#8d62d9", "#3f9e4d", "#b8860b", "#5f7a8c")
 
 _RC = {
     "font.family": "sans-serif",

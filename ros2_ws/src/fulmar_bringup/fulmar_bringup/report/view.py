@@ -18,6 +18,7 @@ SPOKEN = {
     "mpc": "MPC",
     "lqr_drift": "DRIFT's LQR",
     "policy": "policy",
+    "planner": "planner",
     "classical": "classical law",
     "excite": "excitation",
 }

@@ -59,6 +59,14 @@ class ActuationState(Moves):
             values[:, which] = safe
             setattr(self, name, values)
 
+    def hold(self, command: Array) -> None:
+        """Have every actuator do what it is told, as if it had been so for long.
+
+        Args:
+            command: Within the actuators' limits, shape (n, worlds).
+        """
+        self._before = self._wanted = self.applied = command
+
     def begin(self, command: Array, world: World, noise: Array | None) -> None:
         """Take a new command.
 

@@ -1,0 +1,186 @@
+"""A controller that plans a boat's whole course: a learned policy drives while it plans, and where it has no plan.
+
+It is told the course, which policies never see whole. From the observation it knows where it is on it. It rehearses
+what the policy would do for some seconds, follows that, and has a plan made meanwhile that goes on from there
+(`search`); then it follows the plan. Where the boat is driven off, misses a waypoint, or the plan is late, it begins
+anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.seen import Reader
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.tasks import Task, fitted
+from fulmar_core.tasks.passing import PassingTask
+from policy_server.planning.boat import Boat
+from policy_server.planning.pilot import Pilot
+from policy_server.planning.program import Program
+from policy_server.planning.reference import Follower
+from policy_server.planning.rehearsal import Rehearsal
+from policy_server.planning.search import Order, Search
+from policy_server.planning.settings import PlannerSettings
+from policy_server.planning.workers import Planning, Solvers
+
+LEAST_WAYPOINTS = 3  # of a course that can be planned
+_LEAST_HORIZON_S = 20.0  # that a plan looks ahead at the end of an episode, and after it [s]
+
+
+class Planner:
+    """Follows plans of the course; drives as its policy does where nobody told it one."""
+
+    name = "planner"
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        make_policy: Callable[[], Controller],
+        settings: PlannerSettings,
+        *,
+        patient: bool = True,
+    ) -> None:
+        """Get ready.
+
+        Args:
+            robot: The boat.
+            task: One that `check_planner` takes.
+            make_policy: Loads the policy; called thrice: one drives, two are rehearsed with.
+            settings: How to plan.
+            patient: Wait for plans that are not ready in time, as nothing moves meanwhile. In real time they are given
+                up, as the next command cannot wait.
+        """
+        self._policy, self._settings, self._patient = make_policy(), settings, patient
+        self._robot, self._task = robot, task
+        self.control_hz = self._policy.control_hz
+        self.observation_names = self._policy.observation_names
+        self._dt = 1.0 / self.control_hz
+        self._reader, self._boat = Reader(robot, task), Boat(robot)
+        self._rehearsal = Rehearsal(robot, task, make_policy())
+        self._follower = Follower(self._boat, settings, self._dt)
+        self._lead = round(settings.lead_s / self._dt)
+        reach = settings.reach * reach_of(task, robot)
+        solvers = Solvers(
+            lambda: Program(Boat(robot), legs=settings.legs, nodes=settings.nodes, reach=reach),
+            None if patient else 1,
+        )
+        if not patient:
+            solvers.warm_up()
+        boat = Boat(robot)
+        search = Search(boat, Rehearsal(robot, task, make_policy()), settings, solvers, dt=self._dt)
+        self._planning = Planning(search, Follower(boat, settings, self._dt))
+        self._places: np.ndarray | None = None
+        self._pilots: list[Pilot] = []
+
+    def hear_course(self, places: np.ndarray) -> None:
+        """Take the course; as of `Farsighted`. Another one than before is begun anew."""
+        if self._places is None or not np.array_equal(places, self._places):
+            self._places = np.array(places, dtype=float)
+            self._pilots = []
+
+    def reset(self) -> None:
+        """Forget the past, and the course."""
+        self._places = None
+        self._pilots = []
+        self._policy.reset()
+
+    def act(self, observation: Array) -> Array:
+        """Choose commands; shapes as of `Controller.act`."""
+        rows = np.atleast_2d(np.asarray(observation, dtype=float))
+        if self._places is None or self._places.shape[-2] < LEAST_WAYPOINTS:
+            return self._policy.act(observation)
+        places = self._places.reshape(-1, *self._places.shape[-2:])
+        if len(places) != len(rows):
+            return self._policy.act(observation)
+        if not self._pilots:
+            late = round(self._settings.late_s / self._dt)
+            self._pilots = [Pilot(course, self._settings, late_steps=late) for course in places]
+        commands = self._steer(rows)
+        return commands.reshape(*np.shape(observation)[:-1], -1)
+
+    def metadata(self) -> dict[str, Any]:
+        """Policy, settings and boat, with the SHA-256 of everything that commands depend on."""
+        policy = self._policy.metadata()
+        told = {
+            "controller": self.name,
+            "robot": self._robot.name,
+            "task": self._task.name,
+            "control_hz": self.control_hz,
+            "settings": asdict(self._settings),
+            "policy_sha256": policy["sha256"],
+        }
+        water = self._robot.hydrodynamics
+        boat = {
+            "actuators": asdict(self._robot.actuators),
+            "body": asdict(self._robot.body),
+            "hydrodynamics": asdict(water) if water else None,
+        }
+        text = json.dumps(told | boat, sort_keys=True)
+        return told | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
+
+    def _steer(self, rows: np.ndarray) -> np.ndarray:
+        sight = np.stack([x + 1j * y for x, y in self._reader.in_sight(rows)], axis=-1)
+        motion = np.stack(self._reader.motion(rows), axis=-1)
+        told = np.clip(self._reader.previous(rows), self._boat.least, self._boat.most)
+        states = np.stack(
+            [pilot.see(*seen) for pilot, *seen in zip(self._pilots, sight, motion, told, strict=True)]
+        )
+        self._begin([i for i, pilot in enumerate(self._pilots) if self._needs_anew(pilot, states[i])], states)
+        step = self._dt * self._boat.slew
+        return np.stack(
+            [pilot.command(state, step) for pilot, state in zip(self._pilots, states, strict=True)]
+        )
+
+    def _needs_anew(self, pilot: Pilot, state: np.ndarray) -> bool:
+        """Whether a boat has nothing to follow; a plan that is ready is taken up where the rehearsal ends."""
+        if pilot.at_end and not self._takes_up(pilot):
+            return True
+        return pilot.is_lost(state)
+
+    def _takes_up(self, pilot: Pilot) -> bool:
+        ordered, pilot.ordered = pilot.ordered, None
+        if ordered is None:
+            return False
+        plans, number = ordered
+        if not (self._patient or plans.done()):
+            return False
+        plan = plans.result()[number]
+        if plan is None:
+            return False
+        pilot.go_on(plan)
+        return True
+
+    def _begin(self, which: list[int], states: np.ndarray) -> None:
+        """Have some boats follow what the policy would do, and order their plans."""
+        if not which:
+            return
+        pilots = [self._pilots[i] for i in which]
+        courses = np.stack([np.roll(pilot.places, -pilot.coming, axis=0) for pilot in pilots])
+        seen = self._rehearsal.drive(states[which], courses, steps=self._lead)
+        orders = []
+        for i, pilot in enumerate(pilots):
+            done = seen.done[i]
+            arrivals = np.searchsorted(done, np.arange(1, done[-1] + 1))
+            pilot.follow(self._follower.of_samples(seen.states[i], arrivals))
+            left_s = self._task.episode_s - self._dt * (pilot.steps + self._lead)
+            course = np.roll(courses[i], -int(done[-1]), axis=0)
+            orders.append(Order(seen.states[i, -1], course, max(left_s, _LEAST_HORIZON_S)))
+        ordered = self._planning.begin(orders)
+        for number, pilot in enumerate(pilots):
+            pilot.ordered = ordered, number
+
+
+def reach_of(task: Task, robot: Robot) -> float:
+    """How near a robot takes a waypoint of a task for passed [m]."""
+    passing = fitted(task, robot)
+    assert isinstance(passing, PassingTask)
+    return passing.reach

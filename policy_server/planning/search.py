@@ -1,0 +1,210 @@
+"""Looks for quick drives of courses: the controller's own, then optimal control, then detours and optimal control.
+
+Optimal control alone ends at the quickest drive near its guess. Another way around a waypoint is another valley, and
+one is found by large neighbourhood search (Shaw 1998): the boat leaves the best plan somewhere, holds random commands
+for a while and lets the controller drive on; the quickest of some such detours is the next guess.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from policy_server.planning.boat import Boat
+from policy_server.planning.program import Drive
+from policy_server.planning.rehearsal import Rehearsal
+from policy_server.planning.settings import PlannerSettings
+
+_SLOWEST_S = 15.0  # time that a controller may take for a leg on average [s]
+_SHORTEST_S = 0.06  # of a leg in a guess [s]
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a plan is asked for."""
+
+    start: np.ndarray  # state that it begins in, shape (size,), as of `boat`
+    places: (
+        np.ndarray
+    )  # of the waypoints from the next one on, shape (k, 2); after the last the first comes again [m]
+    horizon_s: float  # the time in which many of them shall be passed [s]
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What optimal control begins from."""
+
+    drive: Drive
+    course: np.ndarray  # (legs, 2) places of the waypoints [m]
+    wanted: int  # legs that matter
+
+
+Solve = Callable[[Iterable[Guess]], Iterable[Drive | None]]
+
+
+@dataclass
+class _Course:
+    """An order, and what was found for it."""
+
+    order: Order
+    places: np.ndarray  # (legs, 2), as often around as that takes [m]
+    best: Drive | None = None
+    # The same order has the same plan, whatever else is ordered with it.
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+
+    @property
+    def worth(self) -> float:
+        """Waypoints in time."""
+        return -1.0 if self.best is None else self.best.passed(self.order.horizon_s)
+
+
+class Search:
+    """Makes plans, many at once: all their detours are driven side by side."""
+
+    def __init__(
+        self, boat: Boat, rehearsal: Rehearsal, settings: PlannerSettings, solve: Solve, *, dt: float
+    ) -> None:
+        """Say how.
+
+        Args:
+            boat: Whose plans they are.
+            rehearsal: Of the controller that guesses.
+            settings: How much to try.
+            solve: Makes guesses quick, in their order.
+            dt: Control period [s].
+        """
+        self._boat, self._rehearsal, self._settings, self._solve, self._dt = (
+            boat,
+            rehearsal,
+            settings,
+            solve,
+            dt,
+        )
+
+    def plans(self, orders: list[Order]) -> list[Drive | None]:
+        """A drive for each order.
+
+        Args:
+            orders: At least one.
+
+        Returns:
+            The best drives found; None where not even the first guess leads to one.
+        """
+        legs = self._settings.legs
+        courses = [_Course(order, order.places[np.arange(legs) % len(order.places)]) for order in orders]
+        self._take(courses, self._firsts(courses))
+        for _ in range(self._settings.rounds):
+            planned = [course for course in courses if course.best is not None]
+            if planned:
+                self._take(planned, self._others(planned))
+        return [course.best for course in courses]
+
+    def _take(self, courses: list[_Course], guesses: list[Guess | None]) -> None:
+        """Make guesses quick, and keep what is better than what was known."""
+        asked = [(course, guess) for course, guess in zip(courses, guesses, strict=True) if guess is not None]
+        for (course, _), drive in zip(asked, self._solve([guess for _, guess in asked]), strict=True):
+            if drive is not None and drive.passed(course.order.horizon_s) > course.worth:
+                course.best = drive
+
+    def _firsts(self, courses: list[_Course]) -> list[Guess | None]:
+        """What the controller does by itself."""
+        legs = self._settings.legs
+        seen = self._rehearsal.drive(
+            np.stack([course.order.start for course in courses]),
+            np.stack([course.places for course in courses]),
+            steps=int(legs * _SLOWEST_S / self._dt),
+            until=np.full(len(courses), legs),
+        )
+        guesses: list[Guess | None] = []
+        for course, states, done in zip(courses, seen.states, seen.done, strict=True):
+            if done[-1] < legs:
+                guesses.append(None)
+                continue
+            end = int(np.argmax(done >= legs)) + 1
+            drive = self._joined(
+                Drive(course.order.start[None], np.zeros(0)), states[:end], done[:end], since=0.0
+            )
+            guesses.append(Guess(drive, course.places, self._wanted(drive, course.order.horizon_s)))
+        return guesses
+
+    def _others(self, courses: list[_Course]) -> list[Guess | None]:
+        """The best plans with a detour in each."""
+        told, tries = self._settings, self._settings.detours
+        low, high = (int(each / self._dt) for each in told.detour_s)
+        starts, rolled, held, commands, untils, cuts = [], [], [], [], [], []
+        for course in courses:
+            best, rng = course.best, course.rng
+            assert best is not None
+            wanted = self._wanted(best, course.order.horizon_s)
+            leg = int(rng.integers(0, max(int(course.worth), 1)))
+            node = leg * told.nodes + int(rng.integers(0, told.nodes))
+            waits = rng.integers(low, high + 1, tries)
+            waits[0] = 0  # one lets the controller drive on at once
+            starts.append(np.repeat(best.states[node][None], tries, axis=0))
+            rolled.append(np.repeat(np.roll(course.places, -leg, axis=0)[None], tries, axis=0))
+            held.append(waits)
+            size = (tries, len(self._boat.slew))
+            commands.append(rng.choice([self._boat.least, 0.0, self._boat.most], size))
+            untils.append(wanted - leg)
+            cuts.append((leg, node, wanted))
+        seen = self._rehearsal.drive(
+            np.concatenate(starts),
+            np.concatenate(rolled),
+            steps=int(max(untils) * _SLOWEST_S / self._dt),
+            until=np.asarray(untils),
+            held=np.concatenate(held),
+            commands=np.concatenate(commands),
+        )
+        guesses: list[Guess | None] = []
+        for i, (course, until, (leg, node, wanted)) in enumerate(zip(courses, untils, cuts, strict=True)):
+            done, states = (each[i * tries : (i + 1) * tries] for each in (seen.done, seen.states))
+            best = course.best
+            assert best is not None
+            if done.max() < until:
+                guesses.append(None)
+                continue
+            end = int(np.argmax(done.max(axis=0) >= until)) + 1
+            first = int(np.argmax(done[:, end - 1]))
+            before = Drive(best.states[: node + 1], best.leg_s[:leg])
+            since = float(best.times[node] - best.times[leg * told.nodes])
+            drive = self._joined(before, states[first, :end], done[first, :end], since=since)
+            guesses.append(Guess(self._completed(drive, best), course.places, wanted))
+        return guesses
+
+    def _wanted(self, drive: Drive, horizon_s: float) -> int:
+        """How many legs matter: those in time, and two more, without which the last ones would be greedy."""
+        return min(int(drive.passed(horizon_s)) + 2, self._settings.legs)
+
+    def _joined(self, before: Drive, states: np.ndarray, done: np.ndarray, *, since: float) -> Drive:
+        """A drive whose first legs are of a plan and whose others are of a rehearsal.
+
+        Args:
+            before: Nodes up to the one where the rehearsal begins, and times of the whole legs among them.
+            states: Of the rehearsal, shape (steps + 1, size).
+            done: Waypoints that it has passed, shape (steps + 1,).
+            since: How long the leg that it begins in has lasted [s].
+        """
+        nodes, legs = self._settings.nodes, len(before.leg_s)
+        begun = before.states[legs * nodes : -1]  # of the leg in which the rehearsal begins
+        lasted = since * np.arange(len(begun)) / max(len(begun), 1)
+        t = np.concatenate((lasted, since + self._dt * np.arange(len(states))))
+        path = np.concatenate((begun, states))
+        pieces, leg_s, last = [before.states[: legs * nodes]], list(before.leg_s), 0.0
+        for number in range(1, int(done[-1]) + 1):
+            end = max(since + self._dt * int(np.argmax(done >= number)), last + _SHORTEST_S)
+            at = last + (end - last) * np.arange(nodes) / nodes
+            pieces.append(np.column_stack([np.interp(at, t, column) for column in path.T]))
+            leg_s.append(end - last)
+            last = end
+        return Drive(np.concatenate((*pieces, states[-1:])), np.asarray(leg_s))
+
+    def _completed(self, drive: Drive, plan: Drive) -> Drive:
+        """A drive with the legs that it lacks of a plan."""
+        legs = len(drive.leg_s)
+        rest = plan.states[legs * self._settings.nodes :].copy()
+        rest[:, 2] += 2.0 * np.pi * np.round((drive.states[-1, 2] - rest[0, 2]) / (2.0 * np.pi))
+        return Drive(
+            np.concatenate((drive.states[:-1], rest)), np.concatenate((drive.leg_s, plan.leg_s[legs:]))
+        )
