@@ -17,7 +17,9 @@ from policy_server.policy_node import make_policy
 def make_planner(robot: Robot, task: Task, settings: ControllerSettings) -> Controller:
     """Load the bundle as the policy's node does, and get ready to plan with it."""
     check_planner(robot, task)
-    return planner_with(robot, task, lambda: make_policy(robot, task, settings), patient=settings.lockstep)
+    planner = planner_with(robot, task, lambda: make_policy(robot, task, settings), patient=settings.lockstep)
+    planner.warm_up()
+    return planner
 
 
 def main() -> None:

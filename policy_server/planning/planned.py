@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.config import load_config
@@ -12,6 +13,9 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+
+if TYPE_CHECKING:
+    from policy_server.planning.planner import Planner
 
 TASKS = ("go_through_positions",)  # whose courses are told whole, and of which enough waypoints are seen
 
@@ -65,7 +69,7 @@ def load_planner(robot: Robot, task: Task, folder: Path, *, control_hz: float) -
 
 def planner_with(
     robot: Robot, task: Task, make_policy: Callable[[], Controller], *, patient: bool
-) -> Controller:
+) -> Planner:
     """A planner for a pair that `check_planner` takes; arguments as of `Planner`."""
     from policy_server.planning.planner import Planner
     from policy_server.planning.settings import PlannerSettings

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
+from concurrent.futures import wait
 from dataclasses import asdict
 from typing import Any
 
@@ -32,6 +33,7 @@ from policy_server.planning.settings import PlannerSettings
 from policy_server.planning.workers import Planning, Solvers
 
 LEAST_WAYPOINTS = 3  # of a course that can be planned
+_PATIENCE_S = 0.15  # waited at each step of a rehearsal, less than what a plant takes for silence [s]
 _LEAST_HORIZON_S = 20.0  # that a plan looks ahead at the end of an episode, and after it [s]
 
 
@@ -69,17 +71,19 @@ class Planner:
         self._follower = Follower(self._boat, settings, self._dt)
         self._lead = round(settings.lead_s / self._dt)
         reach = settings.reach * reach_of(task, robot)
-        solvers = Solvers(
+        self._solvers = Solvers(
             lambda: Program(Boat(robot), legs=settings.legs, nodes=settings.nodes, reach=reach),
             None if patient else 1,
         )
-        if not patient:
-            solvers.warm_up()
         boat = Boat(robot)
-        search = Search(boat, Rehearsal(robot, task, make_policy()), settings, solvers, dt=self._dt)
+        search = Search(boat, Rehearsal(robot, task, make_policy()), settings, self._solvers, dt=self._dt)
         self._planning = Planning(search, Follower(boat, settings, self._dt))
         self._places: np.ndarray | None = None
         self._pilots: list[Pilot] = []
+
+    def warm_up(self) -> None:
+        """Write down now what the first plan would have to wait for seconds for."""
+        self._solvers.warm_up()
 
     def hear_course(self, places: np.ndarray) -> None:
         """Take the course; as of `Farsighted`. Another one than before is begun anew."""
@@ -134,6 +138,8 @@ class Planner:
         states = np.stack(
             [pilot.see(*seen) for pilot, *seen in zip(self._pilots, sight, motion, told, strict=True)]
         )
+        if self._patient:
+            wait({pilot.ordered[0] for pilot in self._pilots if pilot.ordered}, timeout=_PATIENCE_S)
         self._begin([i for i, pilot in enumerate(self._pilots) if self._needs_anew(pilot, states[i])], states)
         step = self._dt * self._boat.slew
         return np.stack(
