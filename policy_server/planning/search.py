@@ -133,7 +133,7 @@ class Search:
         """The best plans with a detour in each."""
         told, tries = self._settings, self._settings.detours
         low, high = (int(each / self._dt) for each in told.detour_s)
-        starts, rolled, held, commands, untils, cuts = [], [], [], [], [], []
+        starts, rolled, held, commands, ends, cuts = [], [], [], [], [], []
         for course in courses:
             best, rng = course.best, course.rng
             assert best is not None
@@ -147,18 +147,18 @@ class Search:
             held.append(waits)
             size = (tries, len(self._boat.slew))
             commands.append(rng.choice([self._boat.least, 0.0, self._boat.most], size))
-            untils.append(wanted - leg)
+            ends.append(wanted - leg)
             cuts.append((leg, node, wanted))
         seen = self._rehearsal.drive(
             np.concatenate(starts),
             np.concatenate(rolled),
-            steps=int(max(untils) * _SLOWEST_S / self._dt),
-            until=np.asarray(untils),
+            steps=int(max(ends) * _SLOWEST_S / self._dt),
+            until=np.asarray(ends),
             held=np.concatenate(held),
             commands=np.concatenate(commands),
         )
         guesses: list[Guess | None] = []
-        for i, (course, until, (leg, node, wanted)) in enumerate(zip(courses, untils, cuts, strict=True)):
+        for i, (course, until, (leg, node, wanted)) in enumerate(zip(courses, ends, cuts, strict=True)):
             done, states = (each[i * tries : (i + 1) * tries] for each in (seen.done, seen.states))
             best = course.best
             assert best is not None

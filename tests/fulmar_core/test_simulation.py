@@ -64,6 +64,21 @@ def differing(one, other):
     return {name for name in COLUMNS if not np.array_equal(getattr(one, name), getattr(other, name))}
 
 
+def test_robots_that_are_put_where_others_are_go_on_as_those():
+    task, boat = load_task("go_through_positions"), ROBOTS["kingfisher"]
+    others = run(build(robot=boat, task=task), 30)
+    these = build(robot=boat, task=task, seed=99)
+    these.put(others.truth, others.goal, others.command)
+    np.testing.assert_allclose(these.observe(), others.observe(), rtol=1e-6, atol=1e-6)
+    for command in commands(others, 20, seed=2):
+        others.step(command)
+        these.step(command)
+    for name in COLUMNS:
+        np.testing.assert_allclose(
+            getattr(these.truth, name), getattr(others.truth, name), rtol=1e-5, atol=1e-5
+        )
+
+
 @EACH_ROBOT
 def test_the_first_64_of_4096_worlds_are_64_worlds(robot):
     task = load_task("go_through_positions")
