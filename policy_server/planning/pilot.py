@@ -34,6 +34,7 @@ class Pilot:
             None  # plans, and which is this boat's
         )
         self.steps = 0  # since the course was heard
+        self.losses = 0  # plans that had to be given up
         self._settings, self._late = settings, late_steps
         self._where: Whereabouts | None = None
         self._reference: Reference | None = None

@@ -70,9 +70,9 @@ class Planner:
         self._rehearsal = Rehearsal(robot, task, make_policy())
         self._follower = Follower(self._boat, settings, self._dt)
         self._lead = round(settings.lead_s / self._dt)
-        reach = settings.reach * reach_of(task, robot)
+        self._reach = settings.reach * reach_of(task, robot)
         self._solvers = Solvers(
-            lambda: Program(Boat(robot), legs=settings.legs, nodes=settings.nodes, reach=reach),
+            lambda: Program(Boat(robot), legs=settings.legs, nodes=settings.nodes),
             None if patient else 1,
         )
         boat = Boat(robot)
@@ -150,7 +150,9 @@ class Planner:
         """Whether a boat has nothing to follow; a plan that is ready is taken up where the rehearsal ends."""
         if pilot.at_end and not self._takes_up(pilot):
             return True
-        return pilot.is_lost(state)
+        lost = pilot.is_lost(state)
+        pilot.losses += lost
+        return lost
 
     def _takes_up(self, pilot: Pilot) -> bool:
         ordered, pilot.ordered = pilot.ordered, None
@@ -179,7 +181,8 @@ class Planner:
             pilot.follow(self._follower.of_samples(seen.states[i], arrivals))
             left_s = self._task.episode_s - self._dt * (pilot.steps + self._lead)
             course = np.roll(courses[i], -int(done[-1]), axis=0)
-            orders.append(Order(seen.states[i, -1], course, max(left_s, _LEAST_HORIZON_S)))
+            reach = self._reach * self._settings.caution**pilot.losses
+            orders.append(Order(seen.states[i, -1], course, max(left_s, _LEAST_HORIZON_S), reach))
         ordered = self._planning.begin(orders)
         for number, pilot in enumerate(pilots):
             pilot.ordered = ordered, number

@@ -64,14 +64,13 @@ class Drive:
 class Program:
     """The program for one boat and one number of legs; solves one after another."""
 
-    def __init__(self, boat: Boat, *, legs: int, nodes: int, reach: float) -> None:
+    def __init__(self, boat: Boat, *, legs: int, nodes: int) -> None:
         """Write the program down; takes seconds.
 
         Args:
             boat: Whose drive it is.
             legs: How many waypoints are passed.
             nodes: Of each leg.
-            reach: How near a waypoint is passed [m].
         """
         self._boat, self._legs, self._nodes = boat, legs, nodes
         size, count = boat.size, legs * nodes
@@ -84,6 +83,7 @@ class Program:
             ca.SX.sym("start", size),
             ca.SX.sym("weights", legs),
         )
+        reach = ca.SX.sym("reach")
         rates, defect = [boat.pace(state) for state in states], self._defect()
         unknown: list[Any] = []
         still: list[Any] = [states[0] - start]
@@ -116,18 +116,19 @@ class Program:
                 "x": ca.vertcat(*unknown),
                 "f": cost,
                 "g": constraints,
-                "p": ca.vertcat(ca.vec(places), start, weights),
+                "p": ca.vertcat(ca.vec(places), start, weights, reach),
             },
             options,
         )
 
-    def solve(self, guess: Drive, places: np.ndarray, *, wanted: int) -> Drive | None:
+    def solve(self, guess: Drive, places: np.ndarray, *, wanted: int, reach: float) -> Drive | None:
         """The quickest drive near a guess.
 
         Args:
             guess: From the state that the drive begins in; need not hold together.
             places: Of the waypoints, shape (legs, 2) [m].
             wanted: How many of them matter; the rest is driven without haste.
+            reach: How near they are passed [m].
 
         Returns:
             The drive; None where IPOPT finds none.
@@ -138,7 +139,9 @@ class Program:
         nodes = np.concatenate((states[:-1], changes), axis=1).reshape(self._legs, -1)
         begin = np.concatenate((np.column_stack((guess.leg_s, nodes)).ravel(), states[-1]))
         weights = np.where(np.arange(self._legs) < wanted, 1.0, 0.02)
-        found = self._solver(x0=begin, p=np.concatenate((places.ravel(), states[0], weights)), **self._bounds)
+        found = self._solver(
+            x0=begin, p=np.concatenate((places.ravel(), states[0], weights, [reach])), **self._bounds
+        )
         if not self._solver.stats()["success"]:
             return None
         values = np.asarray(found["x"]).ravel()

@@ -30,6 +30,7 @@ class Order:
         np.ndarray
     )  # of the waypoints from the next one on, shape (k, 2); after the last the first comes again [m]
     horizon_s: float  # the time in which many of them shall be passed [s]
+    reach: float  # how near they are passed [m]
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Guess:
     drive: Drive
     course: np.ndarray  # (legs, 2) places of the waypoints [m]
     wanted: int  # legs that matter
+    reach: float  # how near waypoints are passed [m]
 
 
 Solve = Callable[[Iterable[Guess]], Iterable[Drive | None]]
@@ -126,7 +128,8 @@ class Search:
             drive = self._joined(
                 Drive(course.order.start[None], np.zeros(0)), states[:end], done[:end], since=0.0
             )
-            guesses.append(Guess(drive, course.places, self._wanted(drive, course.order.horizon_s)))
+            wanted = self._wanted(drive, course.order.horizon_s)
+            guesses.append(Guess(drive, course.places, wanted, course.order.reach))
         return guesses
 
     def _others(self, courses: list[_Course]) -> list[Guess | None]:
@@ -170,7 +173,7 @@ class Search:
             before = Drive(best.states[: node + 1], best.leg_s[:leg])
             since = float(best.times[node] - best.times[leg * told.nodes])
             drive = self._joined(before, states[first, :end], done[first, :end], since=since)
-            guesses.append(Guess(self._completed(drive, best), course.places, wanted))
+            guesses.append(Guess(self._completed(drive, best), course.places, wanted, course.order.reach))
         return guesses
 
     def _wanted(self, drive: Drive, horizon_s: float) -> int:

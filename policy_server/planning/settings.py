@@ -15,6 +15,7 @@ class PlannerSettings:
     legs: int  # waypoints of a plan
     nodes: int  # of each leg
     reach: float  # how near plans pass waypoints, as a share of what the task takes for passed [-]
+    caution: float  # factor on that for each plan that had to be given up on a course [-]
     rounds: int  # of looking for another way: a detour somewhere, then optimal control again
     detours: int  # tried in each round
     detour_s: tuple[float, float]  # how long they hold commands [s]
@@ -37,7 +38,7 @@ class PlannerSettings:
             motion=self.motion,
             change=self.change,
         )
-        shares(reach=self.reach)
+        shares(reach=self.reach, caution=self.caution)
         if self.rounds < 0 or self.reach == 0.0 or not 0.0 < self.detour_s[0] <= self.detour_s[1]:
             raise ValueError(
                 "'rounds' must not be negative, 'reach' not 0, 'detour_s' [low, high], 0 < low <= high."

@@ -34,7 +34,7 @@ class Solvers:
         return self._pool.map(self._solve, guesses)
 
     def _solve(self, guess: Guess) -> Drive | None:
-        return self._program().solve(guess.drive, guess.course, wanted=guess.wanted)
+        return self._program().solve(guess.drive, guess.course, wanted=guess.wanted, reach=guess.reach)
 
     def _program(self) -> Program:
         if not hasattr(self._own, "program"):

@@ -22,7 +22,7 @@ from policy_server.policy import Policy
 from policy_server.shipped import shipped_policy
 
 ROBOT, TASK = load_robot("kingfisher"), load_task("go_through_positions")
-SETTINGS = replace(load_config(PlannerSettings, settings_path("kingfisher")), rounds=0)
+SETTINGS = replace(load_config(PlannerSettings, settings_path("kingfisher")), rounds=0, lead_s=4.0)
 SEED = 41
 
 
@@ -128,6 +128,10 @@ def test_a_boat_that_is_carried_off_begins_anew_from_where_it_is(planner, monkey
     tell_course(planner, simulation.goal)
     planner.act(simulation.observe())
     assert len(nothing.orders) == 2
+    (first,), (second,) = nothing.orders
+    assert second.reach == pytest.approx(
+        SETTINGS.caution * first.reach
+    )  # and passes waypoints nearer to their middle
 
 
 def test_another_course_begins_anew_and_a_reset_forgets_it(planner, monkeypatch):

@@ -57,20 +57,23 @@ def rehearsal():
 
 @pytest.fixture(scope="module")
 def search(boat, rehearsal):
-    program = Program(boat, legs=SMALL.legs, nodes=SMALL.nodes, reach=REACH)
+    program = Program(boat, legs=SMALL.legs, nodes=SMALL.nodes)
     return searching(boat, rehearsal, program, SMALL)
 
 
 def searching(boat, rehearsal, program, settings):
     def solve(guesses):
-        return [program.solve(guess.drive, guess.course, wanted=guess.wanted) for guess in guesses]
+        return [
+            program.solve(guess.drive, guess.course, wanted=guess.wanted, reach=guess.reach)
+            for guess in guesses
+        ]
 
     return Search(boat, rehearsal, settings, solve, dt=DT)
 
 
 @pytest.fixture(scope="module")
 def drive(search):
-    (found,) = search.plans([Order(AT_REST, PLACES, 60.0)])
+    (found,) = search.plans([Order(AT_REST, PLACES, 60.0, REACH)])
     assert found is not None
     return found
 
@@ -141,7 +144,7 @@ def test_a_plan_is_quicker_than_the_drive_that_it_began_from(drive, rehearsal):
 
 def test_a_plan_does_not_depend_on_what_else_is_ordered(search, drive):
     other = np.array([1.0, -2.0, 2.0, 0.3, 0.0, 0.1, 0.2, 0.0])
-    _, again = search.plans([Order(other, PLACES[::-1], 30.0), Order(AT_REST, PLACES, 60.0)])
+    _, again = search.plans([Order(other, PLACES[::-1], 30.0, REACH), Order(AT_REST, PLACES, 60.0, REACH)])
     np.testing.assert_array_equal(again.states, drive.states)
     np.testing.assert_array_equal(again.leg_s, drive.leg_s)
 
@@ -152,7 +155,7 @@ def test_looking_for_another_way_finds_some_and_never_makes_a_plan_worse(boat, r
     worth = []
     for rounds in (0, 3):
         searching_so = Search(boat, rehearsal, replace(SMALL, rounds=rounds), search._solve, dt=DT)
-        found = searching_so.plans([Order(start, PLACES[::-1], 12.0) for start in starts])
+        found = searching_so.plans([Order(start, PLACES[::-1], 12.0, REACH) for start in starts])
         worth.append([drive.passed(12.0) for drive in found])
     assert (np.array(worth[1]) >= worth[0]).all()
     assert max(np.subtract(worth[1], worth[0])) > 0.05
@@ -161,7 +164,9 @@ def test_looking_for_another_way_finds_some_and_never_makes_a_plan_worse(boat, r
 def test_where_the_controller_never_arrives_there_is_no_plan(boat, search):
     idle = Rehearsal(ROBOT, TASK, Idle())
     told = replace(SMALL, legs=2)
-    assert Search(boat, idle, told, search._solve, dt=DT).plans([Order(AT_REST, PLACES, 60.0)]) == [None]
+    assert Search(boat, idle, told, search._solve, dt=DT).plans([Order(AT_REST, PLACES, 60.0, REACH)]) == [
+        None
+    ]
 
 
 def test_waypoints_in_time_are_counted_with_a_share_of_the_next():
