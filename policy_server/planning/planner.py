@@ -88,13 +88,12 @@ class Planner:
     def hear_course(self, places: np.ndarray) -> None:
         """Take the course; as of `Farsighted`. Another one than before is begun anew."""
         if self._places is None or not np.array_equal(places, self._places):
+            self._let_go()
             self._places = np.array(places, dtype=float)
-            self._pilots = []
 
     def reset(self) -> None:
         """Forget the past, and the course."""
-        self._places = None
-        self._pilots = []
+        self._let_go()
         self._policy.reset()
 
     def act(self, observation: Array) -> Array:
@@ -131,6 +130,13 @@ class Planner:
         text = json.dumps(told | boat, sort_keys=True)
         return told | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
 
+    def _let_go(self) -> None:
+        """Forget the course, and what is ordered for it."""
+        for pilot in self._pilots:
+            if pilot.ordered:
+                pilot.ordered[0].cancel()
+        self._places, self._pilots = None, []
+
     def _steer(self, rows: np.ndarray) -> np.ndarray:
         sight = np.stack([x + 1j * y for x, y in self._reader.in_sight(rows)], axis=-1)
         motion = np.stack(self._reader.motion(rows), axis=-1)
@@ -160,6 +166,8 @@ class Planner:
             return False
         plans, number = ordered
         if not (self._patient or plans.done()):
+            plans.cancel()  # if it is still waiting: what comes next must not wait behind it
+        if plans.cancelled() or not (self._patient or plans.done()):
             return False
         plan = plans.result()[number]
         if plan is None:

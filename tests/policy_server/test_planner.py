@@ -102,6 +102,23 @@ def test_without_plans_it_goes_on_as_its_policy_would(patient, monkeypatch):
     assert 7 <= len(nothing.orders) <= 16  # every 4 s, and again for a boat that lost its way
 
 
+def test_what_nobody_waits_for_any_more_keeps_no_later_plan_waiting(monkeypatch):
+    planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=False)
+    ordered = []
+
+    class Busy(Planless):
+        def begin(self, orders):
+            ordered.append(super().begin(orders))
+            return ordered[-1]
+
+    monkeypatch.setattr(planner, "_planning", Busy(ready=False))
+    drive(planner, simulated(1), 60)
+    late, coming = ordered
+    assert late.cancelled() and not coming.cancelled()
+    planner.reset()
+    assert coming.cancelled()
+
+
 def test_in_real_time_no_step_waits_for_a_plan(monkeypatch):
     planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=False)
     monkeypatch.setattr(planner, "_planning", Planless(ready=False))
