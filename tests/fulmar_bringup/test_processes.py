@@ -9,6 +9,7 @@ import psutil
 import pytest
 import yaml
 
+from fulmar_bringup import processes
 from fulmar_bringup.node_table import NodeSpec
 from fulmar_bringup.processes import Ended, ProcessGroup, child_environment, command_line
 
@@ -155,3 +156,15 @@ def test_a_child_that_was_stopped_in_its_tracks_is_killed_without_delay(start, t
     began = time.monotonic()
     assert group.stop("frozen") == [Ended("frozen", -9, forced=True)]
     assert time.monotonic() - began < 3.0
+
+
+def test_a_child_whose_start_was_interrupted_is_stopped_all_the_same(start, monkeypatch):
+    def interrupted(relay):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(processes._Relay, "start", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            start("slow", "import time; time.sleep(60)")
+    group = start("other", "import time; time.sleep(60)")
+    assert {ended.name for ended in group.stop_all()} == {"slow", "other"}

@@ -66,8 +66,8 @@ class ProcessGroup:
             stderr=subprocess.STDOUT,
             start_new_session=True,  # Ctrl-C reaches us alone; we stop the children in order
         )
-        self._children[spec.name] = child
         self._relays[spec.name] = _Relay(spec.name, child.stdout)
+        self._children[spec.name] = child
         self._relays[spec.name].start()
 
     def process(self, name: str) -> psutil.Popen:
@@ -104,7 +104,8 @@ class ProcessGroup:
             psutil.wait_procs(alive, timeout=patience_s)
         for name, _ in chosen:  # not before: whoever interrupts us can still stop them
             del self._children[name]
-            self._relays[name].join(LAST_WORDS_S)
+            if self._relays[name].ident is not None:  # Ctrl-C may have come before it was started
+                self._relays[name].join(LAST_WORDS_S)
         return [Ended(name, child.poll(), forced=child.pid in killed) for name, child in chosen]
 
     def stop_all(self) -> list[Ended]:
