@@ -34,15 +34,13 @@ class Boat:
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Write the formulas of a robot with propellers that slew, as `check_boat` wants it."""
+        """Write the formulas of a robot with propellers that slew, as `check_planner` takes it."""
         actuators, water = robot.actuators, robot.hydrodynamics
         assert isinstance(actuators, Propellers) and water is not None
         self.slew = np.asarray(actuators.response.slew)
         self.size = MOTION + len(self.slew)
-        self._curve, self._commands = (
-            np.asarray(actuators.curve),
-            np.linspace(-1.0, 1.0, len(actuators.curve)),
-        )
+        self._curve = np.asarray(actuators.curve)
+        self._commands = np.linspace(-1.0, 1.0, len(self._curve))
         self.least = float(self._commands[np.flatnonzero(self._curve == self._curve[0])[-1]])
         self.most = float(self._commands[np.flatnonzero(self._curve == self._curve[-1])[0]])
         surge, sway, turn = water.planar_added_mass

@@ -13,9 +13,8 @@ from policy_server.planning.whereabouts import Whereabouts, locate
 
 _FURTHER = 2  # control steps by which a reference goes on at most in one; 0 where the boat is behind it
 _SLIP = 1e-3  # cost of going on by another number of steps than one, for a boat beside its plan [m²]
-_NEARNESS = np.array(
-    [1.0, 1.0, 0.3, 0.1, 0.1, 0.1]
-)  # what tells how far a boat is along its reference [1/m², ..]
+# Weights of what a boat's motion differs by from a reference's, which tell how far along it the boat is [1/m², ..].
+_NEARNESS = np.array([1.0, 1.0, 0.3, 0.1, 0.1, 0.1])
 
 
 class Pilot:
@@ -30,18 +29,16 @@ class Pilot:
             late_steps: How late a waypoint may be passed [control steps].
         """
         self.places = places
-        self.ordered: tuple[Future[list[Reference | None]], int] | None = (
-            None  # plans, and which is this boat's
-        )
+        # Plans that are being made, and which of them is this boat's.
+        self.ordered: tuple[Future[list[Reference | None]], int] | None = None
         self.steps = 0  # since the course was heard
         self.losses = 0  # plans that had to be given up
+        self._course = places[:, 0] + 1j * places[:, 1]
         self._settings, self._late = settings, late_steps
         self._where: Whereabouts | None = None
         self._reference: Reference | None = None
-        self._at, self._first = (
-            0,
-            0,
-        )  # control step of the reference; waypoint that is the first of its arrivals
+        self._at = 0  # control step of the reference
+        self._first = 0  # number of the waypoint that is the first of its arrivals
 
     @property
     def coming(self) -> int:
@@ -60,7 +57,7 @@ class Pilot:
         Returns:
             The state, shape (size,), as of `boat`.
         """
-        self._where = locate(sight, self.places[:, 0] + 1j * self.places[:, 1], self._where)
+        self._where = locate(sight, self._course, self._where)
         self.steps += 1
         return np.concatenate(([self._where.x, self._where.y, self._where.yaw], motion, commands))
 

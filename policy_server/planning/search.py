@@ -7,6 +7,7 @@ for a while and lets the controller drive on; the quickest of some such detours 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -98,6 +99,8 @@ class Search:
         courses = [_Course(order, order.places[np.arange(legs) % len(order.places)]) for order in orders]
         self._take(courses, self._firsts(courses))
         for _ in range(self._settings.rounds):
+            if not threading.main_thread().is_alive():
+                break  # the process ends, and waits for this thread alone
             planned = [course for course in courses if course.best is not None]
             if planned:
                 self._take(planned, self._others(planned))

@@ -15,7 +15,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
-from policy_server.planning.planned import settings_path
+from policy_server.planning.loading import settings_path
 from policy_server.planning.planner import Planner
 from policy_server.planning.settings import PlannerSettings
 from policy_server.policy import Policy

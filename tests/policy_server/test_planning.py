@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +14,8 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from policy_server.planning.boat import MOTION, Boat
+from policy_server.planning.loading import check_planner, settings_path
 from policy_server.planning.pilot import Pilot
-from policy_server.planning.planned import check_planner, settings_path
 from policy_server.planning.program import Drive, Program
 from policy_server.planning.reference import Follower, Reference
 from policy_server.planning.rehearsal import Rehearsal
@@ -159,6 +160,28 @@ def test_looking_for_another_way_finds_some_and_never_makes_a_plan_worse(boat, r
         worth.append([drive.passed(12.0) for drive in found])
     assert (np.array(worth[1]) >= worth[0]).all()
     assert max(np.subtract(worth[1], worth[0])) > 0.05
+
+
+def test_a_process_that_ends_is_not_held_up_by_the_search_for_other_ways(
+    boat, rehearsal, search, monkeypatch
+):
+    tried = []
+
+    def solve(guesses):
+        tried.append(len(guesses))
+        return search._solve(guesses)
+
+    def plan():
+        tried.clear()
+        Search(boat, rehearsal, replace(SMALL, rounds=3), solve, dt=DT).plans(
+            [Order(AT_REST, PLACES, 60.0, REACH)]
+        )
+        return len(tried)
+
+    assert plan() == 4
+    ended = threading.Thread()
+    monkeypatch.setattr(threading, "main_thread", lambda: ended)
+    assert plan() == 1
 
 
 def test_where_the_controller_never_arrives_there_is_no_plan(boat, search):

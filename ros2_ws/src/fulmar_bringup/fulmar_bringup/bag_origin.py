@@ -15,7 +15,7 @@ from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
 from fulmar_ros.provenance import fulmar_version, git_revision
-from policy_server.planning.planned import settings_path
+from policy_server.planning.loading import settings_path
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:

@@ -27,13 +27,13 @@ def _load_policy(robot: Robot, task: Task, control_hz: float, policy: str) -> Co
 
 
 def _load_planner(robot: Robot, task: Task, control_hz: float, policy: str) -> Controller:
-    from policy_server.planning.planned import load_planner
+    from policy_server.planning.loading import load_planner
 
     return load_planner(robot, task, Path(policy), control_hz=control_hz)
 
 
 def _check_planner(robot: Robot, task: Task) -> None:
-    from policy_server.planning.planned import check_planner
+    from policy_server.planning.loading import check_planner
 
     check_planner(robot, task)
 

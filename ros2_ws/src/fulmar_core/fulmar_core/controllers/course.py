@@ -15,7 +15,11 @@ class Farsighted(Protocol):
     """A controller that looks beyond the targets that are observed; `Controller` itself does not ask for it."""
 
     def hear_course(self, places: np.ndarray) -> None:
-        """Hear all waypoints in their order, right before `act`, shape (..., k, 2) [m]; after the last the first."""
+        """Hear where all targets are, in their order, right before `act`; after the last one the first comes again.
+
+        Args:
+            places: Shape (..., k, 2) [m]; at tasks that track velocities, the two velocities of each target [m/s].
+        """
         ...
 
 
