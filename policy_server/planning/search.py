@@ -63,6 +63,19 @@ class _Course:
         return -1.0 if self.best is None else self.best.passed(self.order.horizon_s)
 
 
+@dataclass(frozen=True)
+class _Detours:
+    """Drives that leave one plan at one of its nodes; all of them go through the same legs."""
+
+    leg: int  # of the plan, in which they leave it
+    node: int  # of the plan, at which they do
+    legs: int  # to drive, from that one on
+    starts: np.ndarray  # (tries, size)
+    places: np.ndarray  # (tries, k, 2) waypoints from the end of that leg on [m]
+    held: np.ndarray  # (tries,) control steps for which commands are held
+    commands: np.ndarray  # (tries, n)
+
+
 class Search:
     """Makes plans, many at once: all their detours are driven side by side."""
 
@@ -137,47 +150,62 @@ class Search:
 
     def _others(self, courses: list[_Course]) -> list[Guess | None]:
         """The best plans with a detour in each."""
-        told, tries = self._settings, self._settings.detours
-        low, high = (int(each / self._dt) for each in told.detour_s)
-        starts, rolled, held, commands, ends, cuts = [], [], [], [], [], []
-        for course in courses:
-            best, rng = course.best, course.rng
-            assert best is not None
-            wanted = self._wanted(best, course.order.horizon_s)
-            leg = int(rng.integers(0, max(int(course.worth), 1)))
-            node = leg * told.nodes + int(rng.integers(0, told.nodes))
-            waits = rng.integers(low, high + 1, tries)
-            waits[0] = 0  # one lets the controller drive on at once
-            starts.append(np.repeat(best.states[node][None], tries, axis=0))
-            rolled.append(np.repeat(np.roll(course.places, -leg, axis=0)[None], tries, axis=0))
-            held.append(waits)
-            size = (tries, len(self._boat.slew))
-            commands.append(rng.choice([self._boat.least, 0.0, self._boat.most], size))
-            ends.append(wanted - leg)
-            cuts.append((leg, node, wanted))
+        every = [self._detours(course) for course in courses]
+        tries, ends = self._settings.detours, np.array([detours.legs for detours in every])
         seen = self._rehearsal.drive(
-            np.concatenate(starts),
-            np.concatenate(rolled),
-            steps=int(max(ends) * _SLOWEST_S / self._dt),
-            until=np.asarray(ends),
-            held=np.concatenate(held),
-            commands=np.concatenate(commands),
+            np.concatenate([detours.starts for detours in every]),
+            np.concatenate([detours.places for detours in every]),
+            steps=int(ends.max() * _SLOWEST_S / self._dt),
+            until=ends,
+            held=np.concatenate([detours.held for detours in every]),
+            commands=np.concatenate([detours.commands for detours in every]),
         )
-        guesses: list[Guess | None] = []
-        for i, (course, until, (leg, node, wanted)) in enumerate(zip(courses, ends, cuts, strict=True)):
-            done, states = (each[i * tries : (i + 1) * tries] for each in (seen.done, seen.states))
-            best = course.best
-            assert best is not None
-            if done.max() < until:
-                guesses.append(None)
-                continue
-            end = int(np.argmax(done.max(axis=0) >= until)) + 1
-            first = int(np.argmax(done[:, end - 1]))
-            before = Drive(best.states[: node + 1], best.leg_s[:leg])
-            since = float(best.times[node] - best.times[leg * told.nodes])
-            drive = self._joined(before, states[first, :end], done[first, :end], since=since)
-            guesses.append(Guess(self._completed(drive, best), course.places, wanted, course.order.reach))
-        return guesses
+        states, done = (each.reshape(len(every), tries, *each.shape[1:]) for each in (seen.states, seen.done))
+        return [self._quickest(*of_one) for of_one in zip(courses, every, states, done, strict=True)]
+
+    def _detours(self, course: _Course) -> _Detours:
+        """Detours that leave the best plan of a course at one of its nodes, drawn at random."""
+        told, rng, best = self._settings, course.rng, course.best
+        assert best is not None
+        wanted = self._wanted(best, course.order.horizon_s)
+        leg = int(rng.integers(0, max(int(course.worth), 1)))
+        node = leg * told.nodes + int(rng.integers(0, told.nodes))
+        low, high = (int(each / self._dt) for each in told.detour_s)
+        held = rng.integers(low, high + 1, told.detours)
+        held[0] = 0  # one lets the controller drive on at once
+        useful = [self._boat.least, 0.0, self._boat.most]
+        return _Detours(
+            leg,
+            node,
+            legs=wanted - leg,
+            starts=np.repeat(best.states[node][None], told.detours, axis=0),
+            places=np.repeat(np.roll(course.places, -leg, axis=0)[None], told.detours, axis=0),
+            held=held,
+            commands=rng.choice(useful, (told.detours, len(self._boat.slew))),
+        )
+
+    def _quickest(
+        self, course: _Course, detours: _Detours, states: np.ndarray, done: np.ndarray
+    ) -> Guess | None:
+        """The plan with the detour that was through first; None where none was.
+
+        Args:
+            course: Whose plan it is.
+            detours: What was driven.
+            states: Of each detour, shape (tries, steps + 1, size).
+            done: Waypoints that each has passed, shape (tries, steps + 1).
+        """
+        best = course.best
+        assert best is not None
+        if done.max() < detours.legs:
+            return None
+        end = int(np.argmax(done.max(axis=0) >= detours.legs)) + 1
+        first = int(np.argmax(done[:, end - 1]))
+        before = Drive(best.states[: detours.node + 1], best.leg_s[: detours.leg])
+        since = float(best.times[detours.node] - best.times[detours.leg * self._settings.nodes])
+        drive = self._joined(before, states[first, :end], done[first, :end], since=since)
+        wanted = detours.leg + detours.legs
+        return Guess(self._completed(drive, best), course.places, wanted, course.order.reach)
 
     def _wanted(self, drive: Drive, horizon_s: float) -> int:
         """How many legs matter: those in time, and two more, without which the last ones would be greedy."""
