@@ -91,13 +91,8 @@ class Search:
             solve: Makes guesses quick, in their order.
             dt: Control period [s].
         """
-        self._boat, self._rehearsal, self._settings, self._solve, self._dt = (
-            boat,
-            rehearsal,
-            settings,
-            solve,
-            dt,
-        )
+        self._boat, self._rehearsal = boat, rehearsal
+        self._settings, self._solve, self._dt = settings, solve, dt
 
     def plans(self, orders: list[Order]) -> list[Drive | None]:
         """A drive for each order.
