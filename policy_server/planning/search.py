@@ -27,9 +27,8 @@ class Order:
     """What a plan is asked for."""
 
     start: np.ndarray  # state that it begins in, shape (size,), as of `boat`
-    places: (
-        np.ndarray
-    )  # of the waypoints from the next one on, shape (k, 2); after the last the first comes again [m]
+    # Of the waypoints from the next one on, shape (k, 2); after the last the first comes again [m].
+    places: np.ndarray
     horizon_s: float  # the time in which many of them shall be passed [s]
     reach: float  # how near they are passed [m]
 

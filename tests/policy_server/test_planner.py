@@ -146,9 +146,8 @@ def test_a_boat_that_is_carried_off_begins_anew_from_where_it_is(planner, monkey
     planner.act(simulation.observe())
     assert len(nothing.orders) == 2
     (first,), (second,) = nothing.orders
-    assert second.reach == pytest.approx(
-        SETTINGS.caution * first.reach
-    )  # and passes waypoints nearer to their middle
+    nearer_to_the_middle = SETTINGS.caution * first.reach
+    assert second.reach == pytest.approx(nearer_to_the_middle)
 
 
 def test_another_course_begins_anew_and_a_reset_forgets_it(planner, monkeypatch):
