@@ -10,7 +10,7 @@ import numpy as np
 
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import tell_course
+from fulmar_core.controllers.course import progressed, tell_course
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
 from fulmar_core.health.informer import Informer
@@ -84,7 +84,9 @@ def batches(
         for step in range(steps):
             informer.see(simulation.measured, simulation.command, dt)
             tell_course(controller, simulation.goal)
-            simulation.step(np.asarray(controller.act(simulation.observe())))
+            action = np.asarray(controller.act(simulation.observe()))
+            simulation.goal = progressed(controller, simulation.goal)
+            simulation.step(action)
             log.add(simulation.truth, judge.see(simulation.truth, simulation.goal.block), simulation.command)
             progress(first * steps + (step + 1) * count)
         yield log.trajectories()
@@ -166,6 +168,7 @@ def _side_by_side(
         informer.see(measured, command, control_dt)
         tell_course(controller, goal)
         action = np.asarray(controller.act(observer(measured, goal, command)))
+        goal = progressed(controller, goal)
         command = slewed(robot.actuators.limited(action), command, robot, control_dt)
         samples = [backend.step(each, substeps) for backend, each in zip(backends, command, strict=False)]
         truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])

@@ -316,6 +316,7 @@ class ControllerNode(LifecycleNode):
             self._answer = self.robot.actuators.safe_command
             self.controller.reset()
         mission = self.inputs.mission
+        mission.hear_of(self.controller)
         observation = mission.observe(measurement.state, measurement.stamp_ns, self._answer)
         assert mission.goal is not None
         tell_course(self.controller, mission.goal)

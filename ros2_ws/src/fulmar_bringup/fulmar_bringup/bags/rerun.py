@@ -243,6 +243,7 @@ class _Rerun:
         if not self._mission.complete:
             raise self._goalless()
         sample = int(self._course.sample[step])
+        self._mission.hear_of(self._controller)
         return self._mission.observe(self._states[sample], int(self._course.stamp_ns[step]), self._answer)
 
     def _goalless(self) -> BagError:

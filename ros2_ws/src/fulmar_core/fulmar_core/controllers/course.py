@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -23,6 +24,22 @@ class Farsighted(Protocol):
         ...
 
 
+@runtime_checkable
+class Navigator(Protocol):
+    """A controller that knows how far it has come; it may know its place better than one reading."""
+
+    def coming(self, places: np.ndarray) -> np.ndarray | None:
+        """Say which target comes next.
+
+        Args:
+            places: As of `Farsighted.hear_course`.
+
+        Returns:
+            Numbers of targets in the course, shape (...,); None where it is on no such course.
+        """
+        ...
+
+
 def tell_course(controller: Controller, goal: Goal) -> None:
     """Tell a controller that wants to know where all targets are.
 
@@ -32,3 +49,22 @@ def tell_course(controller: Controller, goal: Goal) -> None:
     """
     if isinstance(controller, Farsighted):
         controller.hear_course(np.asarray(goal.targets)[..., :2])
+
+
+def progressed(controller: Controller, goal: Goal) -> Goal:
+    """The goal as far as a controller knows to have come, which is never less than is known already.
+
+    Args:
+        controller: Any.
+        goal: What it was told last, after `act`.
+    """
+    if not isinstance(controller, Navigator):
+        return goal
+    places = np.asarray(goal.targets)[..., :2]
+    coming = controller.coming(places)
+    if coming is None:
+        return goal
+    count = places.shape[-2]
+    ahead = (coming - np.asarray(goal.done)) % count
+    done = goal.done + np.where(ahead < count / 2, ahead, 0).astype(np.asarray(goal.done).dtype)
+    return replace(goal, done=done)
