@@ -21,15 +21,18 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.seen import Reader
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks import Task, fitted
+from fulmar_core.tasks import Task
 from fulmar_core.tasks.passing import PassingTask
+from policy_server.planning.beam import Beam
 from policy_server.planning.boat import Boat
+from policy_server.planning.estimator import Estimator
 from policy_server.planning.pilot import Pilot
 from policy_server.planning.program import Program
 from policy_server.planning.reference import Follower
 from policy_server.planning.rehearsal import Rehearsal
-from policy_server.planning.search import Order, Search
+from policy_server.planning.search import Order, Search, lengths
 from policy_server.planning.settings import PlannerSettings
+from policy_server.planning.trial import Trial
 from policy_server.planning.workers import Planning, Solvers
 
 LEAST_WAYPOINTS = 3  # of a course that can be planned
@@ -70,26 +73,37 @@ class Planner:
         self._rehearsal = Rehearsal(robot, task, make_policy())
         self._follower = Follower(self._boat, settings, self._dt)
         self._lead = round(settings.lead_s / self._dt)
-        self._reach = settings.reach * reach_of(task, robot)
+        self._soon = round(settings.soon_s / self._dt)
+        self._limit = passing_tolerance(task)
         self._solvers = Solvers(
-            lambda: Program(Boat(robot), legs=settings.legs, nodes=settings.nodes),
+            lambda legs: Program(Boat(robot), legs=legs, nodes=settings.nodes),
             None if patient else 1,
         )
         boat = Boat(robot)
-        search = Search(boat, Rehearsal(robot, task, make_policy()), settings, self._solvers, dt=self._dt)
-        self._planning = Planning(search, Follower(boat, settings, self._dt))
+        beam = Beam(boat, Rehearsal(robot, task, make_policy()), settings, self._dt)
+        search = Search(beam, settings, self._solvers, dt=self._dt)
+        self._planning = Planning(
+            search, Trial(robot, task, Follower(boat, settings, self._dt), settings, self._dt)
+        )
         self._places: np.ndarray | None = None
         self._pilots: list[Pilot] = []
 
     def warm_up(self) -> None:
         """Write down now what the first plan would have to wait for seconds for."""
-        self._solvers.warm_up()
+        self._solvers.warm_up(lengths(self._settings.legs))
 
     def hear_course(self, places: np.ndarray) -> None:
         """Take the course; as of `Farsighted`. Another one than before is begun anew."""
         if self._places is None or not np.array_equal(places, self._places):
             self._let_go()
             self._places = np.array(places, dtype=float)
+
+    def coming(self, places: np.ndarray) -> np.ndarray | None:
+        """As of `Navigator`; it knows from where it believes to be, and not from single readings."""
+        if not self._pilots or self._places is None or not np.array_equal(places, self._places):
+            return None
+        coming = [pilot.coming for pilot in self._pilots]
+        return np.reshape(coming, self._places.shape[:-2])
 
     def reset(self) -> None:
         """Forget the past, and the course."""
@@ -105,8 +119,7 @@ class Planner:
         if len(places) != len(rows):
             return self._policy.act(observation)
         if not self._pilots:
-            late = round(self._settings.late_s / self._dt)
-            self._pilots = [Pilot(course, self._settings, late_steps=late) for course in places]
+            self._set_out(places)
         commands = self._steer(rows)
         return commands.reshape(*np.shape(observation)[:-1], -1)
 
@@ -137,13 +150,26 @@ class Planner:
                 pilot.ordered[0].cancel()
         self._places, self._pilots = None, []
 
+    def _set_out(self, places: np.ndarray) -> None:
+        """Begin courses, shape (rows, k, 2) [m]."""
+        told = self._settings
+        late = round(told.late_s / self._dt)
+        self._pilots = [Pilot(course, told, limit=self._limit, late_steps=late) for course in places]
+        self._estimator = Estimator(
+            self._robot,
+            self._task,
+            rows=len(places),
+            control_hz=self.control_hz,
+            trust=told.trust,
+            most=told.lost,
+        )
+
     def _steer(self, rows: np.ndarray) -> np.ndarray:
         sight = np.stack([x + 1j * y for x, y in self._reader.in_sight(rows)], axis=-1)
         motion = np.stack(self._reader.motion(rows), axis=-1)
-        told = np.clip(self._reader.previous(rows), self._boat.least, self._boat.most)
-        states = np.stack(
-            [pilot.see(*seen) for pilot, *seen in zip(self._pilots, sight, motion, told, strict=True)]
-        )
+        told = self._reader.previous(rows)
+        readings = [pilot.see(*seen) for pilot, *seen in zip(self._pilots, sight, motion, told, strict=True)]
+        states = self._boat.useful(self._estimator.see(np.stack(readings)))
         if self._patient:
             wait({pilot.ordered[0] for pilot in self._pilots if pilot.ordered}, timeout=_PATIENCE_S)
         self._begin([i for i, pilot in enumerate(self._pilots) if self._needs_anew(pilot, states[i])], states)
@@ -181,23 +207,29 @@ class Planner:
             return
         pilots = [self._pilots[i] for i in which]
         courses = np.stack([np.roll(pilot.places, -pilot.coming, axis=0) for pilot in pilots])
-        seen = self._rehearsal.drive(states[which], courses, steps=self._lead)
+        seen = self._rehearsal.drive(states[which], courses, steps=self._lead + self._soon)
         orders = []
         for i, pilot in enumerate(pilots):
-            done = seen.done[i]
+            end = self._end_of_lead(seen.done[i])
+            done = seen.done[i, : end + 1]
             arrivals = np.searchsorted(done, np.arange(1, done[-1] + 1))
-            pilot.follow(self._follower.of_samples(seen.states[i], arrivals))
-            left_s = self._task.episode_s - self._dt * (pilot.steps + self._lead)
+            pilot.follow(self._follower.of_samples(seen.states[i, : end + 1], arrivals))
+            left_s = self._task.episode_s - self._dt * (pilot.steps + end)
             course = np.roll(courses[i], -int(done[-1]), axis=0)
-            reach = self._reach * self._settings.caution**pilot.losses
-            orders.append(Order(seen.states[i, -1], course, max(left_s, _LEAST_HORIZON_S), reach))
+            reach = self._settings.reach * self._settings.caution**pilot.losses * self._limit
+            horizon_s = max(left_s, _LEAST_HORIZON_S)
+            orders.append(Order(seen.states[i, end], course, horizon_s, reach, self._limit))
         ordered = self._planning.begin(orders)
         for number, pilot in enumerate(pilots):
             pilot.ordered = ordered, number
 
+    def _end_of_lead(self, done: np.ndarray) -> int:
+        """The control step that a plan begins at: not right before a waypoint, which it could only take as it comes."""
+        passed = done > done[self._lead]
+        return int(np.argmax(passed)) if passed[-1] else self._lead
 
-def reach_of(task: Task, robot: Robot) -> float:
-    """How near a robot takes a waypoint of a task for passed [m]."""
-    passing = fitted(task, robot)
-    assert isinstance(passing, PassingTask)
-    return passing.reach
+
+def passing_tolerance(task: Task) -> float:
+    """How near a waypoint of a task has to be passed [m]."""
+    assert isinstance(task, PassingTask)
+    return task.tolerance.position

@@ -16,11 +16,12 @@ import numpy as np
 from policy_server.planning.boat import MOTION, Boat
 
 _LEG_S = (0.05, 20.0)  # of any leg [s]
+_STRAY = 10.0  # cost of passing a waypoint farther away than wanted, beside that of time [s/m]
 _ROUGH = 1e-4  # cost of commands that change as fast as they can, beside that of time [-]
 _IPOPT = {
     "print_level": 0,
     "sb": "yes",
-    "max_iter": 400,
+    "max_iter": 200,
     "mu_init": 3e-3,  # the guess is good: begin near it
     "bound_push": 1e-4,
     "bound_frac": 1e-4,
@@ -60,6 +61,20 @@ class Drive:
         times = np.concatenate(([0.0], self.arrivals))
         return float(np.interp(horizon_s, times, np.arange(len(times))))
 
+    def before(self, leg: int) -> Drive:
+        """The legs before one."""
+        return Drive(self.states[: leg * self.nodes + 1], self.leg_s[:leg])
+
+    def since(self, leg: int) -> Drive:
+        """The legs from one on."""
+        return Drive(self.states[leg * self.nodes :], self.leg_s[leg:])
+
+    def then(self, other: Drive) -> Drive:
+        """This drive, and another one that begins where it ends."""
+        return Drive(
+            np.concatenate((self.states[:-1], other.states)), np.concatenate((self.leg_s, other.leg_s))
+        )
+
 
 class Program:
     """The program for one boat and one number of legs; solves one after another."""
@@ -78,27 +93,28 @@ class Program:
         states = [ca.SX.sym(f"state_{k}", size) for k in range(count + 1)]
         changes = [ca.SX.sym(f"change_{k}", len(boat.slew)) for k in range(count)]
         leg_s = [ca.SX.sym(f"leg_{k}") for k in range(legs)]
+        strays = [ca.SX.sym(f"stray_{k}") for k in range(legs)]
         places, start, weights = (
             ca.SX.sym("places", 2, legs),
             ca.SX.sym("start", size),
             ca.SX.sym("weights", legs),
         )
-        reach = ca.SX.sym("reach")
+        reach = ca.SX.sym("reach", legs)
         rates, defect = [boat.pace(state) for state in states], self._defect()
         unknown: list[Any] = []
         still: list[Any] = [states[0] - start]
         near: list[Any] = []
         cost: Any = 0.0
         for leg in range(legs):
-            unknown.append(leg_s[leg])
-            cost += weights[leg] * leg_s[leg]
+            unknown += [leg_s[leg], strays[leg]]
+            cost += weights[leg] * leg_s[leg] + _STRAY * strays[leg]
             h = leg_s[leg] / nodes
             for k in range(leg * nodes, (leg + 1) * nodes):
                 unknown += [states[k], changes[k]]
                 cost += _ROUGH * h * ca.dot(changes[k], changes[k])
                 still.append(defect(states[k], states[k + 1], changes[k], h, rates[k], rates[k + 1]))
             off = states[(leg + 1) * nodes][:2] - places[:, leg]
-            near.append(ca.dot(off, off) - reach * reach)
+            near.append(ca.dot(off, off) - (reach[leg] + strays[leg]) ** 2)
         unknown.append(states[-1])
         constraints = ca.vertcat(*still, *near)
         equalities = constraints.numel() - legs
@@ -121,14 +137,23 @@ class Program:
             options,
         )
 
-    def solve(self, guess: Drive, places: np.ndarray, *, wanted: int, reach: float) -> Drive | None:
+    def solve(
+        self,
+        guess: Drive,
+        places: np.ndarray,
+        *,
+        wanted: int,
+        reach: np.ndarray,
+        most: np.ndarray,
+    ) -> Drive | None:
         """The quickest drive near a guess.
 
         Args:
             guess: From the state that the drive begins in; need not hold together.
             places: Of the waypoints, shape (legs, 2) [m].
             wanted: How many of them matter; the rest is driven without haste.
-            reach: How near they are passed [m].
+            reach: How near each is passed, shape (legs,) [m].
+            most: How near, where that takes too long, shape (legs,) [m].
 
         Returns:
             The drive; None where IPOPT finds none.
@@ -137,16 +162,22 @@ class Program:
         steps = np.diff(guess.times)[:, None] * self._boat.slew
         changes = np.clip(np.diff(states[:, MOTION:], axis=0) / steps, -1.0, 1.0)
         nodes = np.concatenate((states[:-1], changes), axis=1).reshape(self._legs, -1)
-        begin = np.concatenate((np.column_stack((guess.leg_s, nodes)).ravel(), states[-1]))
+        begin = np.concatenate(
+            (np.column_stack((guess.leg_s, np.zeros(self._legs), nodes)).ravel(), states[-1])
+        )
         weights = np.where(np.arange(self._legs) < wanted, 1.0, 0.02)
+        bounds = {side: each.copy() for side, each in self._bounds.items()}
+        bounds["ubx"][1 : -self._boat.size : 2 + self._nodes * self._width] = np.maximum(most - reach, 0.0)
         found = self._solver(
-            x0=begin, p=np.concatenate((places.ravel(), states[0], weights, [reach])), **self._bounds
+            x0=begin,
+            p=np.concatenate((places.ravel(), states[0], weights, reach)),
+            **bounds,
         )
         if not self._solver.stats()["success"]:
             return None
         values = np.asarray(found["x"]).ravel()
         legs = values[: -self._boat.size].reshape(self._legs, -1)
-        inner = legs[:, 1:].reshape(-1, self._width)[:, : self._boat.size]
+        inner = legs[:, 2:].reshape(-1, self._width)[:, : self._boat.size]
         return Drive(np.vstack((inner, values[-self._boat.size :])), legs[:, 0])
 
     def _defect(self) -> ca.Function:
@@ -164,5 +195,5 @@ class Program:
         n = len(self._boat.slew)
         state = np.concatenate((np.full(MOTION, motion), np.full(n, command)))
         node = np.concatenate((state, np.full(n, change)))
-        one = np.concatenate(([leg], np.tile(node, self._nodes)))
+        one = np.concatenate(([leg, 0.0], np.tile(node, self._nodes)))
         return np.concatenate((np.tile(one, self._legs), state))

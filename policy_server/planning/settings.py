@@ -12,15 +12,22 @@ class PlannerSettings:
     """How plans are made and followed."""
 
     lead_s: float  # for how long the policy's own drive is followed while the plan is made [s]
+    soon_s: float  # how much longer at most, to begin the plan where a waypoint is passed [s]
     legs: int  # waypoints of a plan
     nodes: int  # of each leg
     reach: float  # how near plans pass waypoints, as a share of what the task takes for passed [-]
+    most: float  # how near where that takes too long, as such a share [-]
+    sure: float  # how near they must be passed when a plan is tried, as such a share; what is not is passed nearer [-]
     caution: float  # factor on that for each plan that had to be given up on a course [-]
-    rounds: int  # of looking for another way: a detour somewhere, then optimal control again
-    detours: int  # tried in each round
-    detour_s: tuple[float, float]  # how long they hold commands [s]
+    width: int  # ways that are kept from leg to leg
+    tries: int  # in which each of them goes on
+    ahead: int  # waypoints after which they are compared
+    held_s: tuple[float, float]  # how long a try holds commands before the controller drives [s]
+    solved: int  # of the ways found, how many optimal control makes quicker
     lost: float  # distance from the plan beyond which it is given up [m]
+    believed: float  # how near a waypoint is believed to be passed, as a share of the same [-]
     late_s: float  # how late a waypoint may be passed before the plan is given up [s]
+    trust: float  # share of what a reading differs by from what is expected that is believed [-]
     position: float  # cost of a metre beside the plan for one control step [1/m²]
     heading: float  # of a radian [1/rad²]
     motion: float  # of a metre a second, and a radian a second [s²/m²]
@@ -28,9 +35,17 @@ class PlannerSettings:
 
     def __post_init__(self) -> None:
         """Refuse what no plan can be made with."""
-        at_least_1(legs=self.legs, nodes=self.nodes, detours=self.detours)
+        at_least_1(
+            legs=self.legs,
+            nodes=self.nodes,
+            width=self.width,
+            tries=self.tries,
+            ahead=self.ahead,
+            solved=self.solved,
+        )
         positive(
             lead_s=self.lead_s,
+            soon_s=self.soon_s,
             lost=self.lost,
             late_s=self.late_s,
             position=self.position,
@@ -38,8 +53,13 @@ class PlannerSettings:
             motion=self.motion,
             change=self.change,
         )
-        shares(reach=self.reach, caution=self.caution)
-        if self.rounds < 0 or self.reach == 0.0 or not 0.0 < self.detour_s[0] <= self.detour_s[1]:
-            raise ValueError(
-                "'rounds' must not be negative, 'reach' not 0, 'detour_s' [low, high], 0 < low <= high."
-            )
+        shares(
+            trust=self.trust,
+            believed=self.believed,
+            reach=self.reach,
+            most=self.most,
+            sure=self.sure,
+            caution=self.caution,
+        )
+        if not 0.0 < self.held_s[0] <= self.held_s[1]:
+            raise ValueError("'held_s' must be [low, high], 0 < low <= high.")

@@ -8,47 +8,58 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from policy_server.planning.program import Drive, Program
-from policy_server.planning.reference import Follower, Reference
+from policy_server.planning.reference import Reference
 from policy_server.planning.search import Guess, Order, Search
+from policy_server.planning.trial import Trial
+
+_TRIALS = 3  # of a plan at most; waypoints that it misses in one are passed nearer in the next
 
 
 class Solvers:
-    """Threads that make guesses quick; each has a program of its own, written when it is first needed."""
+    """Threads that make guesses quick; each has programs of its own, written when they are first needed."""
 
-    def __init__(self, make: Callable[[], Program], count: int | None = None) -> None:
+    def __init__(self, make: Callable[[int], Program], count: int | None = None) -> None:
         """Begin none yet.
 
         Args:
-            make: Writes a program; takes seconds.
+            make: Writes the program for a number of legs; takes a second.
             count: Threads at most; one for each core that we may use by default.
         """
         self._make, self._own = make, threading.local()
         self._pool = ThreadPoolExecutor(count or len(os.sched_getaffinity(0)), thread_name_prefix="solver")
 
-    def warm_up(self) -> None:
-        """Have one thread ready, so that the first plan does not wait for it."""
-        self._pool.submit(self._program).result()
+    def warm_up(self, lengths: Iterable[int]) -> None:
+        """Have one thread ready for drives of so many legs, so that the first plan does not wait for it."""
+        self._pool.submit(lambda: [self._program(legs) for legs in lengths]).result()
 
     def __call__(self, guesses: Iterable[Guess]) -> Iterable[Drive | None]:
         """As `search.Solve`."""
         return self._pool.map(self._solve, guesses)
 
     def _solve(self, guess: Guess) -> Drive | None:
-        return self._program().solve(guess.drive, guess.course, wanted=guess.wanted, reach=guess.reach)
+        later, legs = guess.drive.since(guess.kept), slice(guess.kept, len(guess.drive.leg_s))
+        found = self._program(len(later.leg_s)).solve(
+            later,
+            guess.course[legs],
+            wanted=guess.wanted - guess.kept,
+            reach=guess.reach[legs],
+            most=guess.most[legs],
+        )
+        return found if found is None else guess.drive.before(guess.kept).then(found)
 
-    def _program(self) -> Program:
-        if not hasattr(self._own, "program"):
-            self._own.program = self._make()
-        program: Program = self._own.program
-        return program
+    def _program(self, legs: int) -> Program:
+        programs: dict[int, Program] = self._own.__dict__.setdefault("programs", {})
+        if legs not in programs:
+            programs[legs] = self._make(legs)
+        return programs[legs]
 
 
 class Planning:
     """One thread that searches while the robot drives."""
 
-    def __init__(self, search: Search, follower: Follower) -> None:
+    def __init__(self, search: Search, trial: Trial) -> None:
         """What it works with; nobody else's."""
-        self._search, self._follower = search, follower
+        self._search, self._trial = search, trial
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="planner")
 
     def begin(self, orders: list[Order]) -> Future[list[Reference | None]]:
@@ -60,5 +71,17 @@ class Planning:
         return self._pool.submit(self._work, orders)
 
     def _work(self, orders: list[Order]) -> list[Reference | None]:
-        drives = self._search.plans(orders)
-        return [None if drive is None else self._follower.of_drive(drive) for drive in drives]
+        courses = self._search.plans(orders)
+        found: dict[int, Reference] = {}
+        on_trial = [number for number, course in enumerate(courses) if course.best is not None]
+        for _ in range(_TRIALS):
+            if not on_trial:
+                break
+            tried = self._trial.drive([courses[number] for number in on_trial])
+            found |= {number: one.reference for number, one in zip(on_trial, tried, strict=True)}
+            failed = {
+                number: one.missed for number, one in zip(on_trial, tried, strict=True) if one.missed.any()
+            }
+            changed = self._search.nearer([(courses[number], missed) for number, missed in failed.items()])
+            on_trial = [number for number, better in zip(failed, changed, strict=True) if better]
+        return [found.get(number) for number in range(len(courses))]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.config import load_config
-from fulmar_core.controllers.course import tell_course
+from fulmar_core.controllers.course import progressed, tell_course
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
@@ -22,7 +22,7 @@ from policy_server.policy import Policy
 from policy_server.shipped import shipped_policy
 
 ROBOT, TASK = load_robot("kingfisher"), load_task("go_through_positions")
-SETTINGS = replace(load_config(PlannerSettings, settings_path("kingfisher")), rounds=0, lead_s=4.0)
+SETTINGS = replace(load_config(PlannerSettings, settings_path("kingfisher")), width=2, tries=4, solved=1)
 SEED = 41
 
 
@@ -42,6 +42,7 @@ def drive(controller, simulation, steps=600, *, tell=True):
         if tell:
             tell_course(controller, simulation.goal)
         commands.append(np.asarray(controller.act(simulation.observe())))
+        simulation.goal = progressed(controller, simulation.goal)
         simulation.step(commands[-1])
     return np.asarray(simulation.goal.done), np.array(commands)
 
@@ -162,6 +163,18 @@ def test_another_course_begins_anew_and_a_reset_forgets_it(planner, monkeypatch)
     assert len(nothing.orders) == 2
     planner.reset()
     np.testing.assert_array_equal(planner.act(simulation.observe()), policy().act(simulation.observe()))
+
+
+def test_it_says_which_waypoint_comes_next_on_its_own_course_alone(planner, monkeypatch):
+    monkeypatch.setattr(planner, "_planning", Planless(ready=True))
+    simulation = simulated(2)
+    places = np.asarray(simulation.goal.targets)[..., :2]
+    planner.reset()
+    assert planner.coming(places) is None
+    drive(planner, simulation, 100)
+    np.testing.assert_array_equal(planner.coming(places), simulation.goal.done % places.shape[1])
+    assert simulation.goal.done.min() >= 1
+    assert planner.coming(places[:, ::-1]) is None
 
 
 def test_its_hash_changes_with_its_settings(planner):
