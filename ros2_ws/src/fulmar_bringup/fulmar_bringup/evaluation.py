@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fulmar_bringup.ros_evaluation import RosPool
 
 WAYS = ("batch", "mujoco", "ros")
-BOUNDED_EPISODES = 256  # whose bound `evaluate` computes: a boat's takes 40 ms each
+BOUNDED_EPISODES = 256  # whose bound `evaluate` computes by default: a boat's takes 40 ms each
 Progress = Callable[[int], None]
 
 
@@ -35,7 +35,8 @@ class Trial:
     through: str  # one of WAYS
     episodes: int
     worlds: int = WORLDS  # of a batch at once
-    jobs: int = 1  # pairs of processes, through ros
+    jobs: int = 1  # processes; through ros, pairs of them
+    bounded: int = BOUNDED_EPISODES  # episodes whose bound is computed
 
     @property
     def robot(self) -> Robot:
@@ -78,7 +79,7 @@ def runs_of(
         RunFailed: Through ros, the controller ended or refused to start.
         LockstepError: Through ros, it did not answer in time.
     """
-    plan, task = trial.plan, trial.task
+    plan = trial.plan
     if trial.through == "ros":
         from fulmar_bringup.ros_evaluation import roll_out_through_ros
 
@@ -87,18 +88,41 @@ def runs_of(
         else:
             yield roll_out_through_ros(plan, episodes=trial.episodes, jobs=trial.jobs, progress=progress)
         return
-    robot, scenario, controller = trial.robot, load_scenario(plan.scenario), trial.controller()
-    if trial.through == "batch":
-        from fulmar_bringup.system import CONTROLLERS
+    together = _together(trial)
+    if together and trial.jobs > 1:
+        from fulmar_bringup.parts import runs_by_parts
 
+        yield from runs_by_parts(trial, together, progress)
+    else:
+        yield from runs_of_part(trial, trial.controller(), 0, trial.episodes, progress)
+
+
+def runs_of_part(
+    trial: Trial, controller: Controller, first: int, episodes: int, progress: Progress = lambda steps: None
+) -> Iterator[Trajectories]:
+    """Run some episodes of a trial in the batch or in MuJoCo.
+
+    Args:
+        trial: What to run.
+        controller: Its controller; reset before it drives.
+        first: Number of the first episode.
+        episodes: How many.
+        progress: As in `runs_of`.
+
+    Yields:
+        What happened, for the next so many episodes.
+    """
+    robot, task, scenario = trial.robot, trial.task, load_scenario(trial.plan.scenario)
+    if trial.through == "batch":
         yield from batches(
             controller,
             robot,
             task,
             scenario,
-            episodes=trial.episodes,
-            seed=plan.seed,
-            worlds=min(trial.worlds, CONTROLLERS[plan.controller].together or trial.worlds),
+            episodes=episodes,
+            seed=trial.plan.seed,
+            first=first,
+            worlds=min(trial.worlds, _together(trial) or trial.worlds),
             progress=progress,
         )
         return
@@ -109,10 +133,18 @@ def runs_of(
         lambda: MujocoBackend.of(robot, task, scenario),
         task,
         scenario,
-        episodes=trial.episodes,
-        seed=plan.seed,
+        episodes=episodes,
+        seed=trial.plan.seed,
+        first=first,
         progress=progress,
     )
+
+
+def _together(trial: Trial) -> int | None:
+    """Episodes that its controller takes at once at most; None for any number."""
+    from fulmar_bringup.system import CONTROLLERS
+
+    return CONTROLLERS[trial.plan.controller].together
 
 
 class Tally:
@@ -149,14 +181,14 @@ def evaluate_trial(trial: Trial, progress: Progress = lambda steps: None) -> dic
 
     Returns:
         Success rate and every figure, JSON-ready. Where waypoints are counted, also what physics allows in the first
-        `BOUNDED_EPISODES`: `bound`, the rule in words, and the shares of it.
+        `bounded`: `bound`, the rule in words, and the shares of it.
     """
     tally = Tally(trial.task)
     for run in runs_of(trial, progress):
         tally.add(run)
     figures, more = tally.figures, {}
     if has_bound(trial.task):
-        numbers = np.arange(min(trial.episodes, BOUNDED_EPISODES))
+        numbers = np.arange(min(trial.episodes, trial.bounded))
         bound = waypoint_bound(trial.robot, trial.task, trial.drawn(numbers), trial.task.episode_s)
         goals = figures["goals_reached"]
         figures |= bound_figures(goals, bound)

@@ -51,10 +51,11 @@ def batches(
     *,
     episodes: int,
     seed: int,
+    first: int = 0,
     worlds: int = WORLDS,
     progress: Progress = lambda steps: None,
 ) -> Iterator[Trajectories]:
-    """Run episodes 0 to `episodes - 1` of a seed in the core's own dynamics, some at once.
+    """Run some episodes of a seed in the core's own dynamics, some at once.
 
     Args:
         controller: Whom to judge.
@@ -63,6 +64,7 @@ def batches(
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
+        first: Number of the first of them, >= 0.
         worlds: How many run at once, >= 1; what happens does not depend on it.
         progress: Told how many control steps have been done.
 
@@ -72,10 +74,16 @@ def batches(
     Raises:
         ConfigError: An episode is shorter than one control step.
     """
-    for first in range(0, episodes, worlds):
-        count = min(worlds, episodes - first)
+    for done in range(0, episodes, worlds):
+        count = min(worlds, episodes - done)
         simulation = BatchSimulation(
-            robot, task, scenario, worlds=count, seed=seed, first=first, control_hz=controller.control_hz
+            robot,
+            task,
+            scenario,
+            worlds=count,
+            seed=seed,
+            first=first + done,
+            control_hz=controller.control_hz,
         )
         dt = simulation.control_dt
         controller.reset()
@@ -88,7 +96,7 @@ def batches(
             simulation.goal = progressed(controller, simulation.goal)
             simulation.step(action)
             log.add(simulation.truth, judge.see(simulation.truth, simulation.goal.block), simulation.command)
-            progress(first * steps + (step + 1) * count)
+            progress(done * steps + (step + 1) * count)
         yield log.trajectories()
 
 
@@ -100,9 +108,10 @@ def roll_out_in_backends(
     *,
     episodes: int,
     seed: int,
+    first: int = 0,
     progress: Progress = lambda steps: None,
 ) -> Trajectories:
-    """Run episodes 0 to `episodes - 1` of a seed, each in a backend of its own, stepped side by side.
+    """Run some episodes of a seed, each in a backend of its own, stepped side by side.
 
     Args:
         controller: Whom to judge.
@@ -111,6 +120,7 @@ def roll_out_in_backends(
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
+        first: Number of the first of them, >= 0.
         progress: Told how many control steps have been done.
 
     Returns:
@@ -125,8 +135,9 @@ def roll_out_in_backends(
         for _ in range(min(episodes, SIDE_BY_SIDE)):
             backends.append(make_backend())
             stack.callback(backends[-1].close)
-        for first in range(0, episodes, SIDE_BY_SIDE):
-            numbers = range(first, min(first + SIDE_BY_SIDE, episodes))
+        end = first + episodes
+        for number in range(first, end, SIDE_BY_SIDE):
+            numbers = range(number, min(number + SIDE_BY_SIDE, end))
             done = sum(run.position_error.size for run in runs)
 
             def further(steps: int, done: int = done) -> None:

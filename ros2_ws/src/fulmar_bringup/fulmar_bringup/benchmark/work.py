@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
-import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.unit import Unit, judge
-from fulmar_bringup.environment import environment
+from fulmar_bringup.pools import begin_worker, counted, ended_with_us, one_thread_each
 from fulmar_core.errors import RunFailed
 
 if TYPE_CHECKING:
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
 
 Outcome = Judged | str  # a sentence where a unit failed
 Done = Callable[[Unit, Outcome], None]
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
 def do_all(
@@ -77,8 +74,8 @@ def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], 
     spawn = multiprocessing.get_context("spawn")
     counts = spawn.Array("q", len(units), lock=False)
     with (
-        environment(ONE_THREAD),
-        ended_with_us(ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts,))) as pool,
+        one_thread_each(),
+        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts,))) as pool,
     ):
         futures: dict[Future[Outcome], Unit] = {
             pool.submit(_work, unit, index): unit for index, unit in enumerate(units)
@@ -94,34 +91,10 @@ def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], 
                     raise RunFailed("a process of the benchmark was ended from outside") from error
 
 
-@contextlib.contextmanager
-def ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
-    """Wait for the workers; after an error or Ctrl-C, end them."""
-    try:
-        yield pool
-    except BaseException:
-        for worker in multiprocessing.active_children():
-            worker.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-_counts: Any = None
-
-
-def _begin_worker(counts: Any) -> None:
-    global _counts
-    _counts = counts
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends its children
-
-
 def _work(unit: Unit, index: int) -> Outcome:
-    def progress(steps: int) -> None:
-        _counts[index] = steps
-
+    progress = counted(index)
     outcome = _outcome_of(unit, progress)
-    _counts[index] = int(unit.cost)
+    progress(int(unit.cost))
     return outcome
 
 

@@ -54,7 +54,11 @@ def evaluate(
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(metavar="N", min=1, help="Pairs of processes through ros; one for each core."),
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="Processes at once, through ros and for a planner; one for each core.",
+        ),
     ] = None,
     episode_s: Annotated[
         float | None,
@@ -66,6 +70,12 @@ def evaluate(
     worlds: Annotated[
         int | None,
         typer.Option(metavar="N", min=1, help="Episodes at once in the batch; no figure depends on it."),
+    ] = None,
+    bounds: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Episodes, from the first on, whose bound on waypoints is computed; 256."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -80,7 +90,7 @@ def evaluate(
 
     fulmar evaluate turtlebot2 go_through_positions --through batch --episodes 4096 --steps 1000
     """
-    from fulmar_bringup.evaluation import Trial, evaluate_trial
+    from fulmar_bringup.evaluation import BOUNDED_EPISODES, Trial, evaluate_trial
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, modules_of
@@ -123,7 +133,7 @@ def evaluate(
         duration_s=duration_s,
         lockstep=True,
     )
-    trial = Trial(plan, through, episodes, worlds or WORLDS, jobs or _cores())
+    trial = Trial(plan, through, episodes, worlds or WORLDS, jobs or _cores(), bounds or BOUNDED_EPISODES)
     began = time.monotonic()
     with step_bar("judging", episodes * episode_steps(trial.task, control_dt)) as progress:
         judged = evaluate_trial(trial, progress)

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bringup.benchmark.identification.trial import Trial, run_trial
-from fulmar_bringup.benchmark.work import ONE_THREAD, ended_with_us
-from fulmar_bringup.environment import environment
+from fulmar_bringup.pools import ended_with_us, one_thread_each
 
 ASKED = ("mass", "yaw_inertia", "thrust")  # of platforms
 MOST_ERROR_PERCENT = 3.0
@@ -31,7 +30,7 @@ def run_identification(
     """
     results: dict[int, dict[str, Any]] = {}
     spawn = multiprocessing.get_context("spawn")
-    with environment(ONE_THREAD), ended_with_us(ProcessPoolExecutor(jobs, spawn)) as pool:
+    with one_thread_each(), ended_with_us(ProcessPoolExecutor(jobs, spawn)) as pool:
         futures = {pool.submit(run_trial, trial): i for i, trial in enumerate(trials)}
         for future in as_completed(futures):
             results[futures[future]] = future.result()

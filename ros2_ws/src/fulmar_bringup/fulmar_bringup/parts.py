@@ -1,0 +1,58 @@
+"""A trial in parts, by several processes at once: for controllers that take seconds for an episode."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+
+from fulmar_bringup.evaluation import Progress, Trial, runs_of_part
+from fulmar_bringup.pools import begin_worker, counted, ended_with_us, one_thread_each
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.errors import RunFailed
+from fulmar_core.metrics import Trajectories, join
+
+_HEARD_S = 0.2  # between two looks at how far the processes are [s]
+
+
+def runs_by_parts(trial: Trial, size: int, progress: Progress) -> Iterator[Trajectories]:
+    """Run the episodes of a trial; what happens does not depend on how many processes there are.
+
+    Args:
+        trial: What to run, in the batch or in MuJoCo, by `jobs` processes.
+        size: Episodes of a part at most.
+        progress: As in `runs_of`.
+
+    Yields:
+        What happened, part by part in their order.
+
+    Raises:
+        RunFailed: A process was ended from outside.
+    """
+    parts = [(first, min(size, trial.episodes - first)) for first in range(0, trial.episodes, size)]
+    spawn = multiprocessing.get_context("spawn")
+    counts = spawn.Array("q", len(parts), lock=False)
+    jobs = min(trial.jobs, len(parts))
+    with (
+        one_thread_each(),
+        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts,))) as pool,
+    ):
+        futures = [pool.submit(_run, trial, *part, number) for number, part in enumerate(parts)]
+        for future in futures:
+            while not wait((future,), timeout=_HEARD_S).done:
+                progress(sum(counts))
+            try:
+                yield future.result()
+            except BrokenProcessPool as error:
+                raise RunFailed("a process of the evaluation was ended from outside") from error
+        progress(sum(counts))
+
+
+_made: dict[Trial, Controller] = {}  # of this process; loading takes a second
+
+
+def _run(trial: Trial, first: int, episodes: int, number: int) -> Trajectories:
+    if trial not in _made:
+        _made[trial] = trial.controller()
+    return join(list(runs_of_part(trial, _made[trial], first, episodes, counted(number))))
