@@ -15,7 +15,9 @@ from fulmar_bringup.benchmark.judged import QUANTILES, Judged
 from fulmar_bringup.benchmark.pairs import code_hash, find_pair, units_of
 from fulmar_bringup.benchmark.required import LEAST, judged_figure, verdicts
 from fulmar_bringup.benchmark.results import wilson
+from fulmar_bringup.benchmark.roboran import document_of
 from fulmar_bringup.benchmark.thesis import ROBOTS, TABLE, TASKS, thesis_row
+from fulmar_bringup.evaluation import runs_of
 from policy_server.shipped import policies_directory
 
 GOOD = {"batch": 0.995, "mujoco": 0.992}
@@ -165,6 +167,62 @@ def test_the_hash_of_the_code_knows_the_simulator_only_where_it_is_used():
 def test_a_pair_without_anybody_says_why(tmp_path):
     assert find_pair("jetbot", "push_block", "policy", tmp_path).reason == "no policy is shipped"
     assert "no classical law does 'push_block'" in find_pair("jetbot", "push_block", "classical").reason
+
+
+def test_a_planner_is_judged_where_there_are_plans_with_its_policys_training():
+    pair = find_pair("kingfisher", "go_through_positions", "planner")
+    policy = find_pair("kingfisher", "go_through_positions", "policy")
+    assert (pair.kind, pair.controller, pair.policy) == ("planner", "planner", policy.policy)
+    assert pair.sha256 != policy.sha256
+    assert pair.passport == policy.passport
+    assert "boats with propellers" in find_pair("turtlebot2", "go_through_positions", "planner").reason
+
+
+def test_a_planner_whose_policy_is_not_there_is_missing(tmp_path):
+    pair = find_pair("kingfisher", "go_through_positions", "planner", tmp_path)
+    assert pair.missing and (pair.kind, pair.reason) == ("planner", "no policy is shipped")
+
+
+def test_a_planner_is_judged_over_the_episode_that_it_plans_for(tmp_path, monkeypatch):
+    unit = unit_of(
+        tmp_path, controller="planner", robot="kingfisher", task="go_through_positions", episodes=3
+    )
+    asked = []
+
+    def as_the_classical_law(trial, progress=lambda steps: None, **how):
+        asked.append((trial.episodes, trial.worlds, trial.jobs, trial.task.episode_s))
+        plan = replace(trial.plan, controller="classical")
+        yield from runs_of(replace(trial, plan=plan), progress, **how)
+
+    monkeypatch.setattr(units, "runs_of", as_the_classical_law)
+    outcome = units.judge(unit)
+    assert asked == [(3, 64, 1, 60.0), (3, units.FEW_AT_ONCE, 1, 60.0)]
+    assert "goals_in_1000_steps" not in outcome.figures
+    assert outcome.figures["share_of_bound"].shape == (3,)
+
+
+@pytest.mark.parametrize(
+    ("met", "counted"),
+    [
+        ((False, True), (1, 1, 0)),
+        ((False, None), (1, 0, 1)),
+        ((False, False), (1, 0, 0)),
+        ((False,), (1, 0, 0)),
+    ],
+)
+def test_a_pair_counts_once_and_policy_or_planner_may_meet_what_is_asked(met, counted):
+    entries = [
+        {"robot": "kingfisher", "task": "go_through_positions", "kind": kind, "status": "judged", "met": each}
+        for kind, each in zip(("policy", "planner"), met, strict=False)
+    ]
+    beside = [
+        {**entries[0], "kind": "classical", "met": None},
+        {**entries[0], "robot": "turtlebot2", "kind": "planner", "status": "missing", "met": None},
+    ]
+    document = document_of(
+        entries + beside, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.0
+    )
+    assert (document["asked"], document["met"], document["open"]) == counted
 
 
 def test_a_damaged_bundle_is_missing_with_its_reason(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -45,6 +45,35 @@ def test_a_part_begins_at_its_own_number():
     whole = join(list(runs_of(trial)))
     (last,) = runs_of_part(trial, trial.controller(), 3, 1)
     np.testing.assert_array_equal(last.x[0], whole.x[3])
+
+
+def test_what_is_kept_of_a_trial_that_was_broken_off_is_not_done_again(tmp_path):
+    trial = Trial(PLAN, "batch", 5, jobs=2)
+
+    def driven():
+        told = []
+        run = join(list(runs_by_parts(trial, 2, told.append, tmp_path)))
+        assert told[-1] == run.x.size
+        return run
+
+    whole = driven()
+    files = sorted(tmp_path.iterdir())
+    assert len(files) == 3
+    again = driven()
+    for each in fields(whole):
+        np.testing.assert_array_equal(getattr(again, each.name), getattr(whole, each.name))
+    assert isinstance(again.control_dt, float)
+
+    cut, moved, gone = files
+    cut.write_bytes(cut.read_bytes()[:1000])
+    with np.load(moved) as file:
+        arrays = dict(file)
+    np.savez(moved, **{**arrays, "x": arrays["x"] + 1.0})
+    gone.unlink()
+    third = driven()
+    kept = slice(2, 4)
+    np.testing.assert_array_equal(third.x[kept], whole.x[kept] + 1.0)
+    np.testing.assert_array_equal(np.delete(third.x, [2, 3], axis=0), np.delete(whole.x, [2, 3], axis=0))
 
 
 def test_a_process_that_is_ended_from_outside_is_told_and_leaves_none_behind():

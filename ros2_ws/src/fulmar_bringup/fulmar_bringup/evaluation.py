@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,7 +63,11 @@ class Trial:
 
 
 def runs_of(
-    trial: Trial, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
+    trial: Trial,
+    progress: Progress = lambda steps: None,
+    *,
+    pool: RosPool | None = None,
+    keep: Path | None = None,
 ) -> Iterator[Trajectories]:
     """Run the episodes of a trial, in their order.
 
@@ -70,6 +75,7 @@ def runs_of(
         trial: What to run.
         progress: Told how many control steps have been done.
         pool: Processes that stay for one trial after another, through ros; by default it has its own.
+        keep: Folder for what is done of this very trial, where it takes long; what lies there is not done again.
 
     Yields:
         What happened, for the next so many episodes.
@@ -88,11 +94,11 @@ def runs_of(
         else:
             yield roll_out_through_ros(plan, episodes=trial.episodes, jobs=trial.jobs, progress=progress)
         return
-    together = _together(trial)
-    if together and trial.jobs > 1:
+    most = together(trial)
+    if most and (trial.jobs > 1 or keep):
         from fulmar_bringup.parts import runs_by_parts
 
-        yield from runs_by_parts(trial, together, progress)
+        yield from runs_by_parts(trial, most, progress, keep)
     else:
         yield from runs_of_part(trial, trial.controller(), 0, trial.episodes, progress)
 
@@ -122,7 +128,7 @@ def runs_of_part(
             episodes=episodes,
             seed=trial.plan.seed,
             first=first,
-            worlds=min(trial.worlds, _together(trial) or trial.worlds),
+            worlds=min(trial.worlds, together(trial) or trial.worlds),
             progress=progress,
         )
         return
@@ -140,7 +146,7 @@ def runs_of_part(
     )
 
 
-def _together(trial: Trial) -> int | None:
+def together(trial: Trial) -> int | None:
     """Episodes that its controller takes at once at most; None for any number."""
     from fulmar_bringup.system import CONTROLLERS
 

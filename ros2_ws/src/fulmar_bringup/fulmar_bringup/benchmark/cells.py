@@ -100,7 +100,9 @@ QUANTITIES = {
 def head(entry: dict[str, Any]) -> str:
     """Title of a pair's column."""
     name = spoken(entry["robot"])
-    return name if entry["kind"] == "policy" else f"{name}, {LAWS.get(entry['law'], 'classical')}"
+    if entry["kind"] == "policy":
+        return name
+    return f"{name}, {entry['kind'] if entry['law'] is None else LAWS.get(entry['law'], 'classical')}"
 
 
 def missing(entry: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,8 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from policy_server.shipped import policies_directory
 
-KINDS = ("policy", "classical")
+KINDS = ("policy", "planner", "classical")
+BUNDLED = ("policy", "planner")  # what is asked of a pair, one of these may meet
 
 
 @dataclass(frozen=True)
@@ -49,14 +50,17 @@ def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) ->
     Args:
         robot: Name of the robot.
         task: Name of the task.
-        kind: policy: the bundle; classical: the law of the robot's family.
+        kind: policy: the bundle; planner: plans that begin from it; classical: the law of the robot's family.
         policies: Folder of bundles named <robot>_<task>; the shipped ones by default.
 
     Returns:
         The pair, perhaps with a reason why nobody does.
     """
+    folder = (policies or policies_directory()) / f"{robot}_{task}"
     if kind == "policy":
-        return with_policy(robot, task, (policies or policies_directory()) / f"{robot}_{task}")
+        return with_policy(robot, task, folder)
+    if kind == "planner":
+        return with_planner(robot, task, folder)
     return with_law(robot, task, "classical")
 
 
@@ -80,6 +84,23 @@ def with_policy(robot: str, task: str, folder: Path) -> Pair:
         sha256=passport.sha256,
         passport=passport.training,
     )
+
+
+def with_planner(robot: str, task: str, folder: Path) -> Pair:
+    """A pair that a planner with the bundle of a folder drives, or why it cannot."""
+    from fulmar_bringup.system import CONTROLLERS
+    from policy_server.planning.loading import check_planner
+
+    the_robot, the_task = load_robot(robot), load_task(task)
+    try:
+        check_planner(the_robot, the_task)
+    except ConfigError as error:
+        return Pair(robot, task, "planner", reason=str(error))
+    pair = with_policy(robot, task, folder)
+    if pair.missing:
+        return replace(pair, kind="planner")
+    planner = CONTROLLERS["planner"].load(the_robot, the_task, the_robot.timing.control_hz, pair.policy)
+    return replace(pair, kind="planner", controller="planner", sha256=str(planner.metadata()["sha256"]))
 
 
 def with_law(robot: str, task: str, name: str) -> Pair:
@@ -113,7 +134,7 @@ def units_of(
         seed: Seed of the episodes.
         scenario: Name of the scenario.
         folder: Where outcomes are kept.
-        jobs: Pairs of processes through ros.
+        jobs: Processes, where a trial has several of its own.
         worlds: Episodes of a batch at once.
     """
     plan = RunPlan(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.benchmark.judged import Judged
-from fulmar_bringup.benchmark.pairs import Pair, find_pair, units_of
+from fulmar_bringup.benchmark.pairs import BUNDLED, Pair, find_pair, units_of
 from fulmar_bringup.benchmark.results import FORMAT, pair_entry
 from fulmar_bringup.benchmark.unit import Unit
 from fulmar_bringup.benchmark.work import Outcome, do_all
@@ -24,7 +24,7 @@ class Request:
 
     robots: Sequence[str]
     tasks: Sequence[str]
-    kinds: Sequence[str]  # policy, classical
+    kinds: Sequence[str]  # out of KINDS
     episodes: dict[str, int]  # in each way
     seed: int
     scenario: str
@@ -121,7 +121,10 @@ def document_of(
     wall_s: float,
 ) -> dict[str, Any]:
     """The whole document; docs/evaluation.md names its keys."""
-    asked = [entry for entry in entries if entry["kind"] == "policy"]
+    met: dict[tuple[str, str], list[bool | None]] = {}
+    for entry in entries:
+        if entry["kind"] == "policy" or (entry["kind"] in BUNDLED and entry["status"] != "missing"):
+            met.setdefault((entry["robot"], entry["task"]), []).append(entry["met"])
     return {
         "benchmark": "roboran",
         "format": FORMAT,
@@ -132,8 +135,8 @@ def document_of(
         "scenario": scenario,
         "episodes": dict(episodes),
         "pairs": entries,
-        "asked": len(asked),
-        "met": sum(entry["met"] is True for entry in asked),
-        "open": sum(entry["met"] is None for entry in asked),
+        "asked": len(met),
+        "met": sum(True in each for each in met.values()),
+        "open": sum(True not in each and None in each for each in met.values()),
         "wall_s": round(wall_s, 1),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from fulmar_bringup.benchmark.bound_file import cached_bound
 from fulmar_bringup.benchmark.judged import QUANTILES, Judged
 from fulmar_bringup.benchmark.thesis import CONTROL_HZ, GOAL_STEPS
-from fulmar_bringup.evaluation import Progress, Tally, Trial, runs_of
+from fulmar_bringup.evaluation import Progress, Tally, Trial, runs_of, together
 from fulmar_core.episode import Episode, episode_steps
 from fulmar_core.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.planar import wrapped
@@ -26,8 +27,10 @@ if TYPE_CHECKING:
 KEPT = 48  # episodes whose paths are kept
 FEW_WORLDS = 64  # of the second run in batch, which must give the same numbers
 COMPARED = 256  # episodes of that second run
+FEW_AT_ONCE = 8  # the same for controllers that take few episodes at once, of one such batch
 # How long one step takes, in steps of a batch; for the progress bar.
 STEP_COSTS = {"batch": 1.0, "mujoco": 120.0, "ros": 600.0}
+PLANNED_COST = 3000.0  # of a step of a controller that takes seconds for an episode, whatever moves
 
 
 class Extra:
@@ -80,7 +83,7 @@ class Unit:
     def cost(self) -> float:
         """How long it takes, in steps of a batch."""
         steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
-        return steps * STEP_COSTS[self.trial.through]
+        return steps * _step_cost(self.trial)
 
     def done_before(self) -> Judged | None:
         """The outcome of an earlier run with the same key, if there is one."""
@@ -103,12 +106,13 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         The outcome.
     """
     began = time.monotonic()
-    trial, weight = _long(unit.trial), STEP_COSTS[unit.trial.through]
+    trial, weight = _long(unit.trial), _step_cost(unit.trial)
     short = unit.trial.task
     steps = episode_steps(short, _control_dt(trial))
     tally, errors, kept, extra = Tally(short), [], _Kept(), unit.extra()
     goals: list[np.ndarray] = []
-    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool):
+    parts = unit.folder / f"{unit.name}_{unit.key[:16]}"
+    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool, keep=parts):
         beginning = first_steps(run, steps)
         tally.add(beginning)
         errors.append(_main_column(run, short))
@@ -137,6 +141,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         more=extra.arrays(),
     )
     outcome.save(unit.path)
+    shutil.rmtree(parts, ignore_errors=True)
     return outcome
 
 
@@ -167,11 +172,15 @@ def _control_dt(trial: Trial) -> float:
     return robot.timing.substeps(trial.plan.control_hz) * robot.timing.physics_dt
 
 
+def _step_cost(trial: Trial) -> float:
+    return STEP_COSTS[trial.through] + (PLANNED_COST if together(trial) else 0.0)
+
+
 def _long(trial: Trial) -> Trial:
     """The same trial, in the batch as long as the thesis counts waypoints for, where that is longer."""
     task = trial.task
-    if trial.through != "batch" or not counts_targets(task):
-        return trial
+    if trial.through != "batch" or not counts_targets(task) or together(trial):
+        return trial  # whoever takes seconds for an episode plans for its end
     seconds = max(task.episode_s, GOAL_STEPS * max(_control_dt(trial), 1.0 / CONTROL_HZ))
     return replace(trial, plan=replace(trial.plan, duration_s=seconds))
 
@@ -226,9 +235,10 @@ def _count_goals(
 
 def _same_with_few_worlds(trial: Trial, figures: dict[str, np.ndarray]) -> tuple[bool, int]:
     """Whether the first episodes give the same numbers in small batches, bit for bit."""
-    count = min(COMPARED, trial.episodes)
+    most = together(trial)
+    count = min(most or COMPARED, trial.episodes)
     tally = Tally(trial.task)
-    for run in runs_of(replace(trial, episodes=count, worlds=FEW_WORLDS)):
+    for run in runs_of(replace(trial, episodes=count, worlds=FEW_AT_ONCE if most else FEW_WORLDS, jobs=1)):
         tally.add(run)
     again = tally.figures
     same = all(

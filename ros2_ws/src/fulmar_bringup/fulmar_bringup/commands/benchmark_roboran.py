@@ -36,7 +36,9 @@ def roboran(
     controllers: Annotated[
         str,
         typer.Option(
-            metavar="K,...", help="policy: the shipped bundles. classical: the laws of the families."
+            metavar="K,...",
+            help="policy: the shipped bundles. planner: plans that begin from them (hours). classical: the laws of "
+            "the families.",
         ),
     ] = "policy",
     policies: Annotated[
@@ -82,14 +84,15 @@ def roboran(
     from fulmar_bringup.benchmark.thesis import ROBOTS, TASKS
     from fulmar_bringup.benchmark.unit import Unit
     from fulmar_bringup.extras import require
+    from fulmar_bringup.system import CONTROLLERS
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.paths import config_names
 
     load_scenario(scenario)
     ways = chosen(through, "way", tuple(EPISODES))
     kinds = chosen(controllers, "kind of controller", KINDS)
-    if "policy" in kinds:
-        require("onnxruntime")
+    for kind in kinds:
+        require(*CONTROLLERS[kind].needs)
     if "mujoco" in ways or "ros" in ways:
         require("mujoco")
     if report:
