@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fulmar_core.planar import wrapped
 from policy_server.planning.boat import Boat
 from policy_server.planning.rehearsal import Rehearsal, Rehearsed
 from policy_server.planning.settings import PlannerSettings
@@ -132,9 +133,8 @@ class Beam:
 
     def _alike(self, way: Way, other: Way) -> bool:
         a, b = way.states[-1], other.states[-1]
-        turned = np.remainder(a[2] - b[2] + np.pi, 2.0 * np.pi) - np.pi
         return bool(
-            abs(turned) < _LIKE_RAD
+            abs(wrapped(a[2] - b[2])) < _LIKE_RAD
             and np.hypot(*(a[3:5] - b[3:5])) < _LIKE_M_S
             and abs(len(way.states) - len(other.states)) * self._dt < _LIKE_S
         )

@@ -6,6 +6,7 @@ from concurrent.futures import Future
 
 import numpy as np
 
+from fulmar_core.controllers.course import further
 from policy_server.planning.boat import MOTION
 from policy_server.planning.reference import Reference
 from policy_server.planning.settings import PlannerSettings
@@ -83,9 +84,8 @@ class Pilot:
             The state, shape (size,), as of `boat`.
         """
         self._where = locate(sight, self._course, self._where)
-        ahead = (self._where.coming - self.coming) % len(self.places)
-        if ahead < len(self.places) / 2:  # others know that they were passed
-            self._closest[self._next : self._next + ahead] = 0.0
+        passed = int(further(self._where.coming, self.coming, len(self.places)))
+        self._closest[self._next : self._next + passed] = 0.0  # as others know
         self.steps += 1
         return np.concatenate(([self._where.x, self._where.y, self._where.yaw], motion, commands))
 

@@ -18,7 +18,7 @@ class PlannerSettings:
     reach: float  # how near plans pass waypoints, as a share of what the task takes for passed [-]
     most: float  # how near where that takes too long, as such a share [-]
     sure: float  # how near they must be passed when a plan is tried, as such a share; what is not is passed nearer [-]
-    caution: float  # factor on that for each plan that had to be given up on a course [-]
+    caution: float  # factor on `reach` for each plan that had to be given up on a course [-]
     width: int  # ways that are kept from leg to leg
     tries: int  # in which each of them goes on
     ahead: int  # waypoints after which they are compared

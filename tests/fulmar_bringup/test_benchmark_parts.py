@@ -235,6 +235,17 @@ def test_a_damaged_bundle_is_missing_with_its_reason(tmp_path):
     assert "not the one that was exported" in pair.reason
 
 
+def test_what_uses_all_processes_itself_is_not_done_in_a_pool(tmp_path, monkeypatch):
+    unit, told, done = unit_of(tmp_path), [], []
+    monkeypatch.setattr(work, "together", lambda trial: 32)
+    monkeypatch.setattr(work, "_in_a_pool", lambda *_: pytest.fail("a pool within a pool"))
+    outcomes = work.do_all(
+        [unit], jobs=2, progress=told.append, on_done=lambda one, outcome: done.append(one)
+    )
+    assert done == [unit] and isinstance(outcomes[unit], Judged)
+    assert told[-1] == unit.cost
+
+
 def test_the_fault_of_one_unit_is_a_sentence_and_costs_no_other(tmp_path, monkeypatch):
     def broken(unit, progress, *, pool=None):
         raise RuntimeError("it broke")

@@ -118,7 +118,9 @@ def test_a_process_that_ends_is_not_held_up_by_the_search(boat, rehearsal, monke
     assert found.best is None and not tried
 
 
-def test_haste_to_the_last_waypoint_in_time_passes_no_fewer(boat, rehearsal, solvers):
+def test_haste_is_to_the_first_waypoint_that_would_come_too_late_and_to_none_after_it(
+    boat, rehearsal, solvers
+):
     orders = some_orders(4, 12.0)
     search = searching(boat, rehearsal, solvers)
     for found in search.plans(orders):

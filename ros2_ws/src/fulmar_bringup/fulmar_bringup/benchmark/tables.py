@@ -66,7 +66,7 @@ def notes(document: dict[str, Any]) -> list[str]:
     if compared:
         same = sum(entry["same_at_64_worlds"] for entry in compared)
         lines.append(
-            f"{same} of {len(compared)} pairs give the same numbers, bit for bit, 64 worlds at a time as all at once."
+            f"{same} of {len(compared)} pairs give the same numbers, bit for bit, in small batches as in large ones."
         )
     return lines
 

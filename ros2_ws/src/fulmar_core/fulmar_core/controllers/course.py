@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.goal import Goal
@@ -64,7 +65,20 @@ def progressed(controller: Controller, goal: Goal) -> Goal:
     coming = controller.coming(places)
     if coming is None:
         return goal
-    count = places.shape[-2]
-    ahead = (coming - np.asarray(goal.done)) % count
-    done = goal.done + np.where(ahead < count / 2, ahead, 0).astype(np.asarray(goal.done).dtype)
-    return replace(goal, done=done)
+    done = np.asarray(goal.done)
+    return replace(goal, done=done + further(coming, done, places.shape[-2]).astype(done.dtype))
+
+
+def further(coming: ArrayLike, known: ArrayLike, count: int) -> np.ndarray:
+    """How many targets one count is ahead of another; 0 where it is behind.
+
+    Args:
+        coming: Number of the target that comes next, shape (...,).
+        known: The same by the other count, or how many are done, shape (...,).
+        count: Targets of the course; half a round or more ahead is taken for behind.
+
+    Returns:
+        Targets, shape (...,).
+    """
+    ahead = (np.asarray(coming) - np.asarray(known)) % count
+    return np.where(ahead < count / 2, ahead, 0)
