@@ -7,7 +7,7 @@ waypoints further, and those that are there first are kept, as far as they pass 
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -50,9 +50,25 @@ class _Search:
 class Beam:
     """Searches of many courses, side by side."""
 
-    def __init__(self, boat: Boat, rehearsal: Rehearsal, settings: PlannerSettings, dt: float) -> None:
-        """Whose drives they are, how much to try, and the control period [s]."""
-        self._rehearsal, self._settings, self._dt = rehearsal, settings, dt
+    def __init__(
+        self,
+        boat: Boat,
+        rehearsal: Rehearsal,
+        settings: PlannerSettings,
+        dt: float,
+        *,
+        wanted: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """Say how.
+
+        Args:
+            boat: Whose commands are held.
+            rehearsal: Whose drives they are.
+            settings: How much to try.
+            dt: Control period [s].
+            wanted: Whether a search is still of use; asked before each leg.
+        """
+        self._rehearsal, self._settings, self._dt, self._wanted = rehearsal, settings, dt, wanted
         self._useful = [boat.least, 0.0, boat.most]
         self._slots = len(boat.slew)
 
@@ -68,7 +84,8 @@ class Beam:
             beyond: Waypoints that a way goes on for after its horizon; at most `legs` in all.
 
         Returns:
-            Of each course some ways, the best first; none where the controller does not get on.
+            Of each course some ways, the best first; none where the controller does not get on, or where a search is
+            of no use any more.
         """
         searches = [
             _Search(places, round(horizon_s / self._dt), [Way(start[None], np.zeros(1, dtype=int))])
@@ -76,8 +93,10 @@ class Beam:
         ]
         for leg in range(self._settings.legs):
             open_ = [one for one in searches if one.ways and (one.enough is None or leg < one.enough)]
-            if not open_ or not threading.main_thread().is_alive():
-                break  # a process that ends waits for this thread alone
+            if not open_:
+                break
+            if not self._wanted():
+                return [[] for _ in searches]
             self._go_on(open_, leg)
             for one in open_:
                 if one.enough is None and one.ways and len(one.ways[0].states) > one.horizon:

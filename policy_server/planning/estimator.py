@@ -17,7 +17,7 @@ class Estimator:
     """What is believed of some boats."""
 
     def __init__(
-        self, robot: Robot, task: Task, *, rows: int, control_hz: float, trust: float, most: float
+        self, robot: Robot, task: Task, *, rows: int, control_hz: float, trust: float, carried: float
     ) -> None:
         """Nothing is known yet.
 
@@ -27,10 +27,11 @@ class Estimator:
             rows: How many boats.
             control_hz: How often they are seen.
             trust: Share of what a reading differs by from what is expected that is believed [-].
-            most: How far from where it is expected a boat may be read before all of the reading is believed [m].
+            carried: How far from where it is expected a boat is read if it was carried there: all of that is believed
+                then [m].
         """
         self._boats = Nominal(robot, task, rows=rows, control_hz=control_hz)
-        self._trust, self._most = trust, most
+        self._trust, self._carried = trust, carried
         self._seen = np.zeros(rows)  # readings since nothing was known
         self._states: np.ndarray | None = None
 
@@ -41,7 +42,7 @@ class Estimator:
         self._boats.put(self._states)
         self._boats.step(readings[:, MOTION:])
         expected = self._boats.states
-        carried_off = np.hypot(*(readings - expected)[:, :2].T) > self._most
+        carried_off = np.hypot(*(readings - expected)[:, :2].T) > self._carried
         self._seen = np.where(carried_off, 1.0, self._seen + 1.0)
         trust = np.maximum(self._trust, 1.0 / self._seen)  # a first reading is no better than the next ones
         believed = expected + trust[:, None] * (readings - expected)

@@ -56,7 +56,14 @@ class Pilot:
 
     @property
     def coming(self) -> int:
-        """Number of the next waypoint, as far as is known."""
+        """Number of the next waypoint, as far as is known, by us or by others."""
+        assert self._where is not None
+        ahead = int(further(self._where.coming, self._counted, len(self.places)))
+        return (self._counted + ahead) % len(self.places)
+
+    @property
+    def _counted(self) -> int:
+        """The same as far as the reference tells."""
         assert self._where is not None
         if self._reference is None:
             return self._where.coming
@@ -84,7 +91,7 @@ class Pilot:
             The state, shape (size,), as of `boat`.
         """
         self._where = locate(sight, self._course, self._where)
-        passed = int(further(self._where.coming, self.coming, len(self.places)))
+        passed = int(further(self._where.coming, self._counted, len(self.places)))
         self._closest[self._next : self._next + passed] = 0.0  # as others know
         self.steps += 1
         return np.concatenate(([self._where.x, self._where.y, self._where.yaw], motion, commands))

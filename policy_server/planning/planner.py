@@ -80,7 +80,9 @@ class Planner:
             None if patient else 1,
         )
         boat = Boat(robot)
-        beam = Beam(boat, Rehearsal(robot, task, make_policy()), settings, self._dt)
+        beam = Beam(
+            boat, Rehearsal(robot, task, make_policy()), settings, self._dt, wanted=self._solvers.take_work
+        )
         search = Search(beam, settings, self._solvers, dt=self._dt)
         self._planning = Planning(
             search, Trial(robot, task, Follower(boat, settings, self._dt), settings, self._dt)
@@ -124,7 +126,7 @@ class Planner:
         return commands.reshape(*np.shape(observation)[:-1], -1)
 
     def metadata(self) -> dict[str, Any]:
-        """Policy, settings and boat, with the SHA-256 of everything that commands depend on."""
+        """Policy, settings and pair, with the SHA-256 of everything but code that commands depend on."""
         policy = self._policy.metadata()
         told = {
             "controller": self.name,
@@ -134,21 +136,21 @@ class Planner:
             "settings": asdict(self._settings),
             "policy_sha256": policy["sha256"],
         }
-        water = self._robot.hydrodynamics
-        boat = {
-            "actuators": asdict(self._robot.actuators),
-            "body": asdict(self._robot.body),
-            "hydrodynamics": asdict(water) if water else None,
-        }
-        text = json.dumps(told | boat, sort_keys=True)
+        pair = {"whole_robot": asdict(self._robot), "whole_task": asdict(self._task)}
+        text = json.dumps(told | pair, sort_keys=True)
         return told | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
 
     def _let_go(self) -> None:
         """Forget the course, and what is ordered for it."""
         for pilot in self._pilots:
-            if pilot.ordered:
-                pilot.ordered[0].cancel()
+            self._give_up(pilot)
         self._places, self._pilots = None, []
+
+    def _give_up(self, pilot: Pilot) -> None:
+        """Forget what a boat has ordered; if nobody else waits for it, what comes next must not wait behind it."""
+        ordered, pilot.ordered = pilot.ordered, None
+        if ordered and not any(other.ordered and other.ordered[0] is ordered[0] for other in self._pilots):
+            ordered[0].cancel()
 
     def _set_out(self, places: np.ndarray) -> None:
         """Begin courses, shape (rows, k, 2) [m]."""
@@ -161,7 +163,7 @@ class Planner:
             rows=len(places),
             control_hz=self.control_hz,
             trust=told.trust,
-            most=told.lost,
+            carried=told.carried,
         )
 
     def _steer(self, rows: np.ndarray) -> np.ndarray:
@@ -187,15 +189,11 @@ class Planner:
         return lost
 
     def _takes_up(self, pilot: Pilot) -> bool:
-        ordered, pilot.ordered = pilot.ordered, None
-        if ordered is None:
+        if pilot.ordered is None:
             return False
-        plans, number = ordered
-        if not (self._patient or plans.done()):
-            plans.cancel()  # if it is still waiting: what comes next must not wait behind it
-        if plans.cancelled() or not (self._patient or plans.done()):
-            return False
-        plan = plans.result()[number]
+        plans, number = pilot.ordered
+        plan = plans.result()[number] if self._patient or plans.done() else None
+        self._give_up(pilot)
         if plan is None:
             return False
         pilot.go_on(plan)
@@ -206,6 +204,8 @@ class Planner:
         if not which:
             return
         pilots = [self._pilots[i] for i in which]
+        for pilot in pilots:
+            self._give_up(pilot)
         courses = np.stack([np.roll(pilot.places, -pilot.coming, axis=0) for pilot in pilots])
         seen = self._rehearsal.drive(states[which], courses, steps=self._lead + self._soon)
         orders = []

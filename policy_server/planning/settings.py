@@ -28,6 +28,7 @@ class PlannerSettings:
     believed: float  # how near a waypoint is believed to be passed, as a share of the same [-]
     late_s: float  # how late a waypoint may be passed before the plan is given up [s]
     trust: float  # share of what a reading differs by from what is expected that is believed [-]
+    carried: float  # how far from where it is expected a boat is read if it was carried there [m]
     position: float  # cost of a metre beside the plan for one control step [1/m²]
     heading: float  # of a radian [1/rad²]
     motion: float  # of a metre a second, and a radian a second [s²/m²]
@@ -48,6 +49,7 @@ class PlannerSettings:
             soon_s=self.soon_s,
             lost=self.lost,
             late_s=self.late_s,
+            carried=self.carried,
             position=self.position,
             heading=self.heading,
             motion=self.motion,

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_AGAIN = 1e-6  # cost of each waypoint further on, where a course passes the same places again
+
 
 @dataclass(frozen=True)
 class Whereabouts:
@@ -23,7 +25,8 @@ def locate(sight: np.ndarray, places: np.ndarray, before: Whereabouts | None) ->
     Args:
         sight: Waypoints from the next one on in the body's frame, as complex numbers ahead + i left, at least two [m].
         places: All waypoints, as complex numbers x + i y, shape (k,) [m].
-        before: What was found a step ago, which decides where a course is like itself; None at the beginning.
+        before: What was found a step ago, which decides where a course is like itself; None at the beginning, and then
+            the first waypoint of those that would be seen alike.
 
     Returns:
         The best explanation.
@@ -40,5 +43,6 @@ def locate(sight: np.ndarray, places: np.ndarray, before: Whereabouts | None) ->
         return Whereabouts(float(here[best].real), float(here[best].imag), float(turn[best]), best)
     away = np.abs(here - complex(before.x, before.y))
     turned = np.remainder(turn - before.yaw + np.pi, 2.0 * np.pi) - np.pi
-    best = int(np.argmin(off + away + np.abs(turned)))
+    further = (np.arange(count) - before.coming) % count
+    best = int(np.argmin(off + away + np.abs(turned) + _AGAIN * further))
     return Whereabouts(float(here[best].real), float(here[best].imag), before.yaw + float(turned[best]), best)

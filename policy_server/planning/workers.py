@@ -12,7 +12,9 @@ from policy_server.planning.reference import Reference
 from policy_server.planning.search import Guess, Order, Search
 from policy_server.planning.trial import Trial
 
-_TRIALS = 3  # of a plan at most; waypoints that it misses in one are passed nearer in the next
+_TRIALS = (
+    3  # of a plan at most; waypoints missed in one are passed nearer in the next, and in the last are missed
+)
 
 
 class Solvers:
@@ -31,6 +33,14 @@ class Solvers:
     def warm_up(self, lengths: Iterable[int]) -> None:
         """Have one thread ready for drives of so many legs, so that the first plan does not wait for it."""
         self._pool.submit(lambda: [self._program(legs) for legs in lengths]).result()
+
+    def take_work(self) -> bool:
+        """Whether there will be anybody to solve what is asked for; not in a process that ends."""
+        try:
+            self._pool.submit(bool)
+        except RuntimeError:
+            return False
+        return True
 
     def __call__(self, guesses: Iterable[Guess]) -> Iterable[Drive | None]:
         """As `search.Solve`."""
@@ -74,7 +84,7 @@ class Planning:
         courses = self._search.plans(orders)
         found: dict[int, Reference] = {}
         on_trial = [number for number, course in enumerate(courses) if course.best is not None]
-        for _ in range(_TRIALS):
+        for left in reversed(range(_TRIALS)):
             if not on_trial:
                 break
             tried = self._trial.drive([courses[number] for number in on_trial])
@@ -82,6 +92,8 @@ class Planning:
             failed = {
                 number: one.missed for number, one in zip(on_trial, tried, strict=True) if one.missed.any()
             }
+            if not left:
+                break
             changed = self._search.nearer([(courses[number], missed) for number, missed in failed.items()])
             on_trial = [number for number, better in zip(failed, changed, strict=True) if better]
         return [found.get(number) for number in range(len(courses))]

@@ -17,6 +17,7 @@ from fulmar_bringup.benchmark.required import LEAST, judged_figure, verdicts
 from fulmar_bringup.benchmark.results import wilson
 from fulmar_bringup.benchmark.roboran import document_of
 from fulmar_bringup.benchmark.thesis import ROBOTS, TABLE, TASKS, thesis_row
+from fulmar_bringup.benchmark.unit import done_already
 from fulmar_bringup.evaluation import runs_of
 from policy_server.shipped import policies_directory
 
@@ -118,6 +119,29 @@ def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
     assert replace(unit, defines="other code").done_before() is None
     unit.path.write_bytes(b"cut off")
     assert unit.done_before() is None
+
+
+def test_what_is_to_be_judged_again_forgets_what_was_done_by_halves(tmp_path):
+    unit, other = unit_of(tmp_path), unit_of(tmp_path, task="go_to_position")
+    outdated = replace(unit, defines="other code")
+    for each in (unit, outdated, other):
+        each.parts.mkdir(parents=True)
+    assert done_already([unit], fresh=False) == {}
+    assert unit.parts.is_dir()
+    assert done_already([unit], fresh=True) == {}
+    assert not unit.parts.exists() and not outdated.parts.exists() and other.parts.is_dir()
+
+    outcome = units.judge(unit)
+    assert done_already([unit], fresh=False)[unit].about["key"] == outcome.about["key"]
+    assert done_already([unit], fresh=True) == {}
+
+
+def test_a_judging_that_is_done_leaves_no_parts(tmp_path):
+    unit = unit_of(tmp_path)
+    outdated = replace(unit, defines="other code")
+    outdated.parts.mkdir()
+    units.judge(unit)
+    assert not outdated.parts.exists()
 
 
 def test_an_outcome_does_not_depend_on_where_the_policy_lies(tmp_path):

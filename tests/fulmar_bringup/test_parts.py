@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import subprocess
+import sys
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from fulmar_bringup import parts
@@ -90,6 +95,42 @@ def test_a_process_that_is_ended_from_outside_is_told_and_leaves_none_behind():
         list(runs_by_parts(trial, 1, progress))
     assert ended
     assert not multiprocessing.active_children()
+
+
+ENDLESS = """
+import multiprocessing, sys
+from dataclasses import replace
+from fulmar_bringup.evaluation import Trial
+from fulmar_bringup.parts import runs_by_parts
+from tests.fulmar_bringup.test_parts import PLAN
+
+def progress(steps):
+    print(*(worker.pid for worker in multiprocessing.active_children()), flush=True)
+
+if __name__ == "__main__":
+    list(runs_by_parts(Trial(replace(PLAN, duration_s=6000.0), "mujoco", 4, jobs=2), 1, progress))
+"""
+
+
+def test_no_process_outlives_the_one_whose_work_it_does(tmp_path):
+    root = Path(__file__).parents[2]
+    (tmp_path / "endless.py").write_text(ENDLESS)
+    ours = subprocess.Popen(
+        [sys.executable, tmp_path / "endless.py"],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join((str(root), os.environ.get("PYTHONPATH", "")))},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert ours.stdout is not None
+    workers = [psutil.Process(int(pid)) for pid in ours.stdout.readline().split()]
+    assert len(workers) == 2
+    ours.kill()
+    ours.wait()
+    _, left = psutil.wait_procs(workers, timeout=20.0)
+    for worker in left:
+        worker.kill()
+    assert not left
 
 
 def test_only_controllers_that_take_few_episodes_at_once_are_judged_in_parts(monkeypatch):

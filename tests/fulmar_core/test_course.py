@@ -96,6 +96,10 @@ def test_who_knows_to_have_come_further_has_and_nobody_goes_back(done, coming, k
     assert after.done.dtype == np.float32
 
 
+def test_who_claims_many_waypoints_at_once_is_not_believed():
+    assert progressed(Knowing(0), on_its_way(6, waypoints=9)).done == 6
+
+
 def test_who_is_on_no_course_or_does_not_look_ahead_changes_nothing():
     goal = on_its_way(2)
     assert progressed(Knowing(None), goal) is goal

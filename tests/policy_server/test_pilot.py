@@ -56,6 +56,17 @@ def test_on_a_course_that_is_like_itself_the_step_before_decides():
         assert found.coming == coming
 
 
+def test_on_a_course_that_passes_the_same_places_again_the_round_is_not_mistaken():
+    once = np.array([0.0, 4.0, 2.0 + 3.0j])
+    again = np.tile(once, 3)
+    for coming in range(9):
+        true = Whereabouts(1.0, 1.2, 0.4, coming)
+        found = locate(sight_of(true, again), again, Whereabouts(1.0, 1.15, 0.4, coming))
+        assert found.coming == coming
+        after_one_more = locate(sight_of(true, again), again, Whereabouts(1.0, 1.15, 0.4, (coming - 1) % 9))
+        assert after_one_more.coming == coming
+
+
 def pilot_on(reference, *, state=AT_REST, late_steps=2):
     pilot = Pilot(PLACES, SHIPPED, limit=LIMIT, late_steps=late_steps)
     look(pilot, state, 0)
@@ -134,12 +145,18 @@ def test_a_waypoint_is_passed_too_where_others_know_that_it_was():
     assert pilot.coming == 1
 
 
+def test_a_waypoint_that_others_know_is_passed_also_where_the_reference_goes_to_none():
+    pilot = pilot_on(standing(9, []))
+    look(pilot, AT_REST, 1)
+    assert pilot.coming == 1
+
+
 def readings_of(states, rng, std=0.02):
     return states + std * rng.normal(size=states.shape) * (np.arange(states.shape[-1]) < MOTION)
 
 
 def estimator(rows=1, trust=0.1):
-    return Estimator(ROBOT, TASK, rows=rows, control_hz=1.0 / DT, trust=trust, most=SHIPPED.lost)
+    return Estimator(ROBOT, TASK, rows=rows, control_hz=1.0 / DT, trust=trust, carried=SHIPPED.carried)
 
 
 def test_what_is_believed_is_nearer_to_the_truth_than_what_is_read(driven_before):
@@ -167,6 +184,15 @@ def test_a_boat_that_is_carried_off_is_believed_to_be_where_it_is_read(driven_be
     said = believed.see(np.stack((carried, driven_before[20])))
     np.testing.assert_allclose(said[0], carried, atol=1e-6)
     np.testing.assert_allclose(said[1], driven_before[20], atol=1e-6)
+
+
+def test_a_boat_that_was_not_seen_for_a_moment_is_believed_to_be_where_it_is_read(driven_before):
+    believed, fast = estimator(), int(np.argmax(driven_before[:, 3]))
+    for state in driven_before[:fast]:
+        believed.see(state[None])
+    after_two_missed_beats = driven_before[fast + 2]
+    said = believed.see(after_two_missed_beats[None])[0]
+    np.testing.assert_allclose(said[:2], after_two_missed_beats[:2], atol=0.01)
 
 
 def driven(reference, start, *, gains=True):

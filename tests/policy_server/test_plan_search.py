@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-import threading
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +17,7 @@ from policy_server.planning.program import Program
 from policy_server.planning.reference import Follower
 from policy_server.planning.rehearsal import Rehearsal
 from policy_server.planning.search import Guess, Order, Search, lengths
-from policy_server.planning.trial import Trial
+from policy_server.planning.trial import Trial, Tried
 from policy_server.planning.workers import Planning, Solvers
 from policy_server.policy import Policy
 from policy_server.shipped import shipped_policy
@@ -105,17 +108,46 @@ def test_where_the_controller_never_arrives_there_is_no_plan(boat, solvers):
     assert found.best is None
 
 
-def test_a_process_that_ends_is_not_held_up_by_the_search(boat, rehearsal, monkeypatch):
-    tried = []
+ENDS_WHILE_IT_SEARCHES = """
+from dataclasses import replace
+import numpy as np
+from policy_server.planning.planner import Planner
+from policy_server.planning.search import Order
+from policy_server.policy import Policy
+from policy_server.shipped import shipped_policy
+from tests.boats import AT_REST, LIMIT, PLACES, REACH, ROBOT, SMALL, TASK
 
-    def solve(guesses):
-        tried.extend(guesses)
-        return [None for _ in guesses]
+endless = replace(SMALL, legs=100_000)
+planner = Planner(
+    ROBOT, TASK, lambda: Policy(shipped_policy(ROBOT.name, TASK.name), ROBOT, TASK), endless, patient=False
+)
+plans = planner._planning.begin([Order(AT_REST, PLACES, 1e7, REACH, LIMIT)])
+while not plans.running():
+    pass
+print("searching", flush=True)
+"""
 
-    ended = threading.Thread()
-    monkeypatch.setattr(threading, "main_thread", lambda: ended)
-    (found,) = searching(boat, rehearsal, solve).plans([an_order()])
-    assert found.best is None and not tried
+
+def test_a_process_that_ends_is_not_held_up_by_the_search():
+    ended = subprocess.run(
+        [sys.executable, "-c", ENDS_WHILE_IT_SEARCHES],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "searching\n", "")
+
+
+def test_a_search_that_is_of_no_use_any_more_finds_nothing(boat, rehearsal):
+    asked = []
+
+    def wanted():
+        asked.append(True)
+        return len(asked) < 3
+
+    beam = Beam(boat, rehearsal, SMALL, DT, wanted=wanted)
+    assert beam.ways(AT_REST[None], [PLACES], [60.0], beyond=0) == [[]]
 
 
 def test_haste_is_to_the_first_waypoint_that_would_come_too_late_and_to_none_after_it(
@@ -185,6 +217,24 @@ def test_a_plan_that_passes_too_far_away_is_changed_until_the_boat_passes(
     assert all(plan is not None for plan in plans)
     assert 2 <= len(tries) <= 3
     assert sum(tried.missed.sum() for tried in tries[-1]) < sum(before)
+
+
+def test_what_is_missed_in_the_last_trial_is_not_changed_any_more(boat, rehearsal, solvers):
+    search, changed = searching(boat, rehearsal, solvers), []
+    missing = Tried(
+        Follower(boat, SHIPPED, DT).of_drive(search.plans([an_order()])[0].best), np.ones(1, bool)
+    )
+
+    def nearer(failed):
+        changed.append(failed)
+        return [True] * len(failed)
+
+    search.nearer = nearer
+    trials = []
+    always_missed = SimpleNamespace(drive=lambda courses: trials.append(courses) or [missing] * len(courses))
+    (plan,) = Planning(search, always_missed).begin([an_order()]).result()
+    assert plan is missing.reference
+    assert len(changed) == len(trials) - 1
 
 
 def test_where_there_is_no_plan_there_is_nothing_to_follow(boat, solvers, trial):

@@ -12,11 +12,12 @@ import pytest
 from fulmar_core.config import load_config
 from fulmar_core.controllers.course import progressed, tell_course
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.metrics import Judge
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from policy_server.planning.loading import settings_path
-from policy_server.planning.planner import Planner
+from policy_server.planning.planner import _PATIENCE_S, Planner
 from policy_server.planning.settings import PlannerSettings
 from policy_server.policy import Policy
 from policy_server.shipped import shipped_policy
@@ -120,6 +121,34 @@ def test_what_nobody_waits_for_any_more_keeps_no_later_plan_waiting(monkeypatch)
     assert coming.cancelled()
 
 
+def carry_off(simulation, row, metres):
+    x = np.array(simulation.truth.x)
+    x[row] += metres
+    simulation.truth.write(slice(None), replace(simulation.truth, x=x))
+    simulation.step(np.zeros((len(x), 2)))
+
+
+@pytest.mark.parametrize("patient", [True, False])
+def test_a_lost_boat_leaves_no_plan_behind_but_one_that_others_wait_for(patient, monkeypatch):
+    planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=patient)
+    ordered = []
+
+    class Busy(Planless):
+        def begin(self, orders):
+            ordered.append(super().begin(orders))
+            return ordered[-1]
+
+    monkeypatch.setattr(planner, "_planning", Busy(ready=False))
+    monkeypatch.setattr("policy_server.planning.planner._PATIENCE_S", 0.0)
+    simulation = simulated(2)
+    drive(planner, simulation, 5)
+    for row, given_up in ((0, []), (0, [1]), (1, [0, 1])):
+        carry_off(simulation, row, 2.0)
+        tell_course(planner, simulation.goal)
+        planner.act(simulation.observe())
+        assert [number for number, plans in enumerate(ordered) if plans.cancelled()] == given_up
+
+
 def test_in_real_time_no_step_waits_for_a_plan(monkeypatch):
     planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=False)
     monkeypatch.setattr(planner, "_planning", Planless(ready=False))
@@ -128,11 +157,11 @@ def test_in_real_time_no_step_waits_for_a_plan(monkeypatch):
     for _ in range(100):
         tell_course(planner, simulation.goal)
         seen = simulation.observe()
-        began = time.process_time()
+        began = time.perf_counter()
         command = planner.act(seen)
-        took.append(time.process_time() - began)
+        took.append(time.perf_counter() - began)
         simulation.step(command)
-    assert np.median(took) < 0.02
+    assert np.median(took) < 0.5 * _PATIENCE_S
 
 
 def test_a_boat_that_is_carried_off_begins_anew_from_where_it_is(planner, monkeypatch):
@@ -177,7 +206,38 @@ def test_it_says_which_waypoint_comes_next_on_its_own_course_alone(planner, monk
     assert planner.coming(places[:, ::-1]) is None
 
 
-def test_its_hash_changes_with_its_settings(planner):
-    other = Planner(ROBOT, TASK, policy, replace(SETTINGS, lost=0.4))
-    assert other.metadata()["sha256"] != planner.metadata()["sha256"]
+def test_on_a_course_that_passes_the_same_places_again_it_counts_as_the_judge_does(planner, monkeypatch):
+    monkeypatch.setattr(planner, "_planning", Planless(ready=True))
+    simulation = simulated(1, "ideal")
+    once = np.array([[2.0, 0.0, 0.0], [3.0, 2.0, 2.0], [0.5, 2.5, -2.0]])
+    simulation.goal = replace(
+        simulation.goal, targets=np.tile(once, (3, 1))[None].astype(simulation.goal.targets.dtype)
+    )
+    judge = Judge(TASK, simulation.goal, simulation.control_dt)
+    planner.reset()
+    for _ in range(250):
+        tell_course(planner, simulation.goal)
+        command = planner.act(simulation.observe())
+        simulation.goal = progressed(planner, simulation.goal)
+        simulation.step(command)
+        goals = np.asarray(judge.see(simulation.truth, None).done)
+        assert abs(int(simulation.goal.done[0]) - int(goals[0])) <= 1
+    assert goals[0] >= 4
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"settings": replace(SETTINGS, lost=0.4)},
+        {"task": replace(TASK, reach=0.1)},
+        {"robot": replace(ROBOT, body=replace(ROBOT.body, mass=1.01 * ROBOT.body.mass))},
+    ],
+    ids=lambda changed: next(iter(changed)),
+)
+def test_its_hash_changes_with_whatever_its_commands_depend_on(planner, changed):
+    told = {"robot": ROBOT, "task": TASK, "make_policy": policy, "settings": SETTINGS} | changed
+    assert Planner(**told).metadata()["sha256"] != planner.metadata()["sha256"]
+
+
+def test_it_says_whose_policy_it_begins_from(planner):
     assert planner.metadata()["policy_sha256"] == policy().metadata()["sha256"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import zipfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, wait
@@ -45,7 +46,7 @@ def runs_by_parts(
     jobs = min(trial.jobs, len(parts))
     with (
         one_thread_each(),
-        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts,))) as pool,
+        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts, os.getpid()))) as pool,
     ):
         futures = [pool.submit(_run, trial, *part, number, keep) for number, part in enumerate(parts)]
         for future in futures:

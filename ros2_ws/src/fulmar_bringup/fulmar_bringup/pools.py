@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 from fulmar_bringup.environment import environment
+from fulmar_core.orphans import end_with
 
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
@@ -35,15 +36,17 @@ def ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
 _counts: Any = None
 
 
-def begin_worker(counts: Any) -> None:
+def begin_worker(counts: Any, parent: int) -> None:
     """Begin a process of a pool.
 
     Args:
         counts: Shared numbers, one for each piece of work; see `counted`.
+        parent: Process whose pool it is; without it we end, as nobody would take what we do.
     """
     global _counts
     _counts = counts
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends its children
+    end_with(parent, signal.SIGTERM)
 
 
 def counted(index: int) -> Callable[[int], None]:

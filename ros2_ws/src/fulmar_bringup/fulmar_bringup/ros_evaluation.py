@@ -33,11 +33,12 @@ from fulmar_core.episode import Episode, draw_episode, episode_steps
 from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.goal import Goal
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
+from fulmar_core.orphans import end_with
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
-from fulmar_ros.runtime import SWITCH_INTERVAL_S, end_with_parent, settle_memory, spinning
+from fulmar_ros.runtime import SWITCH_INTERVAL_S, settle_memory, spinning
 from sim_nodes.sim_node import make_backend
 
 Progress = Callable[[int], None]
@@ -150,8 +151,7 @@ def _begin_worker(counts: list[Any], parent: int) -> None:
     _counts[:] = counts
     for number in STOPS:
         signal.signal(number, _on_stop)
-    os.environ["FULMAR_PARENT_PID"] = str(parent)
-    end_with_parent()
+    end_with(parent, signal.SIGINT)
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)
     except SystemExit:  # told to stop before it began; the pool would print where

@@ -7,7 +7,6 @@ thread is free for signals and for a control loop's last words.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import gc
 import os
 import queue
@@ -27,6 +26,7 @@ from rclpy.task import Future
 
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
+from fulmar_core.orphans import end_with
 from fulmar_ros.middleware import set_up_middleware
 
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
@@ -90,12 +90,8 @@ def end_with_parent() -> None:
     Only for children that were told their launcher's id; a node that a person started outlives the shell as usual.
     """
     parent = os.environ.get("FULMAR_PARENT_PID", "")
-    if not parent.isdecimal() or not sys.platform.startswith("linux"):
-        return
-    pr_set_pdeathsig = 1  # prctl(2)
-    ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGINT)
-    if os.getppid() != int(parent):  # it died before we asked
-        os.kill(os.getpid(), signal.SIGINT)
+    if parent.isdecimal():
+        end_with(int(parent), signal.SIGINT)
 
 
 def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field, replace
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -156,7 +157,7 @@ def units_of(
 
 
 def code_hash(way: str) -> str:
-    """Hash of the code and the configuration that outcomes of one way depend on."""
+    """Hash of the code, the configuration and the libraries that outcomes of one way depend on."""
     packages = (fulmar_core, policy_server, *((sim_nodes,) if way != "batch" else ()))
     files = [
         path for package in packages for path in sorted(Path(str(package.__file__)).parent.rglob("*.py"))
@@ -166,7 +167,15 @@ def code_hash(way: str) -> str:
         for family in ("robots", "tasks", "scenarios", "controllers", "goals")
         for path in config_files(family).values()
     )
-    return hash_of(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))
+    installed = [_version(name) for name in ("numpy", "onnxruntime", "casadi", "mujoco")]
+    return hash_of(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files), *installed)
+
+
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return ""
 
 
 def hash_of(*parts: str) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.pairs import BUNDLED, Pair, find_pair, units_of
 from fulmar_bringup.benchmark.results import FORMAT, pair_entry
-from fulmar_bringup.benchmark.unit import Unit
+from fulmar_bringup.benchmark.unit import Unit, done_already
 from fulmar_bringup.benchmark.work import Outcome, do_all
 from fulmar_ros.provenance import fulmar_version, git_revision
 
@@ -80,13 +80,11 @@ def run_benchmark(
         for pair in pairs
         if not pair.missing
     }
-    outcomes: dict[Unit, Outcome] = {}
-    for unit in (unit for of_pair in units.values() for unit in of_pair):
-        before = None if request.fresh else unit.done_before()
-        if before is not None:
-            outcomes[unit] = before
-            on_done(unit, before, True)
-    left = [unit for of_pair in units.values() for unit in of_pair if unit not in outcomes]
+    every = [unit for of_pair in units.values() for unit in of_pair]
+    outcomes: dict[Unit, Outcome] = {**done_already(every, fresh=request.fresh)}
+    for unit, before in outcomes.items():
+        on_done(unit, before, True)
+    left = [unit for unit in every if unit not in outcomes]
     total = sum(unit.cost for unit in left)
     outcomes |= do_all(
         left,

@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 import time
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +31,7 @@ COMPARED = 256  # episodes of that second run
 FEW_AT_ONCE = 8  # the same for controllers that take few episodes at once, of one such batch
 # How long one step takes, in steps of a batch; for the progress bar.
 STEP_COSTS = {"batch": 1.0, "mujoco": 120.0, "ros": 600.0}
+_KEY_DIGITS = 16  # of a key, in the name of a folder
 PLANNED_COST = 3000.0  # of a step of a controller that takes seconds for an episode, whatever moves
 
 
@@ -80,6 +82,16 @@ class Unit:
         return self.folder / f"{self.name}.npz"
 
     @property
+    def parts(self) -> Path:
+        """Folder of what is done of it so far, by controllers that take long."""
+        return self.folder / f"{self.name}_{self.key[:_KEY_DIGITS]}"
+
+    def forget_parts(self) -> None:
+        """Remove what was done of it by halves, also by code and configuration that are no more."""
+        for folder in self.folder.glob(f"{self.name}_{'[0-9a-f]' * _KEY_DIGITS}"):
+            shutil.rmtree(folder, ignore_errors=True)
+
+    @property
     def cost(self) -> float:
         """How long it takes, in steps of a batch."""
         steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
@@ -92,6 +104,25 @@ class Unit:
         except (OSError, ValueError, KeyError):
             return None
         return judged if judged.about.get("key") == self.key else None
+
+
+def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, Judged]:
+    """What is known of some units from earlier runs.
+
+    Args:
+        units: What is to be done.
+        fresh: Do all of it again: nothing is known, and what was done by halves is forgotten.
+
+    Returns:
+        Their outcomes.
+    """
+    known = {}
+    for unit in units:
+        if fresh:
+            unit.forget_parts()
+        elif (before := unit.done_before()) is not None:
+            known[unit] = before
+    return known
 
 
 def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None) -> Judged:
@@ -111,8 +142,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
     steps = episode_steps(short, _control_dt(trial))
     tally, errors, kept, extra = Tally(short), [], _Kept(), unit.extra()
     goals: list[np.ndarray] = []
-    parts = unit.folder / f"{unit.name}_{unit.key[:16]}"
-    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool, keep=parts):
+    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool, keep=unit.parts):
         beginning = first_steps(run, steps)
         tally.add(beginning)
         errors.append(_main_column(run, short))
@@ -141,7 +171,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         more=extra.arrays(),
     )
     outcome.save(unit.path)
-    shutil.rmtree(parts, ignore_errors=True)
+    unit.forget_parts()
     return outcome
 
 

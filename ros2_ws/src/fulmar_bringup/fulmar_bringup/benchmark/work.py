@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -81,7 +82,7 @@ def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], 
     counts = spawn.Array("q", len(units), lock=False)
     with (
         one_thread_each(),
-        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts,))) as pool,
+        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts, os.getpid()))) as pool,
     ):
         futures: dict[Future[Outcome], Unit] = {
             pool.submit(_work, unit, index): unit for index, unit in enumerate(units)

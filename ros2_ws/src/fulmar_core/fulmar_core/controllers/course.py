@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.goal import Goal
 
+_AT_ONCE = 2  # targets that may be passed in one control step; who says more has lost count
+
 
 @runtime_checkable
 class Farsighted(Protocol):
@@ -55,6 +57,9 @@ def tell_course(controller: Controller, goal: Goal) -> None:
 def progressed(controller: Controller, goal: Goal) -> Goal:
     """The goal as far as a controller knows to have come, which is never less than is known already.
 
+    It is asked at each step. Many targets at once are not believed: on a course that passes the same places again, who
+    has just begun cannot tell the rounds apart.
+
     Args:
         controller: Any.
         goal: What it was told last, after `act`.
@@ -66,7 +71,8 @@ def progressed(controller: Controller, goal: Goal) -> Goal:
     if coming is None:
         return goal
     done = np.asarray(goal.done)
-    return replace(goal, done=done + further(coming, done, places.shape[-2]).astype(done.dtype))
+    ahead = further(coming, done, places.shape[-2])
+    return replace(goal, done=done + np.where(ahead <= _AT_ONCE, ahead, 0).astype(done.dtype))
 
 
 def further(coming: ArrayLike, known: ArrayLike, count: int) -> np.ndarray:

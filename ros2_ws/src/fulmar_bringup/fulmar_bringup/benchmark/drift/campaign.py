@@ -23,7 +23,7 @@ from fulmar_bringup.benchmark.drift.physics import physics_of
 from fulmar_bringup.benchmark.drift.unit import DriftUnit
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.pairs import Pair, code_hash, hash_of, with_law, with_policy
-from fulmar_bringup.benchmark.unit import Unit
+from fulmar_bringup.benchmark.unit import Unit, done_already
 from fulmar_bringup.benchmark.work import Outcome, do_all
 from fulmar_bringup.evaluation import Trial
 from fulmar_bringup.node_table import RunPlan
@@ -86,12 +86,9 @@ def run_drift(
         for controller in request.controllers
         if not pairs[_task_of_row(row), controller].missing
     }
-    outcomes: dict[Unit, Outcome] = {}
-    for unit in units.values():
-        before = None if request.fresh else unit.done_before()
-        if before is not None:
-            outcomes[unit] = before
-            on_done(unit, before, True)
+    outcomes: dict[Unit, Outcome] = {**done_already(units.values(), fresh=request.fresh)}
+    for unit, before in outcomes.items():
+        on_done(unit, before, True)
     left: list[Unit] = [unit for unit in units.values() if unit not in outcomes]
     total = sum(unit.cost for unit in left)
     outcomes |= do_all(
