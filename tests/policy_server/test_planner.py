@@ -49,14 +49,15 @@ def drive(controller, simulation, steps=600, *, tell=True):
 
 
 class Planless:
-    """In place of the thread that plans: never ready, or ready with nothing; counts what is ordered."""
+    """In place of the thread that plans: never ready, or ready with nothing; keeps what is ordered and what it gave."""
 
     def __init__(self, *, ready):
-        self.ready, self.orders = ready, []
+        self.ready, self.orders, self.given = ready, [], []
 
     def begin(self, orders):
         self.orders.append(orders)
         plans = Future()
+        self.given.append(plans)
         if self.ready:
             plans.set_result([None] * len(orders))
         return plans
@@ -106,16 +107,10 @@ def test_without_plans_it_goes_on_as_its_policy_would(patient, monkeypatch):
 
 def test_what_nobody_waits_for_any_more_keeps_no_later_plan_waiting(monkeypatch):
     planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=False)
-    ordered = []
-
-    class Busy(Planless):
-        def begin(self, orders):
-            ordered.append(super().begin(orders))
-            return ordered[-1]
-
-    monkeypatch.setattr(planner, "_planning", Busy(ready=False))
+    busy = Planless(ready=False)
+    monkeypatch.setattr(planner, "_planning", busy)
     drive(planner, simulated(1), 60)
-    late, coming = ordered
+    late, coming = busy.given
     assert late.cancelled() and not coming.cancelled()
     planner.reset()
     assert coming.cancelled()
@@ -131,14 +126,8 @@ def carry_off(simulation, row, metres):
 @pytest.mark.parametrize("patient", [True, False])
 def test_a_lost_boat_leaves_no_plan_behind_but_one_that_others_wait_for(patient, monkeypatch):
     planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=patient)
-    ordered = []
-
-    class Busy(Planless):
-        def begin(self, orders):
-            ordered.append(super().begin(orders))
-            return ordered[-1]
-
-    monkeypatch.setattr(planner, "_planning", Busy(ready=False))
+    busy = Planless(ready=False)
+    monkeypatch.setattr(planner, "_planning", busy)
     monkeypatch.setattr("policy_server.planning.planner._PATIENCE_S", 0.0)
     simulation = simulated(2)
     drive(planner, simulation, 5)
@@ -146,7 +135,7 @@ def test_a_lost_boat_leaves_no_plan_behind_but_one_that_others_wait_for(patient,
         carry_off(simulation, row, 2.0)
         tell_course(planner, simulation.goal)
         planner.act(simulation.observe())
-        assert [number for number, plans in enumerate(ordered) if plans.cancelled()] == given_up
+        assert [number for number, plans in enumerate(busy.given) if plans.cancelled()] == given_up
 
 
 def test_in_real_time_no_step_waits_for_a_plan(monkeypatch):
