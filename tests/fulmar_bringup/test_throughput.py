@@ -133,6 +133,18 @@ def test_a_step_of_the_batch_observes_rewards_and_begins_new_episodes():
     assert pace._simulation._repeats.sum() > begun
 
 
+def test_torch_steps_the_same_worlds_as_numpy():
+    pytest.importorskip("torch")
+    numpy, torch = (
+        BatchPace(BOAT, TASK, RANDOMISED, worlds=50, library=library) for library in (NUMPY, Library("torch"))
+    )
+    for _ in range(5):
+        numpy._step()
+        torch._step()
+        np.testing.assert_allclose(torch.observation.numpy(), numpy.observation, atol=1e-4)
+        np.testing.assert_allclose(torch.reward.numpy(), numpy.reward, atol=1e-4)
+
+
 def test_shared_worlds_are_shared_out_and_give_one_pace():
     shared = SharedPace(2)
     try:

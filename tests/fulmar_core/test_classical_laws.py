@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -187,6 +188,14 @@ def test_a_heading_gain_that_would_not_be_stable_is_refused():
     gains = load_classical(ROBOTS["turtlebot2"], TASKS["go_to_pose"]).gains
     with pytest.raises(ValueError, match=r"must be greater than 0 \(§3\.6\.2\)"):
         replace(gains, heading=-5.0)
+
+
+def test_docs_tell_of_every_law_and_of_every_task_that_one_does():
+    text = (Path(__file__).parents[2] / "docs/controllers.md").read_text(encoding="utf-8")
+    entries = {**LAWS, **{law: entry for law, (_, entry) in OTHERS.items()}}
+    names = set(entries) | {entry.law.law for entry in entries.values()}
+    tasks = {task for entry in entries.values() for task in entry.tasks if task != "track_velocities"}
+    assert {name for name in names | tasks if f"`{name}`" not in text} == set()
 
 
 def test_every_file_of_gains_belongs_to_a_robot_and_its_law():

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.goal_files import FollowedPath, Poses, Positions, Velocities, load_goals
+from fulmar_core.goal_files import FollowedPath, HeldVelocity, Poses, Positions, Velocities, load_goals
 from fulmar_core.paths import config_names
 from fulmar_core.references import PATHS
 
@@ -48,6 +51,20 @@ def test_every_shipped_file_can_be_read_and_has_a_title(name):
         assert goals.planner().points.shape == (3600, 2)
     else:
         assert goals.targets().shape[1] == 3
+
+
+def test_every_kind_of_path_ships_in_a_file():
+    shipped = [load_goals(name) for name in config_names("goals")]
+    assert {goals.path.kind for goals in shipped if isinstance(goals, FollowedPath)} == set(PATHS)
+
+
+def test_docs_tell_of_every_kind_of_goal_and_path_and_of_all_their_entries():
+    text = (Path(__file__).parents[2] / "docs/goals.md").read_text(encoding="utf-8")
+    kinds = (Positions, Poses, HeldVelocity, FollowedPath, *PATHS.values())
+    entries = {field.name for kind in kinds for field in fields(kind)} - {"title"}
+    assert {
+        name for name in entries | set(PATHS) if f"`{name}`" not in text and f"{name}:" not in text
+    } == set()
 
 
 def test_the_lab_s_circle_is_that_of_drift():

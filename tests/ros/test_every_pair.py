@@ -1,9 +1,11 @@
-"""Every robot and every task over the wires: the nodes compute what a loop without ROS does."""
+"""Every robot, every task, and policies with memory over the wires: nodes compute what a loop without ROS does."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bringup.supervisor import Supervisor
 from fulmar_core.backend import Sample
+from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.observation import Observer
@@ -75,7 +78,9 @@ def ros(ros_domain: RosDomain) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def nodes(robot: Robot, task: Task) -> Iterator[tuple[PlantNode, ControllerNode, Supervisor]]:
+def nodes(
+    robot: Robot, task: Task, make: Callable[[Robot, Task], Controller]
+) -> Iterator[tuple[PlantNode, ControllerNode, Supervisor]]:
     """Plant and controller in lock step, and an operator."""
 
     def arguments(*more: str) -> list[str]:
@@ -91,19 +96,19 @@ def nodes(robot: Robot, task: Task) -> Iterator[tuple[PlantNode, ControllerNode,
     plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments("autostart:=false"))
     assert plant.trigger_configure() == TransitionCallbackReturn.SUCCESS
     controller = ControllerNode(
-        lambda *_: Wanderer(robot, task), lambda _code: None, cli_args=arguments("wait_for_subscribers:=1")
+        lambda *_: make(robot, task), lambda _code: None, cli_args=arguments("wait_for_subscribers:=1")
     )
     with spinning(operator, fail), spinning(plant, fail), spinning(controller, fail):
         yield plant, controller, overseer
 
 
-def check_pair(robot: Robot, task: Task) -> None:
+def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controller] = Wanderer) -> None:
     """Run the same two episodes with and without ROS; the second shows that nothing of the first is left."""
     scenario = load_scenario("nominal")
     dt = 1.0 / robot.timing.control_hz
     steps = round(LASTS_S.get(task.name, BRIEFLY_S) / dt)
     ways: list[list[tuple[float, ...]]] = [[], []]
-    with nodes(robot, task) as (plant, _, overseer):
+    with nodes(robot, task, make) as (plant, _, overseer):
         for number in range(2):
             episode = draw_episode(robot, task, scenario, seed=SEED, number=number)
             plant.clock.advance(dt)
@@ -116,7 +121,7 @@ def check_pair(robot: Robot, task: Task) -> None:
 
             plant.run_episode(episode, number=number, seed=SEED, steps=steps, on_step=on_step)
     alone = roll_out_in_backends(
-        Wanderer(robot, task),
+        make(robot, task),
         lambda: MujocoBackend.of(robot, task, scenario),
         task,
         scenario,
@@ -142,3 +147,21 @@ def test_every_robot_goes_the_same_way_over_the_wires_as_without_them(robot: str
 def test_every_task_comes_over_the_wires_as_it_does_without_them(task: str) -> None:
     """Poses, waypoints, gates, velocities that change, obstacles and the block; with wheels on `cmd_vel`."""
     check_pair(load_robot("turtlebot2"), load_task(task))
+
+
+def test_a_policy_with_memory_goes_the_same_way_over_the_wires_as_without_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("torch")
+    from policy_server.policy import Policy
+    from training.export import export
+    from training.settings import load_training_settings
+    from training.train import train
+
+    robot, task = load_robot("turtlebot2"), load_task("go_to_position")
+    told = load_training_settings(robot, task, "recurrent_ppo")
+    briefly = replace(told, algorithm=replace(told.algorithm, epochs=1, steps=16, minibatch=256), worlds=64)
+    monkeypatch.setattr("training.train.held_out_judge", lambda *_: lambda network: (0.5, 0.5))
+    train(robot, task, briefly, seed=1, out=tmp_path / "run", updates=2)
+    assert export(tmp_path / "run", tmp_path / "bundle").memory
+    check_pair(robot, task, lambda robot, task: Policy(tmp_path / "bundle", robot, task))
