@@ -35,6 +35,22 @@ def test_the_length_of_an_episode_is_seconds_or_control_steps():
     assert evaluate(f"{POSE} --episodes 1")["episode_s"] == 60.0
 
 
+@pytest.mark.parametrize(
+    ("asked", "episodes"),
+    [("lqr --through batch", 4096), ("lqr --through mujoco", 256), ("lqr --through batch --episodes 3", 3)],
+)
+def test_the_batch_is_judged_by_more_episodes_where_nobody_says_how_many(asked, episodes, monkeypatch):
+    class AskedError(Exception):
+        pass
+
+    def trial(plan, through, episodes, *more):
+        raise AskedError(episodes)
+
+    monkeypatch.setattr("fulmar_bringup.evaluation.Trial", trial)
+    with pytest.raises(AskedError, match=f"^{episodes}$"):
+        evaluate(f"evaluate floating_platform go_to_pose --controller {asked}")
+
+
 def test_waypoints_are_told_with_what_physics_allows(monkeypatch):
     monkeypatch.setattr("fulmar_bringup.evaluation.BOUNDED_EPISODES", 2)
     words = "evaluate turtlebot2 go_through_positions --controller classical --through batch --episodes 3"

@@ -27,6 +27,7 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.figures import FIGURES, meanings
 
 WAYS = ("batch", "mujoco", "ros")
+EPISODES, BATCH_EPISODES = 256, 4096
 EPILOG = f"""\b
 What the figures mean. Of all but the first: mean, median and 95th percentile over the episodes.
 {meanings()}
@@ -45,7 +46,14 @@ def evaluate(
             help="batch: the core's own dynamics. mujoco: an independent simulator. ros: the deployed nodes over DDS.",
         ),
     ] = "mujoco",
-    episodes: Annotated[int, typer.Option(metavar="N", min=1, help="Number of episodes.")] = 256,
+    episodes: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="Number of episodes; 4,096 in the batch, 256 elsewhere and for a planner.",
+        ),
+    ] = None,
     seed: SeedOption = JUDGE_SEED,
     scenario: ScenarioOption = "nominal",
     calibration: CalibrationOption = None,
@@ -88,12 +96,12 @@ def evaluate(
 
     fulmar evaluate floating_platform go_to_pose --controller lqr --through ros
 
-    fulmar evaluate turtlebot2 go_through_positions --through batch --episodes 4096 --steps 1000
+    fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
     """
     from fulmar_bringup.evaluation import BOUNDED_EPISODES, Trial, evaluate_trial
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import checked_rate, chosen_policy
-    from fulmar_bringup.system import check_names, modules_of
+    from fulmar_bringup.system import CONTROLLERS, check_names, modules_of
     from fulmar_core.calibration import use_calibration
     from fulmar_core.disturbances.scenario import check_delays, load_scenario
     from fulmar_core.robot import load_robot
@@ -132,6 +140,9 @@ def evaluate(
         seed=seed,
         duration_s=duration_s,
         lockstep=True,
+    )
+    episodes = episodes or (
+        BATCH_EPISODES if through == "batch" and not CONTROLLERS[controller].together else EPISODES
     )
     trial = Trial(plan, through, episodes, worlds or WORLDS, jobs or _cores(), bounds or BOUNDED_EPISODES)
     began = time.monotonic()
