@@ -175,3 +175,15 @@ def test_ways_are_seen_whole_unless_they_lead_far_away(findings, picture):
         whole = np.all((ways > (left, low)) & (ways < (right, high)))
         assert whole == (ways.max() < 30.0)
         assert right - left < 25.0
+
+
+@pytest.mark.parametrize("low", [0.2, 0.5, 0.81, 0.9])
+def test_the_overview_marks_its_scale_where_its_numbers_say(findings, low):
+    from fulmar_bringup.benchmark.report.headline_picture import draw_headline
+
+    entries = [entry | {"judged": {"batch": low}} for entry in findings.document["pairs"][:1]]
+    figure = draw_headline(findings.document | {"pairs": entries})
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    for at, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):
+        assert float(label.get_text().removesuffix(" %")) == pytest.approx(100.0 * at)

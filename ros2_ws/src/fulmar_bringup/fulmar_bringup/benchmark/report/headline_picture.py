@@ -7,6 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from fulmar_bringup.benchmark.cells import head, spoken
 from fulmar_bringup.benchmark.report.view import ROBOT_COLOURS, WIDTH
@@ -53,6 +54,7 @@ def draw_headline(document: dict[str, Any]) -> Figure:
     low = _lowest(document)
     axes.set_xlim(low, 1.012)
     axes.set_yticks(ticks, labels)
+    axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))  # at whole percents, as they are told
     axes.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
     quiet_grid(axes)
     axes.grid(False, axis="y")
