@@ -104,6 +104,17 @@ def with_planner(robot: str, task: str, folder: Path) -> Pair:
     return replace(pair, kind="planner", controller="planner", sha256=str(planner.metadata()["sha256"]))
 
 
+def has_planner(robot: str, task: str) -> bool:
+    """Whether there are plans for a robot at a task."""
+    from policy_server.planning.loading import check_planner
+
+    try:
+        check_planner(load_robot(robot), load_task(task))
+    except ConfigError:
+        return False
+    return True
+
+
 def with_law(robot: str, task: str, name: str) -> Pair:
     """A pair that a controller without a bundle drives, or why it cannot.
 
