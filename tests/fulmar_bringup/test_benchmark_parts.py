@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_bringup.benchmark import bound_file, work
+from fulmar_bringup.benchmark import bound_file, pairs, work
 from fulmar_bringup.benchmark import unit as units
 from fulmar_bringup.benchmark.judged import QUANTILES, Judged
 from fulmar_bringup.benchmark.pairs import code_hash, find_pair, units_of
@@ -186,6 +186,13 @@ def test_a_bound_is_computed_once_and_kept(tmp_path, monkeypatch):
 def test_the_hash_of_the_code_knows_the_simulator_only_where_it_is_used():
     assert code_hash("batch") == code_hash("batch")
     assert code_hash("batch") != code_hash("mujoco")
+
+
+@pytest.mark.parametrize("library", ["numpy", "onnxruntime", "casadi", "mujoco"])
+def test_the_hash_of_the_code_knows_which_libraries_computed(library, monkeypatch):
+    before, version = code_hash("mujoco"), pairs.version
+    monkeypatch.setattr(pairs, "version", lambda name: "another" if name == library else version(name))
+    assert code_hash("mujoco") != before
 
 
 def test_a_pair_without_anybody_says_why(tmp_path):

@@ -169,6 +169,16 @@ def test_a_boat_that_is_carried_off_begins_anew_from_where_it_is(planner, monkey
     assert second.reach == pytest.approx(nearer_to_the_middle)
 
 
+def test_a_boat_that_is_read_further_away_than_carried_is_believed_to_be_there(planner, monkeypatch):
+    monkeypatch.setattr(planner, "_planning", Planless(ready=True))
+    simulation, by = simulated(1, "ideal"), 0.5 * (SETTINGS.carried + SETTINGS.lost)
+    drive(planner, simulation, 10)
+    carry_off(simulation, 0, by)
+    tell_course(planner, simulation.goal)
+    planner.act(simulation.observe())
+    assert planner._estimator._states[0, 0] == pytest.approx(simulation.truth.x[0], abs=0.1 * by)
+
+
 def test_another_course_begins_anew_and_a_reset_forgets_it(planner, monkeypatch):
     nothing = Planless(ready=True)
     monkeypatch.setattr(planner, "_planning", nothing)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fulmar_bringup.ros_evaluation import RosPool
 
 WAYS = ("batch", "mujoco", "ros")
+EPISODES, BATCH_EPISODES = 256, 4096  # that are judged where nobody says how many; the second in the batch
 BOUNDED_EPISODES = 256  # whose bound `evaluate` computes by default: a boat's takes 40 ms each
 Progress = Callable[[int], None]
 

@@ -13,9 +13,11 @@ from fulmar_bringup.benchmark.pairs import BUNDLED, Pair, find_pair, units_of
 from fulmar_bringup.benchmark.results import FORMAT, pair_entry
 from fulmar_bringup.benchmark.unit import Unit, done_already
 from fulmar_bringup.benchmark.work import Outcome, do_all
+from fulmar_bringup.evaluation import BATCH_EPISODES
+from fulmar_bringup.evaluation import EPISODES as JUDGED
 from fulmar_ros.provenance import fulmar_version, git_revision
 
-EPISODES = {"batch": 4096, "mujoco": 256, "ros": 16}
+EPISODES = {"batch": BATCH_EPISODES, "mujoco": JUDGED, "ros": 16}
 
 
 @dataclass(frozen=True)

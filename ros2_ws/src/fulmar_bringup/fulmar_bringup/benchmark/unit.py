@@ -29,9 +29,9 @@ KEPT = 48  # episodes whose paths are kept
 FEW_WORLDS = 64  # of the second run in batch, which must give the same numbers
 COMPARED = 256  # episodes of that second run
 FEW_AT_ONCE = 8  # the same for controllers that take few episodes at once, of one such batch
+_KEY_DIGITS = 16  # of a key, in the name of a folder
 # How long one step takes, in steps of a batch; for the progress bar.
 STEP_COSTS = {"batch": 1.0, "mujoco": 120.0, "ros": 600.0}
-_KEY_DIGITS = 16  # of a key, in the name of a folder
 PLANNED_COST = 3000.0  # of a step of a controller that takes seconds for an episode, whatever moves
 
 

@@ -26,8 +26,6 @@ from fulmar_core.episode import JUDGE_SEED, episode_steps
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.figures import FIGURES, meanings
 
-WAYS = ("batch", "mujoco", "ros")
-EPISODES, BATCH_EPISODES = 256, 4096
 EPILOG = f"""\b
 What the figures mean. Of all but the first: mean, median and 95th percentile over the episodes.
 {meanings()}
@@ -98,7 +96,14 @@ def evaluate(
 
     fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
     """
-    from fulmar_bringup.evaluation import BOUNDED_EPISODES, Trial, evaluate_trial
+    from fulmar_bringup.evaluation import (
+        BATCH_EPISODES,
+        BOUNDED_EPISODES,
+        EPISODES,
+        WAYS,
+        Trial,
+        evaluate_trial,
+    )
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import checked_rate, chosen_policy
     from fulmar_bringup.system import CONTROLLERS, check_names, modules_of
