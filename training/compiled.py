@@ -1,4 +1,4 @@
-"""A step of many worlds as one compiled kernel: the core's own functions, traced and compiled by torch.
+"""A batch in NumPy that steps by a compiled kernel.
 
 What a step computes is defined once, in the core. NumPy carries it out array by array; here torch writes one loop over
 the worlds, which a C++ compiler makes machine code of. Both draw the same random numbers, and differ by rounding.
@@ -6,39 +6,24 @@ the worlds, which a C++ compiler makes machine code of. Both draw the same rando
 
 from __future__ import annotations
 
-import os
-import shutil
-import warnings
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 
-from fulmar_core.disturbances.world import World
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal import Goal
 from fulmar_core.learning_step import observed_step
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
+from training.kernel import ASKED, EFFORT, TOLD, Kernel, check_compiler, kernel_of
+from training.leaves import leaves, moving_of, parts_of, rebuilt
 
-Moving = dict[str, Any]  # as of `Moves.moving`
 ObservedStep = Callable[..., tuple[Array, Array, Array]]  # `observed_step` of one batch
-
-_NO_COMPILER = (
-    "steps cannot be compiled here: that takes g++ (or what CXX names) and Python's headers. Install them (Debian: g++ "
-    "and python3-dev), or do without: 'compiled: false' in training settings, `--library numpy` of the benchmark."
-)
-
-
-def compiler_found() -> bool:
-    """Whether there is the C++ compiler that torch looks for."""
-    return shutil.which(os.environ.get("CXX", "g++")) is not None
+Form = tuple[Any, ...]  # type, shape and strides of each leaf of a part
 
 
 def step_of(batch: BatchSimulation, *, compiled: bool) -> ObservedStep:
@@ -46,31 +31,45 @@ def step_of(batch: BatchSimulation, *, compiled: bool) -> ObservedStep:
     return CompiledStep(batch) if compiled else partial(observed_step, batch)
 
 
+@dataclass(slots=True)
+class _Seen:
+    """A part of what a step is given, and the memory of its leaves as NumPy and as torch see it."""
+
+    part: Any
+    arrays: tuple[Any, ...]
+    tensors: tuple[torch.Tensor, ...]
+    form: Form
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """A kernel, and what it was made for."""
+
+    robot: Robot
+    task: Task
+    forms: dict[str, Form]
+    kernel: Kernel
+
+
 class CompiledStep:
     """`observed_step` of one batch that lives in NumPy.
 
-    What torch sees is a twin of the batch, whose tensors are the batch's own memory. Episodes begin in NumPy, where a
-    few worlds at a time cost least.
+    Kernels work on the batch's own memory. Episodes begin in NumPy, where a few worlds at a time cost least.
     """
 
     def __init__(self, batch: BatchSimulation) -> None:
-        """Prepare; what is not compiled yet is compiled at the first step, which takes 10 to 30 s.
+        """Prepare; what is not compiled yet is compiled at the first step, which takes 5 to 20 s.
 
         Raises:
             ConfigError: There is no compiler.
         """
-        if not compiler_found():
-            raise ConfigError(_NO_COMPILER)
+        check_compiler()
         self._batch = batch
-        self._twin = BatchSimulation(
-            batch.robot, batch.task, batch.scenario, worlds=batch.worlds, seed=batch.seed, xp=torch
+        self._seen: dict[str, _Seen] = {}  # every part, as it was when last looked at
+        self._made: list[_Made] = []
+        self._last: tuple[Robot, Task, Kernel] | None = (
+            None  # asked for last, while all forms stay as they are
         )
-        self._twin.step(torch.from_numpy(np.array(batch.command)))  # fills caches, which cannot be traced
-        self._compiled = torch.compile(observed_step, fullgraph=True, dynamic=False)
-        self._asked: Robot | None = None  # as it was passed last,
-        self._judge = batch.robot  # and as torch sees that one
-        self._arrays: Moving = {}  # of the batch, and of the twin, when both were last the same
-        self._tensors: Moving = {}
 
     def __call__(
         self, command: np.ndarray, *, robot: Robot, task: Task
@@ -80,61 +79,83 @@ class CompiledStep:
         Raises:
             ConfigError: The compiler fails.
         """
-        batch, twin = self._batch, self._twin
-        arrays = batch.moving()
-        given = _renewed(arrays, self._arrays, self._tensors, _tensor)
-        twin.take(given)
-        with torch.no_grad(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            try:
-                told = self._compiled(twin, _tensor(command), robot=self._judging(robot), task=task)
-            except RuntimeError as error:
-                from torch._dynamo.exc import BackendCompilerFailed  # 1.5 s, which nobody else shall wait for
+        moving = parts_of(self._batch.moving())
+        seen = self._look({ASKED: command, EFFORT: robot.costs.effort} | moving)
+        kernel = self._kernel(robot, task)
+        tensors = [tensor for one in seen.values() for tensor in one.tensors]
+        arrays = [array for one in seen.values() for array in one.arrays]
+        returned = kernel.run(*tensors)
+        told = len(tensors)
+        tensors += returned
+        arrays += [_array(tensor) for tensor in returned]
+        for name, places in kernel.replaced.items():
+            one = seen[name]
+            one.tensors = tuple([tensors[place] for place in places])
+            one.arrays = tuple([arrays[place] for place in places])
+            one.part = moving[name] = rebuilt(one.part, iter(one.arrays))
+        self._batch.take(moving_of(moving | kernel.numbers))
+        reward, over, observed = arrays[told : told + TOLD]
+        return reward, over, observed
 
-                if not isinstance(error, BackendCompilerFailed):
-                    raise
-                raise ConfigError(f"{_NO_COMPILER} torch says: {str(error).splitlines()[0]}") from None
-        self._tensors = twin.moving()
-        self._arrays = _renewed(self._tensors, given, arrays, _array)
-        batch.take(self._arrays)
-        reward, over, seen = (_array(part) for part in told)
-        return reward, over, seen
+    def _look(self, parts: dict[str, Any]) -> dict[str, _Seen]:
+        """All parts; what is the same object as before was seen before."""
+        seen = self._seen
+        for name, part in parts.items():
+            if name not in seen or part is not seen[name].part:
+                arrays = leaves(part)
+                tensors = tuple([_tensor(array) for array in arrays])
+                form = tuple([(tensor.dtype, tensor.shape, tensor.stride()) for tensor in tensors])
+                if name not in seen or form != seen[name].form:
+                    self._last = None
+                seen[name] = _Seen(part, arrays, tensors, form)
+        return seen
 
-    def _judging(self, robot: Robot) -> Robot:
-        """The robot with a cost that may change without being compiled anew, as a number in the kernel would be."""
-        if robot is not self._asked:
-            self._asked, costs = robot, replace(robot.costs, effort=torch.tensor(robot.costs.effort))
-            self._judge = replace(robot, costs=costs)
-        return self._judge
+    def _kernel(self, robot: Robot, task: Task) -> Kernel:
+        """What moves parts of these forms, and judges so."""
+        if self._last is None or robot is not self._last[0] or task is not self._last[1]:
+            self._last = robot, task, self._found(robot, task) or self._compiled(robot, task)
+        return self._last[2]
+
+    def _found(self, robot: Robot, task: Task) -> Kernel | None:
+        """A kernel that was made before."""
+        forms = self._forms()
+        for made in self._made:
+            if task is made.task and forms == made.forms and _alike_but_for_effort(robot, made.robot):
+                return made.kernel
+        return None
+
+    def _compiled(self, robot: Robot, task: Task) -> Kernel:
+        batch = self._batch
+        twin = BatchSimulation(
+            batch.robot,
+            batch.task,
+            batch.scenario,
+            worlds=batch.worlds,
+            seed=batch.seed,
+            control_hz=1.0 / batch.control_dt,
+            xp=torch,
+        )
+        twin.step(_tensor(np.array(batch.command)))  # fills what it keeps for later steps
+        parts = {name: rebuilt(one.part, iter(one.tensors)) for name, one in self._seen.items()}
+        kernel = kernel_of(twin, parts, robot=robot, task=task)
+        self._made.append(_Made(robot, task, self._forms(), kernel))
+        return kernel
+
+    def _forms(self) -> dict[str, Form]:
+        return {name: one.form for name, one in self._seen.items()}
 
 
-def _renewed(now: Moving, before: Moving, converted: Moving, convert: Callable[[Any], Any]) -> Moving:
-    """What moves now, converted; what is the same object as before was converted before."""
-    renewed: Moving = {}
-    for name, value in now.items():
-        if isinstance(value, dict):
-            renewed[name] = _renewed(value, before.get(name, {}), converted.get(name, {}), convert)
-        elif name in before and value is before[name]:
-            renewed[name] = converted[name]
-        else:
-            renewed[name] = _converted(value, convert)
-    return renewed
+def _alike_but_for_effort(robot: Robot, other: Robot) -> bool:
+    """Whether two robots are made of the same parts; what effort costs is given to kernels as a number."""
+    same = all(getattr(robot, f.name) is getattr(other, f.name) for f in fields(Robot) if f.name != "costs")
+    return same and replace(robot.costs, effort=other.costs.effort) == other.costs
 
 
-def _converted(value: Any, convert: Callable[[Any], Any]) -> Any:
-    """The same with every array converted."""
-    if isinstance(value, (np.ndarray, torch.Tensor)):
-        return convert(value)
-    if isinstance(value, (tuple, list)):
-        return type(value)(_converted(part, convert) for part in value)
-    if isinstance(value, (PlanarState, Goal, World)):
-        return type(value)(*(convert(getattr(value, field.name)) for field in fields(value) if field.init))
-    return value
-
-
-def _tensor(array: np.ndarray) -> torch.Tensor:
-    """The same memory; torch computes with words of 32 bits only where they have a sign."""
-    return torch.from_numpy(array.view(np.int32) if array.dtype == np.uint32 else array)
+def _tensor(leaf: np.ndarray | float) -> torch.Tensor:
+    """The same memory, or a number; torch computes with words of 32 bits only where they have a sign."""
+    if isinstance(leaf, (int, float)):
+        return torch.tensor(leaf)
+    return torch.from_numpy(leaf.view(np.int32) if leaf.dtype == np.uint32 else leaf)
 
 
 def _array(tensor: torch.Tensor) -> np.ndarray:

@@ -114,7 +114,7 @@ def test_whoever_asks_for_compiled_steps_is_told_that_a_compiler_is_missing(comm
 @pytest.mark.slow
 def test_steps_are_compiled_where_nobody_says_otherwise(command):
     pytest.importorskip("torch")
-    from training.compiled import compiler_found
+    from training.kernel import compiler_found
 
     if not compiler_found():
         pytest.skip("there is no C++ compiler; that NumPy takes over then is tested above")

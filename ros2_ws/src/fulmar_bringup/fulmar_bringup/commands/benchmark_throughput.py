@@ -106,7 +106,7 @@ def _fastest(device: str) -> str:
     if device != "cpu":
         return "torch"
     if find_spec("torch") is not None:
-        from training.compiled import compiler_found
+        from training.kernel import compiler_found
 
         if compiler_found():
             return "compiled"

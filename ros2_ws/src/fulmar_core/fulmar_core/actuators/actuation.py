@@ -40,8 +40,8 @@ class ActuationState(Moves):
         self._before, self._wanted, self.applied = safe, safe, safe
         self.gain = array_namespace(safe).ones_like(safe)
         self._since_s = 0.0
-        self._late: Array | None = None
-        self._open_late: Array | None = None  # until closed valves are open
+        self._late = array_namespace(safe).zeros_like(safe[0])  # until the command acts, in every world [s]
+        self._open_late = self._late  # until closed valves are open [s]
         self._slew: Array | None = None
         if response.slew:
             xp = array_namespace(safe)
@@ -102,7 +102,6 @@ class ActuationState(Moves):
         xp = array_namespace(target)
         now_s = self._since_s + 0.5 * dt
         if now_s < latest_s:
-            assert self._late is not None and self._open_late is not None
             if self._opens_late:
                 target = xp.where(now_s < self._open_late, xp.minimum(self._before, target), target)
             target = xp.where(now_s < self._late, self._before, target)

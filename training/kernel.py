@@ -1,0 +1,153 @@
+"""A step of worlds as machine code: the core's own functions, traced by torch, written as one loop, and compiled."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch.fx.experimental.proxy_tensor import make_fx
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.learning_step import observed_step
+from fulmar_core.robot import Robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import Task
+from training.leaves import Parts, leaves, moving_of, parts_of, rebuilt
+
+ASKED, EFFORT = (
+    "asked",
+    "effort",
+)  # parts beside those that move: the command, and what the actuators' effort costs
+TOLD = 3  # reward, over, seen: what `observed_step` returns
+
+_NO_COMPILER = (
+    "steps cannot be compiled here: that takes g++ (or what CXX names) and Python's headers. Install them (Debian: g++ "
+    "and python3-dev), or do without: 'compiled: false' in training settings, `--library numpy` of the benchmark."
+)
+
+
+def compiler_found() -> bool:
+    """Whether there is the C++ compiler that torch looks for."""
+    return shutil.which(os.environ.get("CXX", "g++")) is not None
+
+
+def check_compiler() -> None:
+    """Refuse to go on without one.
+
+    Raises:
+        ConfigError: There is no compiler.
+    """
+    if not compiler_found():
+        raise ConfigError(_NO_COMPILER)
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A step as a function of tensors alone: it changes nothing, and knows nothing but what it is given."""
+
+    run: Callable[
+        ..., Sequence[torch.Tensor]
+    ]  # of the leaves of all parts; returns what was told, then new leaves
+    # Parts that a step replaces, by the places of their leaves among those that were given, and then those returned.
+    replaced: dict[str, tuple[int, ...]]
+    numbers: dict[str, float]  # parts that are the same number after every step
+
+
+def kernel_of(twin: BatchSimulation, parts: Parts, *, robot: Robot, task: Task) -> Kernel:
+    """Compile a step of worlds; torch keeps what it compiled on disk and finds it again by what it computes.
+
+    Args:
+        twin: Such worlds of torch's. They have stepped before, so that what they keep for later steps is there; what
+            moves of them is of no use afterwards.
+        parts: What a step is given: ASKED, EFFORT and all that moves, as tensors of the shapes, types and strides that
+            the kernel is for.
+        robot: As of `observed_step`, but for what effort costs.
+        task: As of `observed_step`.
+
+    Raises:
+        ConfigError: The compiler fails.
+    """
+    given = [leaf for part in parts.values() for leaf in leaves(part)]
+    trace = _Trace(twin, parts, robot, task)
+    with torch.no_grad(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        graph = make_fx(trace, tracing_mode="fake", _allow_non_fake_inputs=True)(*given)
+        run = _compiled(graph, given)
+    return Kernel(run, trace.replaced, trace.numbers)
+
+
+def _compiled(
+    graph: torch.fx.GraphModule, given: list[torch.Tensor]
+) -> Callable[..., Sequence[torch.Tensor]]:
+    import torch._inductor as inductor  # 1 s, which nobody else shall wait for
+    from torch._inductor.exc import InductorError
+
+    try:
+        return inductor.standalone_compile(
+            graph, given, dynamic_shapes="from_example_inputs", donate_graph_module=True
+        )
+    except InductorError as error:
+        raise ConfigError(f"{_NO_COMPILER} torch says: {str(error).splitlines()[0]}") from None
+
+
+class _Trace:
+    """A step of leaves, which notes what becomes of each part."""
+
+    def __init__(self, twin: BatchSimulation, parts: Parts, robot: Robot, task: Task) -> None:
+        self._twin, self._parts, self._robot, self._task = twin, parts, robot, task
+        self.replaced: dict[str, tuple[int, ...]] = {}
+        self.numbers: dict[str, float] = {}
+
+    def __call__(self, *given: torch.Tensor) -> list[torch.Tensor]:
+        """What was told, and the new leaves."""
+        each = iter(given)
+        before = {name: rebuilt(part, each) for name, part in self._parts.items()}
+        twin, costs = self._twin, replace(self._robot.costs, effort=before[EFFORT])
+        twin.take(moving_of(before))
+        told = observed_step(twin, before[ASKED], robot=replace(self._robot, costs=costs), task=self._task)
+        places = _Places(given, told)
+        for name, part in parts_of(twin.moving()).items():
+            if isinstance(part, float):
+                self.numbers[name] = part
+            elif part is not before[name]:
+                self.replaced[name] = places.of(leaves(part), leaves(before[name]))
+        return places.returned
+
+
+class _Places:
+    """Where tensors stand among those that were given, and then those that are returned."""
+
+    def __init__(self, given: Sequence[torch.Tensor], told: Sequence[torch.Tensor]) -> None:
+        self.returned = list(told)
+        self._given = len(given)
+        self._known = list(zip(given, range(len(given)), strict=True))
+
+    def of(self, new: Sequence[torch.Tensor], old: Sequence[torch.Tensor]) -> tuple[int, ...]:
+        """Places of a part's leaves; those that are not known yet are returned as well."""
+        return tuple(self._place(tensor, like) for tensor, like in zip(new, old, strict=True))
+
+    def _place(self, tensor: torch.Tensor, like: torch.Tensor) -> int:
+        for known, place in self._known:
+            if known is tensor:
+                return place
+        place = self._given + len(self.returned)
+        self._known.append((tensor, place))
+        self.returned.append(_laid_as(tensor, like))
+        return place
+
+
+def _laid_as(tensor: torch.Tensor, like: torch.Tensor) -> torch.Tensor:
+    """The same numbers, side by side in memory as in another tensor, so that the next step takes the same kernel.
+
+    Raises:
+        TypeError: Shape or type differ; steps must keep both.
+    """
+    if (tensor.shape, tensor.dtype) != (like.shape, like.dtype):
+        raise TypeError(f"a step made {tensor.shape}, {tensor.dtype} of {like.shape}, {like.dtype}")
+    if tensor.stride() == like.stride():
+        return tensor
+    return torch.empty_strided(like.shape, like.stride(), dtype=like.dtype, device=like.device).copy_(tensor)
