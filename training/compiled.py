@@ -67,9 +67,7 @@ class CompiledStep:
         self._batch = batch
         self._seen: dict[str, _Seen] = {}  # every part, as it was when last looked at
         self._made: list[_Made] = []
-        self._last: tuple[Robot, Task, Kernel] | None = (
-            None  # asked for last, while all forms stay as they are
-        )
+        self._last: tuple[Robot, Task, Kernel] | None = None  # asked for last, while forms stay
 
     def __call__(
         self, command: np.ndarray, *, robot: Robot, task: Task

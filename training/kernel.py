@@ -18,10 +18,8 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
 from training.leaves import Parts, leaves, moving_of, parts_of, rebuilt
 
-ASKED, EFFORT = (
-    "asked",
-    "effort",
-)  # parts beside those that move: the command, and what the actuators' effort costs
+# Parts beside those that move: the command, and what the actuators' effort costs.
+ASKED, EFFORT = "asked", "effort"
 TOLD = 3  # reward, over, seen: what `observed_step` returns
 
 _NO_COMPILER = (
@@ -49,9 +47,8 @@ def check_compiler() -> None:
 class Kernel:
     """A step as a function of tensors alone: it changes nothing, and knows nothing but what it is given."""
 
-    run: Callable[
-        ..., Sequence[torch.Tensor]
-    ]  # of the leaves of all parts; returns what was told, then new leaves
+    # Of the leaves of all parts; returns what was told, then new leaves.
+    run: Callable[..., Sequence[torch.Tensor]]
     # Parts that a step replaces, by the places of their leaves among those that were given, and then those returned.
     replaced: dict[str, tuple[int, ...]]
     numbers: dict[str, float]  # parts that are the same number after every step
