@@ -7,7 +7,7 @@ the worlds, which a C++ compiler makes machine code of. Both draw the same rando
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,10 +15,8 @@ import numpy as np
 import torch
 
 from fulmar_core.learning_step import observed_step
-from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.tasks import Task
 from training.kernel import ASKED, EFFORT, TOLD, Kernel, check_compiler, kernel_of
 from training.leaves import leaves, moving_of, parts_of, rebuilt
 
@@ -41,16 +39,6 @@ class _Seen:
     form: Form
 
 
-@dataclass(frozen=True, slots=True)
-class _Made:
-    """A kernel, and what it was made for."""
-
-    robot: Robot
-    task: Task
-    forms: dict[str, Form]
-    kernel: Kernel
-
-
 class CompiledStep:
     """`observed_step` of one batch that lives in NumPy.
 
@@ -66,20 +54,18 @@ class CompiledStep:
         check_compiler()
         self._batch = batch
         self._seen: dict[str, _Seen] = {}  # every part, as it was when last looked at
-        self._made: list[_Made] = []
-        self._last: tuple[Robot, Task, Kernel] | None = None  # asked for last, while forms stay
+        self._kernels: dict[tuple[Form, ...], Kernel] = {}
+        self._last: Kernel | None = None  # while the forms of all parts stay
 
-    def __call__(
-        self, command: np.ndarray, *, robot: Robot, task: Task
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def __call__(self, command: np.ndarray, *, effort: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Move the batch one control step; arguments and results as of `observed_step`.
 
         Raises:
             ConfigError: The compiler fails.
         """
         moving = parts_of(self._batch.moving())
-        seen = self._look({ASKED: command, EFFORT: robot.costs.effort} | moving)
-        kernel = self._kernel(robot, task)
+        seen = self._look({ASKED: command, EFFORT: effort} | moving)
+        kernel = self._kernel()
         tensors = [tensor for one in seen.values() for tensor in one.tensors]
         arrays = [array for one in seen.values() for array in one.arrays]
         returned = kernel.run(*tensors)
@@ -108,21 +94,16 @@ class CompiledStep:
                 seen[name] = _Seen(part, arrays, tensors, form)
         return seen
 
-    def _kernel(self, robot: Robot, task: Task) -> Kernel:
-        """What moves parts of these forms, and judges so."""
-        if self._last is None or robot is not self._last[0] or task is not self._last[1]:
-            self._last = robot, task, self._found(robot, task) or self._compiled(robot, task)
-        return self._last[2]
+    def _kernel(self) -> Kernel:
+        """What moves parts of these forms."""
+        if self._last is None:
+            forms = tuple(one.form for one in self._seen.values())
+            if forms not in self._kernels:
+                self._kernels[forms] = self._compiled()
+            self._last = self._kernels[forms]
+        return self._last
 
-    def _found(self, robot: Robot, task: Task) -> Kernel | None:
-        """A kernel that was made before."""
-        forms = self._forms()
-        for made in self._made:
-            if task is made.task and forms == made.forms and _alike_but_for_effort(robot, made.robot):
-                return made.kernel
-        return None
-
-    def _compiled(self, robot: Robot, task: Task) -> Kernel:
+    def _compiled(self) -> Kernel:
         batch = self._batch
         twin = BatchSimulation(
             batch.robot,
@@ -134,19 +115,9 @@ class CompiledStep:
             xp=torch,
         )
         twin.step(_tensor(np.array(batch.command)))  # fills what it keeps for later steps
-        parts = {name: rebuilt(one.part, iter(one.tensors)) for name, one in self._seen.items()}
-        kernel = kernel_of(twin, parts, robot=robot, task=task)
-        self._made.append(_Made(robot, task, self._forms(), kernel))
-        return kernel
-
-    def _forms(self) -> dict[str, Form]:
-        return {name: one.form for name, one in self._seen.items()}
-
-
-def _alike_but_for_effort(robot: Robot, other: Robot) -> bool:
-    """Whether two robots are made of the same parts; what effort costs is given to kernels as a number."""
-    same = all(getattr(robot, f.name) is getattr(other, f.name) for f in fields(Robot) if f.name != "costs")
-    return same and replace(robot.costs, effort=other.costs.effort) == other.costs
+        return kernel_of(
+            twin, {name: rebuilt(one.part, iter(one.tensors)) for name, one in self._seen.items()}
+        )
 
 
 def _tensor(leaf: np.ndarray | float) -> torch.Tensor:

@@ -6,16 +6,14 @@ import os
 import shutil
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.learning_step import observed_step
-from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.tasks import Task
 from training.leaves import Parts, leaves, moving_of, parts_of, rebuilt
 
 # Parts beside those that move: the command, and what the actuators' effort costs.
@@ -54,7 +52,7 @@ class Kernel:
     numbers: dict[str, float]  # parts that are the same number after every step
 
 
-def kernel_of(twin: BatchSimulation, parts: Parts, *, robot: Robot, task: Task) -> Kernel:
+def kernel_of(twin: BatchSimulation, parts: Parts) -> Kernel:
     """Compile a step of worlds; torch keeps what it compiled on disk and finds it again by what it computes.
 
     Args:
@@ -62,15 +60,13 @@ def kernel_of(twin: BatchSimulation, parts: Parts, *, robot: Robot, task: Task) 
             moves of them is of no use afterwards.
         parts: What a step is given: ASKED, EFFORT and all that moves, as tensors of the shapes, types and strides that
             the kernel is for.
-        robot: As of `observed_step`, but for what effort costs.
-        task: As of `observed_step`.
 
     Raises:
         ConfigError: The compiler fails.
     """
     given = [leaf for part in parts.values() for leaf in leaves(part)]
-    trace = _Trace(twin, parts, robot, task)
-    with torch.no_grad(), warnings.catch_warnings():
+    trace = _Trace(twin, parts)
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         graph = make_fx(trace, tracing_mode="fake", _allow_non_fake_inputs=True)(*given)
         run = _compiled(graph, given)
@@ -84,9 +80,7 @@ def _compiled(
     from torch._inductor.exc import InductorError
 
     try:
-        return inductor.standalone_compile(
-            graph, given, dynamic_shapes="from_example_inputs", donate_graph_module=True
-        )
+        return inductor.standalone_compile(graph, given, dynamic_shapes="from_example_inputs")
     except InductorError as error:
         raise ConfigError(f"{_NO_COMPILER} torch says: {str(error).splitlines()[0]}") from None
 
@@ -94,8 +88,8 @@ def _compiled(
 class _Trace:
     """A step of leaves, which notes what becomes of each part."""
 
-    def __init__(self, twin: BatchSimulation, parts: Parts, robot: Robot, task: Task) -> None:
-        self._twin, self._parts, self._robot, self._task = twin, parts, robot, task
+    def __init__(self, twin: BatchSimulation, parts: Parts) -> None:
+        self._twin, self._parts = twin, parts
         self.replaced: dict[str, tuple[int, ...]] = {}
         self.numbers: dict[str, float] = {}
 
@@ -103,9 +97,9 @@ class _Trace:
         """What was told, and the new leaves."""
         each = iter(given)
         before = {name: rebuilt(part, each) for name, part in self._parts.items()}
-        twin, costs = self._twin, replace(self._robot.costs, effort=before[EFFORT])
+        twin = self._twin
         twin.take(moving_of(before))
-        told = observed_step(twin, before[ASKED], robot=replace(self._robot, costs=costs), task=self._task)
+        told = observed_step(twin, before[ASKED], effort=before[EFFORT])
         places = _Places(given, told)
         for name, part in parts_of(twin.moving()).items():
             if isinstance(part, float):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -89,7 +88,7 @@ class BatchVecEnv(VecEnv):
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
-        self._judged = robot  # with what its actuators cost now
+        self._effort = robot.costs.effort
         self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
         self.choice = WrenchChoice.of(robot, gas) if wrench else None
         self.mirror = Mirror.of(robot, task, mirror) if mirror else None
@@ -156,8 +155,7 @@ class BatchVecEnv(VecEnv):
 
     def set_effort(self, factor: float) -> None:
         """What using the actuators costs from now on, as a multiple of the robot's own costs [-]."""
-        costs = replace(self.robot.costs, effort=factor * self.robot.costs.effort)
-        self._judged = replace(self.robot, costs=costs)
+        self._effort = factor * self.robot.costs.effort
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed of the next `reset`."""
@@ -241,7 +239,7 @@ class BatchVecEnv(VecEnv):
         asked = self._actions
         if self.takes_orders:
             asked = shares_asked(asked, shares(self.simulation.command, self._scale))
-        told = self._observed_step(asked * self._scale, robot=self._judged, task=self.task)
+        told = self._observed_step(asked * self._scale, effort=self._effort)
         return tuple(np.asarray(part) for part in told)
 
     def _observed(self, worlds: np.ndarray) -> np.ndarray:

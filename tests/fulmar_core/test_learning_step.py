@@ -42,6 +42,7 @@ def judged(task, here, *, before=None, goal=None, ended=None, previous=STILL, co
         ended=goal if ended is None else ended,
         previous=previous,
         command=command,
+        effort=robot.costs.effort,
     )
     return float(reward[0]), bool(over[0])
 
@@ -100,8 +101,10 @@ def test_torch_judges_as_numpy_does(name):
         "before": before, "after": simulation.truth, "goal": goal, "ended": simulation.goal,
         "previous": previous, "command": simulation.command,
     }  # fmt: skip
-    ours = learning_step(BASE, task, **given)
-    theirs = learning_step(BASE, task, **{key: in_torch(value, torch) for key, value in given.items()})
+    ours = learning_step(BASE, task, effort=0.1, **given)
+    theirs = learning_step(
+        BASE, task, effort=0.1, **{key: in_torch(value, torch) for key, value in given.items()}
+    )
     np.testing.assert_allclose(theirs[0].numpy(), ours[0], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(theirs[1].numpy(), ours[1])
 

@@ -19,6 +19,7 @@ from fulmar_core.tasks import load_task
 from training import kernel
 from training.compiled import CompiledStep
 from training.kernel import compiler_found
+from training.leaves import leaves, parts_of
 from training.vec_env import BatchVecEnv
 
 pytestmark = pytest.mark.skipif(
@@ -40,8 +41,8 @@ def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None):
     for k in range(steps):
         command = rng.uniform(-1.0, 1.0, (WORLDS, len(robot.actuators.names))) * robot.actuators.scale
         command = command.astype(np.float32)
-        reward, over, seen = observed_step(plain, command, robot=robot, task=plain.task)
-        told = compiled(command, robot=robot, task=batch.task)
+        reward, over, seen = observed_step(plain, command, effort=robot.costs.effort)
+        told = compiled(command, effort=robot.costs.effort)
         np.testing.assert_array_equal(told[1], over)
         np.testing.assert_allclose(told[0], reward, atol=2e-4)
         np.testing.assert_allclose(told[2], seen, atol=2e-4)
@@ -51,6 +52,11 @@ def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None):
                 worlds.reset([1, 3, 5 + k % 4])
             np.testing.assert_allclose(batch.observe(), plain.observe(), atol=2e-4)
     assert np.ptp(reward) > 0.0
+    ours, theirs = (parts_of(worlds.moving()) for worlds in (batch, plain))
+    assert ours.keys() == theirs.keys()
+    for name in ours:
+        for our, their in zip(leaves(ours[name]), leaves(theirs[name]), strict=True):
+            np.testing.assert_allclose(our, their, atol=2e-3, err_msg=name)
 
 
 def test_compiled_worlds_move_as_in_numpy():
@@ -75,10 +81,21 @@ def traced(monkeypatch):
 def test_one_trace_moves_worlds_of_every_pair_as_in_numpy(robot, task, traced):
     assert_moves_as_in_numpy(load_robot(robot), load_task(task), steps=12)
     assert len(traced) == 1
+    (made,) = traced[0].graph.output_node().args
+    assert len(set(made)) == len(made)  # nothing is copied, neither what stays nor what two names have
+    assert all(node.op != "placeholder" for node in made)
 
 
 def test_worlds_at_another_rate_are_traced_at_that_rate(traced):
     assert_moves_as_in_numpy(ROBOT, TASK, steps=3, control_hz=0.5 * ROBOT.timing.control_hz)
+
+
+def test_commands_that_lie_otherwise_in_memory_have_a_kernel_of_their_own(traced):
+    batch = BatchSimulation(ROBOT, TASK, RANDOMISED, worlds=WORLDS, seed=5)
+    compiled, command = CompiledStep(batch), np.zeros((WORLDS, 2), dtype=np.float32)
+    for asked in (command, np.asfortranarray(command), command):
+        compiled(asked, effort=0.1)
+    assert len(traced) == 2
 
 
 def test_a_step_that_changes_the_shape_of_what_moves_is_refused(traced, monkeypatch):
@@ -87,7 +104,7 @@ def test_a_step_that_changes_the_shape_of_what_moves_is_refused(traced, monkeypa
         type(batch.task), "advance", lambda task, goal, truth, time_s: replace(goal, block=goal.block[:, :1])
     )
     with pytest.raises(TypeError, match="a step made"):
-        CompiledStep(batch)(batch.command, robot=ROBOT, task=batch.task)
+        CompiledStep(batch)(batch.command, effort=0.1)
 
 
 @pytest.mark.slow
@@ -174,7 +191,7 @@ from fulmar_core.errors import ConfigError
 from tests.training.test_compiled import RANDOMISED, ROBOT, TASK, BatchSimulation, CompiledStep
 batch = BatchSimulation(ROBOT, TASK, RANDOMISED, worlds=7, seed=5)
 try:
-    CompiledStep(batch)(np.zeros((7, 2), dtype=np.float32), robot=ROBOT, task=TASK)
+    CompiledStep(batch)(np.zeros((7, 2), dtype=np.float32), effort=0.1)
 except ConfigError as error:
     sys.exit(str(error))
 """
@@ -188,13 +205,6 @@ def test_a_compiler_that_fails_is_told_of(tmp_path):
         [sys.executable, "-c", STEP_ONCE], env=failing, capture_output=True, text=True, check=False
     )
     assert "python3-dev" in done.stderr.splitlines()[-1]
-
-
-@pytest.mark.slow
-def test_effort_is_the_only_cost_that_a_kernel_does_not_hold():
-    """A robot with other costs of its own is another robot: compiled anew, not judged by the old ones."""
-    dear = replace(ROBOT, costs=replace(ROBOT.costs, change=5.0))
-    assert_moves_as_in_numpy(dear, TASK, steps=3)
 
 
 @pytest.mark.slow

@@ -26,11 +26,12 @@ def learning_step(
     ended: Goal,
     previous: Array,
     command: Array,
+    effort: float,
 ) -> tuple[Array, Array]:
     """Judge one control step of some worlds.
 
     Args:
-        robot: Says what using its actuators costs, and how far off it may be.
+        robot: Says what changing its commands costs, and how far off it may be.
         task: Says what the step is worth.
         before: True state when the step began, shapes (worlds,).
         after: When it ended.
@@ -38,12 +39,13 @@ def learning_step(
         ended: The goal after it.
         previous: Command of the step before, shape (worlds, n).
         command: Of this step.
+        effort: What full command of one actuator costs, as `Costs.effort`.
 
     Returns:
         The reward, less what the actuators cost and what is in the way; and whether the episode is over before its
         time, because the robot left the geofence or touched something. Shapes (worlds,).
     """
-    reward = task.reward(before, after, goal) - _cost(robot, previous, command)
+    reward = task.reward(before, after, goal) - _cost(robot, effort, previous, command)
     if isinstance(task, PushBlock):
         reward = reward + task.block_reward(goal, ended)
     penalty = getattr(task, "penalty", None)  # tasks where nothing is in the way have none
@@ -59,15 +61,14 @@ def learning_step(
 
 
 def observed_step(
-    simulation: BatchSimulation, command: Array, *, robot: Robot, task: Task
+    simulation: BatchSimulation, command: Array, *, effort: float
 ) -> tuple[Array, Array, Array]:
     """Move a batch one control step, judge it, and look.
 
     Args:
         simulation: The worlds.
         command: In the actuators' units, shape (worlds, n).
-        robot: Says what using its actuators costs, and how far off it may be.
-        task: Says what the step is worth.
+        effort: What full command of one actuator costs; the robot's own is `Costs.effort`.
 
     Returns:
         Reward and whether episodes are over, as `learning_step`, and what controllers see now, shape (worlds, k).
@@ -75,27 +76,27 @@ def observed_step(
     before, goal, previous = simulation.truth, simulation.goal, simulation.command
     simulation.step(command)
     reward, over = learning_step(
-        robot,
-        task,
+        simulation.robot,
+        simulation.task,
         before=before,
         after=simulation.truth,
         goal=goal,
         ended=simulation.goal,
         previous=previous,
         command=simulation.command,
+        effort=effort,
     )
     return reward, over, simulation.observe()
 
 
-def _cost(robot: Robot, previous: Array, command: Array) -> Array:
+def _cost(robot: Robot, effort: float, previous: Array, command: Array) -> Array:
     """What using the actuators costs, shape (worlds,)."""
-    costs = robot.costs
     scale = robot.actuators.scale
     share = shares(command, scale)
-    cost = costs.effort * _sum(array_namespace(share).abs(share))
-    if costs.change:
+    cost = effort * _sum(array_namespace(share).abs(share))
+    if robot.costs.change:
         change = share - shares(previous, scale)
-        cost = cost + costs.change * _sum(change * change)
+        cost = cost + robot.costs.change * _sum(change * change)
     return cost
 
 

@@ -69,7 +69,7 @@ class Library:
         return np.flatnonzero(truths.cpu().numpy() if self.name == "torch" else truths)
 
     def step_of(self, simulation: BatchSimulation) -> Callable[..., tuple[Array, Array, Array]]:
-        """How a batch moves: `observed_step` of the command, the robot and the task."""
+        """How a batch moves: `observed_step` of the command and what effort costs."""
         if self.name != "compiled":
             return partial(observed_step, simulation)
         import torch
@@ -87,7 +87,7 @@ class BatchPace:
         self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, library: Library, first: int = 0
     ) -> None:
         """Build the worlds, numbered from `first` on; the first episodes end at random times."""
-        self._robot, self._task, self._library = robot, task, library
+        self._effort, self._library = robot.costs.effort, library
         self._simulation = BatchSimulation(
             robot,
             task,
@@ -119,9 +119,7 @@ class BatchPace:
         simulation = self._simulation
         command = self._commands[self._at]
         self._at = (self._at + 1) % DIFFERENT
-        self.reward, ended_early, self.observation = self._observed_step(
-            command, robot=self._robot, task=self._task
-        )
+        self.reward, ended_early, self.observation = self._observed_step(command, effort=self._effort)
         self._age += 1
         ended = self._age >= self._horizon
         ended[self._library.numbers(ended_early)] = True
