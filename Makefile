@@ -137,9 +137,10 @@ format: dev ## Rewrite the sources in the one format, with the safe fixes of the
 ros-build: dev ## Build the ROS workspace with colcon, into ros2_ws/{build,install,log}
 	cd ros2_ws && PATH="$$PWD/../$(BIN):$$PATH" ../$(BIN)/colcon build --base-paths src
 
-# Universal: one file serves Python 3.11 to 3.13. Neither command nor index is written into it.
+# Universal: one file serves Python 3.11 to 3.13. Neither command nor index is written into it. Extras stay: pip before
+# 23.3 does not see that `coverage` is pinned where `coverage[toml]` is wanted, and takes the newest.
 compile = $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.11 --fork-strategy fewest \
-	--generate-hashes --no-header --no-annotate --quiet
+	--generate-hashes --no-strip-extras --no-header --no-annotate --quiet
 
 .PHONY: lock
 lock: dev ## Make both locks anew (UPGRADE=1 takes the newest versions)

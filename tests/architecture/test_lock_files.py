@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from importlib.metadata import PackageNotFoundError, requires
 
 import pytest
 from packaging.requirements import Requirement
@@ -14,6 +15,7 @@ LOCKS = [RUN_LOCK, DEV_LOCK]
 PYTHONS = ["3.11", "3.12", "3.13"]
 RUN_EXTRAS = ["ros", "sim", "policy", "bags", "hardware", "view"]
 DEV_EXTRAS = ["planning", "datasets", "train", "cluster", "wandb"]
+INSTALLED = [(RUN_LOCK, RUN_EXTRAS, ["build"]), (DEV_LOCK, [*RUN_EXTRAS, *DEV_EXTRAS], ["build", "dev"])]
 
 
 def entries(text):
@@ -86,11 +88,34 @@ def test_every_pin_is_exact_and_hashed(locks, name):
         assert all(re.fullmatch(r"sha256:[0-9a-f]{64}", digest.strip()) for digest in hashes), requirement
 
 
+@pytest.mark.parametrize(("name", "extras", "groups"), INSTALLED)
+def test_a_pin_names_every_extra_that_is_wanted_of_it(project, locks, name, extras, groups):
+    """Where one is left out, pip before 23.3 takes the newest version for it, and then has no hash."""
+    pinned = {canonicalize_name(requirement.name): requirement for requirement, _ in entries(locks[name])}
+    all_wanted = wanted(project, extras, groups) + [
+        one for requirement in pinned.values() for one in wanted_by(requirement)
+    ]
+    with_extras = [one for one in all_wanted if one.extras]
+    assert with_extras
+    for one in with_extras:
+        assert one.extras <= pinned[canonicalize_name(one.name)].extras, f"{one}. Run `make lock`."
+
+
+def wanted_by(requirement):
+    """What an installed package needs here with the extras that are pinned; nothing of one that is not installed."""
+    try:
+        texts = requires(requirement.name) or []
+    except PackageNotFoundError:
+        return
+    for one in map(Requirement, texts):
+        if one.marker is None or any(
+            one.marker.evaluate({"extra": extra}) for extra in ("", *requirement.extras)
+        ):
+            yield one
+
+
 @pytest.mark.parametrize("python", PYTHONS)
-@pytest.mark.parametrize(
-    ("name", "extras", "groups"),
-    [(RUN_LOCK, RUN_EXTRAS, ["build"]), (DEV_LOCK, [*RUN_EXTRAS, *DEV_EXTRAS], ["build", "dev"])],
-)
+@pytest.mark.parametrize(("name", "extras", "groups"), INSTALLED)
 def test_the_pins_satisfy_pyproject(project, locks, name, extras, groups, python):
     pinned = versions(locks[name], python)
     for requirement in wanted(project, extras, groups):
