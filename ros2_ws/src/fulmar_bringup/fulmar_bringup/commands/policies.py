@@ -72,7 +72,7 @@ def policies(
         if aside := set_aside(job):
             console.print(f"{job.name}: the old one is in {aside}", markup=False, soft_wrap=True)
     console.print(
-        f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} minutes and the judging"
+        f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the judging"
     )
     with JobBars(missing) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
