@@ -71,9 +71,7 @@ def policies(
     for job in jobs if anew else []:
         if aside := set_aside(job):
             console.print(f"{job.name}: the old one is in {aside}", markup=False, soft_wrap=True)
-    console.print(
-        f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the judging"
-    )
+    console.print(f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the judging")
     with JobBars(missing) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
     if as_json:
