@@ -35,6 +35,7 @@ from fulmar_core.topics import (
     TRUTH,
     VELOCITY_COMMAND,
     Wire,
+    goal_wires,
 )
 from fulmar_ros.bag_writer import RUN_RECORD
 from fulmar_ros.message_reader import goal_of, obstacles_of
@@ -119,7 +120,7 @@ class _Reader:
         """What the controller was told; it hears the topic of its task alone."""
         goals = []
         heard = _goal_wires_of(task)
-        for wire in GOAL_WIRES.values():
+        for wire in (wire for topic in GOAL_WIRES for wire in goal_wires(topic)):
             if wire not in heard:
                 self._warn_of_others(wire, task)
                 continue
@@ -129,7 +130,7 @@ class _Reader:
                     self._warnings.append(f"a message of {self._bag.topic_name(wire)} is no goal: {problem}.")
                     continue
                 goals.append(GivenGoal(stamp_of(message) / NS, log_ns / NS, goal.targets))
-        return goals
+        return sorted(goals, key=lambda goal: goal.log_s)
 
     def _warn_of_others(self, wire: Wire, task: object) -> None:
         count = len(self._bag.of(wire))
@@ -153,9 +154,9 @@ class _Reader:
 def _goal_wires_of(task: object) -> list[Wire]:
     """Where goals of a task are told; anywhere, of a task that nobody knows here."""
     try:
-        return [GOAL_WIRES[load_task(str(task)).goal_topic]]
+        return list(goal_wires(load_task(str(task)).goal_topic))
     except ConfigError:
-        return list(GOAL_WIRES.values())
+        return [wire for topic in GOAL_WIRES for wire in goal_wires(topic)]
 
 
 def _motion(found: Odometries) -> Motion:

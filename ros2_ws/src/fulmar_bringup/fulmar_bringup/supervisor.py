@@ -28,6 +28,7 @@ from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_ros.goal_messages import TYPES, goal_message, obstacles_message
 from fulmar_ros.middleware import set_up_middleware
+from fulmar_ros.operator_subscription import SUBSCRIPTIONS
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
@@ -113,7 +114,7 @@ class Supervisor:
         stamps = {stamp for _, stamp in parts}
 
         def found() -> bool:
-            return all(wire.get_subscription_count() >= listeners for wire in wires)
+            return all(wire.get_subscription_count() >= SUBSCRIPTIONS * listeners for wire in wires)
 
         while not (self._told(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
             self.wait_until(lambda: not self._reason.startswith(SILENT), alive)

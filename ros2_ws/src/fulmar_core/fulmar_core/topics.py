@@ -169,6 +169,14 @@ GOAL_PATH = Wire(
     "on demand",
     "waypoints in their order; after the last one the first comes again",
 )
+GOAL_POSES = Wire(
+    "goal_poses",
+    "geometry_msgs/msg/PoseArray",
+    "operator",
+    "latched",
+    "on demand",
+    "the same as `goal_path`, for publishers of PoseArray",
+)
 GOAL_VELOCITY = Wire(
     "goal_velocity",
     "geometry_msgs/msg/TwistStamped",
@@ -216,7 +224,15 @@ ESTOP = Wire(
     "operator",
     "latched",
     "10 Hz, where there is one",
-    "true: nothing may move; so does its silence, once it was heard or where it is required",
+    "true, once and from any publisher: nothing moves until a reset; silence of an e-stop node says the same",
+)
+ESTOP_RELEASED = Wire(
+    "estop/released",
+    "std_msgs/msg/String",
+    "operator",
+    "stream",
+    "once a reset",
+    "a reset of the e-stop succeeded; the data names the node that reset it",
 )
 TELEOP = Wire(
     "teleop/command",
@@ -277,12 +293,14 @@ WIRES: tuple[Wire, ...] = (
     GOAL_POSE,
     GOAL_POINT,
     GOAL_PATH,
+    GOAL_POSES,
     GOAL_VELOCITY,
     OBSTACLES,
     BLOCK,
     AIR_BEARING,
     DEVICE_STATE,
     ESTOP,
+    ESTOP_RELEASED,
     TELEOP,
     JOY,
     SWAP,
@@ -290,6 +308,11 @@ WIRES: tuple[Wire, ...] = (
 )
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}
+
+
+def goal_wires(topic: str) -> tuple[Wire, ...]:
+    """Wires on which goals for a task's goal topic arrive; the first carries the topic's own type."""
+    return (GOAL_WIRES[topic], GOAL_POSES) if topic == GOAL_PATH.name else (GOAL_WIRES[topic],)
 
 
 def command_wire(robot: Robot) -> Wire:

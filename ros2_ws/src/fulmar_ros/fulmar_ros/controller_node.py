@@ -115,6 +115,7 @@ class ControllerNode(LifecycleNode):
             on_obstacles=self._on_obstacles,
             on_block=self._on_block,
             on_estop=self._on_estop,
+            on_estop_released=self._on_estop_released,
             on_swap=self._on_swap,
             lockstep=self.settings.lockstep,
         )
@@ -182,6 +183,10 @@ class ControllerNode(LifecycleNode):
         self.inputs.hear_estop(message)
         self._tell_status(self.inputs.decide())
 
+    def _on_estop_released(self, _message: String) -> None:
+        self.inputs.release_estop()
+        self._tell_status(self.inputs.decide())
+
     def _on_swap(self, message: String) -> None:
         self._swap.ask(message.data)
 
@@ -204,8 +209,6 @@ class ControllerNode(LifecycleNode):
     def _on_goal(self, message: GoalMessage) -> None:
         if problem := self.inputs.take_goal(message):
             self.get_logger().warning(f"goal refused: {problem}")
-            self._tell_status(self.inputs.decide())
-            return
         self._tell_status(self.inputs.decide())
         self._go_on()
 

@@ -26,7 +26,7 @@ from fulmar_core.topics import (
     BLOCK,
     DIAGNOSTICS,
     ESTOP,
-    GOAL_WIRES,
+    ESTOP_RELEASED,
     METADATA,
     OBSERVATION,
     OBSTACLES,
@@ -35,10 +35,12 @@ from fulmar_core.topics import (
     SWAP,
     VELOCITY_COMMAND,
     command_wire,
+    goal_wires,
 )
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
+from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
@@ -60,6 +62,7 @@ class ControllerWires:
         on_obstacles: Callable[[MarkerArray], None],
         on_block: Callable[[PoseStamped], None],
         on_estop: Callable[[Bool], None],
+        on_estop_released: Callable[[String], None],
         on_swap: Callable[[String], None],
         lockstep: bool,
     ) -> None:
@@ -75,6 +78,7 @@ class ControllerWires:
             on_obstacles: Told all obstacles whenever they change.
             on_block: Told where the block is.
             on_estop: Told whether the e-stop is pressed.
+            on_estop_released: Called after each reset of the e-stop.
             on_swap: Told which policy shall go on.
             lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag
                 behind.
@@ -109,17 +113,17 @@ class ControllerWires:
         self._write_health = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(controller.observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
-        goal = GOAL_WIRES[task.goal_topic]
+        released = subscriber_qos(ESTOP_RELEASED, reliable=True)
         self._subscriptions = [
             node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
-            node.create_subscription(TYPES[goal.name], goal.name, on_goal, subscriber_qos(goal)),
-            node.create_subscription(Bool, ESTOP.name, on_estop, subscriber_qos(ESTOP)),
+            *subscribe_operator(node, Bool, ESTOP, on_estop),
+            node.create_subscription(String, ESTOP_RELEASED.name, on_estop_released, released),
             node.create_subscription(String, SWAP.name, on_swap, subscriber_qos(SWAP, reliable=True)),
         ]
+        for goal in goal_wires(task.goal_topic):
+            self._subscriptions += subscribe_operator(node, TYPES[goal.name], goal, on_goal)
         if sees_obstacles(task):
-            self._subscriptions.append(
-                node.create_subscription(MarkerArray, OBSTACLES.name, on_obstacles, subscriber_qos(OBSTACLES))
-            )
+            self._subscriptions += subscribe_operator(node, MarkerArray, OBSTACLES, on_obstacles)
         if isinstance(task, PushBlock):
             self._subscriptions.append(
                 node.create_subscription(

@@ -1,10 +1,12 @@
-"""The node `estop`: one button for one robot, that keeps saying whether it is pressed."""
+"""The node `estop`: the e-stop button of one robot, which reports ten times a second whether it is pressed."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
@@ -12,7 +14,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
@@ -21,6 +23,7 @@ from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
 from fulmar_core.topics import (
     DIAGNOSTICS,
     ESTOP,
+    ESTOP_RELEASED,
     ESTOP_RESET,
     ESTOP_TRIGGER,
     TELEOP,
@@ -28,13 +31,13 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.health import Health
+from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 FLUSH = Duration(seconds=0.3)
-# So often "pressed" is said before the release of a reset, which those who heard a button die would not believe else.
-STILL_PRESSED = 3
+OWN_MESSAGES = 50  # of its own e-stop messages, by which the node recognises them: 5 s of them
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class EstopSettings:
 
 
 class EstopNode(Node):
-    """Says ten times a second whether the button is pressed; whoever no longer hears it stops by itself."""
+    """Publishes ten times a second whether the button is pressed; nodes that no longer receive it stop the robot."""
 
     def __init__(self, _request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
         """Begin to say it.
@@ -63,8 +66,11 @@ class EstopNode(Node):
         self._button = EstopButton()
         self._button.pressed = settings.pressed
         self._told_s = 0.0
-        self._still_pressed = 0  # messages that still say so after a reset
+        self._published = 0
+        self._own: deque[tuple[int, int, int]] = deque(maxlen=OWN_MESSAGES)  # number, and sent between [ns]
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
+        self._released = self.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
+        subscribe_operator(self, Bool, ESTOP, self._on_estop, with_info=True)
         diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._health = Health(f"{robot.name}: estop", [diagnostics])
         wire = command_wire(robot)
@@ -92,6 +98,18 @@ class EstopNode(Node):
         zero = message.twist.linear.x == 0.0 and message.twist.angular.z == 0.0
         self._button.hear_command(VELOCITY_COMMAND.name, zero, time.monotonic_ns())
 
+    def _on_estop(self, message: Bool, info: dict[str, Any]) -> None:
+        """Latch a press by any other publisher; what it says besides does not count."""
+        if not message.data or self._is_own(info) or self._button.pressed:
+            return
+        self._button.press()
+        self._tell()
+        self.get_logger().warning(f"e-stop pressed by another publisher of {self._publisher.topic_name}")
+
+    def _is_own(self, info: dict[str, Any]) -> bool:
+        number, sent_ns = info["publication_sequence_number"], info["source_timestamp"]
+        return any(number == own and begin <= sent_ns <= end for own, begin, end in self._own)
+
     def _trigger(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._button.press()
         self._tell()
@@ -101,23 +119,26 @@ class EstopNode(Node):
 
     def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         problem = self._button.reset(time.monotonic_ns())
-        self._still_pressed = 0 if problem else STILL_PRESSED
+        if not problem:
+            self._released.publish(String(data=self.get_fully_qualified_name()))
         self._tell()
         self.get_logger().warning(f"e-stop reset {problem}" if problem else "e-stop reset: released")
         response.success = not problem
-        response.message = problem or "released within a second: controllers wait for a new goal"
+        response.message = problem or "released: controllers wait for a new goal"
         return response
 
     def _beat(self) -> None:
         if not self._prior:  # in the executor's thread, which is not there before
             take_priority_with_helpers(CONTROL_PRIORITY)  # its silence stops the robot
             self._prior = True
-        self._still_pressed = max(0, self._still_pressed - 1)
         self._tell()
 
     def _tell(self) -> None:
-        pressed = self._button.pressed or self._still_pressed > 0
+        pressed = self._button.pressed
+        self._published += 1
+        begin_ns = time.time_ns()
         self._publisher.publish(Bool(data=pressed))
+        self._own.append((self._published, begin_ns, time.time_ns()))
         if time.monotonic() - self._told_s >= 1.0:
             self._told_s = time.monotonic()
             level, words = ("warn", "pressed") if pressed else ("ok", "released")

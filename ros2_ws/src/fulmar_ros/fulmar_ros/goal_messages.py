@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
-from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
+from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -14,11 +14,12 @@ from fulmar_core.rotation import from_yaw
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.message_reader import BODY_FRAME, FRAME
 
-GoalMessage: TypeAlias = PointStamped | PoseStamped | Path | TwistStamped
+GoalMessage: TypeAlias = PointStamped | PoseStamped | Path | PoseArray | TwistStamped
 TYPES: dict[str, type] = {
     "goal_point": PointStamped,
     "goal_pose": PoseStamped,
     "goal_path": Path,
+    "goal_poses": PoseArray,
     "goal_velocity": TwistStamped,
 }
 

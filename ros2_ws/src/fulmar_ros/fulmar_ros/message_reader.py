@@ -74,7 +74,7 @@ def goal_of(message: Any) -> tuple[Goal | None, str]:
             return None, f"goal has {len(poses)} waypoints, must have 1 to {MOST_WAYPOINTS}"
         targets = []
         for pose in poses:
-            target, problem = _target(pose)
+            target, problem = _target(getattr(pose, "pose", pose))  # stamped in a path, not in an array
             if target is None:
                 return None, problem
             targets.append(target)
@@ -83,8 +83,8 @@ def goal_of(message: Any) -> tuple[Goal | None, str]:
     return goal_at(*targets), ""
 
 
-def _target(message: Any) -> tuple[tuple[float, float, float] | None, str]:
-    p, q = message.pose.position, message.pose.orientation
+def _target(pose: Any) -> tuple[tuple[float, float, float] | None, str]:
+    p, q = pose.position, pose.orientation
     quat = np.array([q.x, q.y, q.z, q.w])
     if not (np.isfinite(quat).all() and np.isfinite((p.x, p.y, p.z)).all()):
         return None, "goal holds a value that is not finite"

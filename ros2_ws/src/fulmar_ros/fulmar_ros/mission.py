@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 
 import numpy as np
 
@@ -19,7 +20,10 @@ from fulmar_core.tasks import Task, fitted, sees_obstacles
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.push_block import PushBlock
 
+GOALS_REMEMBERED = 200  # stamps of goals; publishers repeat at most the last 100
 BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
+
+GoalKey = tuple[int, bytes]  # stamp [ns] and targets
 
 
 class Mission:
@@ -45,6 +49,9 @@ class Mission:
         self._block_stamp_ns = 0
         self._batched_of: tuple[object, object, object] = (None, None, None)
         self._planar_of: RigidBodyState | None = None
+        self._given: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # since the last drop
+        self._dropped: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)
+        self._void: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # ended by a press of the e-stop
         self.goal_stamp_ns = 0
         self.obstacles_stamp_ns = 0
 
@@ -75,9 +82,14 @@ class Mission:
         """Take a new goal; its time begins with the next observation, or, of a velocity, when its stamp says.
 
         Returns:
-            Whether something new begins: not so for a goal that is streamed again, and for velocities, which go on
-            from one to the next.
+            Whether something new begins: not so for a goal that is streamed again, or repeated with the same stamp for
+            a subscriber that came late, and for velocities, which go on from one to the next.
         """
+        if not self._streamed and stamp_ns:
+            key = _key(goal, stamp_ns)
+            if key in self._given:
+                return False
+            self._given.append(key)
         self.goal_stamp_ns = stamp_ns
         if self._schedule is not None:
             self._schedule.give(goal, stamp_ns)
@@ -87,11 +99,29 @@ class Mission:
         self._goal, self._since_ns = goal, None
         return True
 
-    def drop(self) -> None:
-        """Forget the goal, as after an emergency stop: what moves then is asked for anew."""
+    def drop(self, *, pressed: bool = False) -> None:
+        """Forget the goal, as after an emergency stop: what moves then is asked for anew.
+
+        Args:
+            pressed: Whether a press ends the goals for good: their repetitions do not count either, see `is_void`.
+        """
+        self._dropped.extend(self._given)
+        self._given.clear()
+        if pressed:
+            self._void.extend(self._dropped)
+            self._dropped.clear()
         self._goal, self._since_ns, self.goal_stamp_ns = None, None, 0
         if self._schedule is not None:
             self._schedule = Schedule()
+
+    def is_void(self, goal: Goal, stamp_ns: int) -> bool:
+        """Whether the e-stop ended this very goal; one with the stamp 0 is always new [ns]."""
+        return bool(stamp_ns) and _key(goal, stamp_ns) in self._void
+
+    def skip(self, stamp_ns: int) -> None:
+        """Note that the streamed goal of a time came and does not count [ns]."""
+        if self._streamed:
+            self.goal_stamp_ns = stamp_ns
 
     def turn_to(self, stamp_ns: int) -> None:
         """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""
@@ -179,3 +209,7 @@ class Mission:
         if state is not self._planar_of:
             self._planar_of, self._planar = state, planar_of(state)[None]
         return self._planar
+
+
+def _key(goal: Goal, stamp_ns: int) -> GoalKey:
+    return stamp_ns, np.asarray(goal.targets, dtype=float).tobytes()

@@ -14,7 +14,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
@@ -27,6 +27,7 @@ from fulmar_core.topics import (
     BLOCK,
     CLOCK,
     ESTOP,
+    ESTOP_RELEASED,
     GIVE_BACK,
     IMU,
     MOCAP,
@@ -40,6 +41,7 @@ from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWrit
 from fulmar_ros.deadline import Spread
 from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.motion_capture import MotionCapture
+from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.sent_states import SentStates
@@ -115,7 +117,11 @@ class PlantWires:
             if wire is VELOCITY_COMMAND
             else node.create_subscription(JointState, wire.name, self._on_command, commands)
         )
-        self._operator = [node.create_subscription(Bool, ESTOP.name, self._on_estop, subscriber_qos(ESTOP))]
+        released = subscriber_qos(ESTOP_RELEASED, reliable=True)
+        self._operator = [
+            *subscribe_operator(node, Bool, ESTOP, self._on_estop),
+            node.create_subscription(String, ESTOP_RELEASED.name, self._on_estop_released, released),
+        ]
         if not lockstep:
             teleop = subscriber_qos(TELEOP, reliable=True)
             self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, teleop))
@@ -211,6 +217,10 @@ class PlantWires:
     def _on_estop(self, message: Bool) -> None:
         with self.lock:
             self._guard.estop.hear(bool(message.data), time.monotonic_ns())
+
+    def _on_estop_released(self, _message: String) -> None:
+        with self.lock:
+            self._guard.estop.release(time.monotonic_ns())
 
     def _on_teleop(self, message: JointState) -> None:
         with self.lock:

@@ -28,7 +28,9 @@ def publisher_qos(wire: Wire, *, lockstep: bool = False) -> QoSProfile:
     )
 
 
-def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | None = None) -> QoSProfile:
+def subscriber_qos(
+    wire: Wire, *, reliable: bool | None = None, depth: int | None = None, latched: bool | None = None
+) -> QoSProfile:
     """How subscribers of a wire ask for it.
 
     By default a subscriber wants the newest message only: best effort, the last 1 kept. Latched wires are
@@ -38,11 +40,12 @@ def subscriber_qos(wire: Wire, *, reliable: bool | None = None, depth: int | Non
         wire: The wire.
         reliable: Ask for every message again that got lost; only where publishers offer it.
         depth: Messages that may wait for the callback, >= 1, or `EVERYTHING`.
+        latched: Ask for what was published before; as the wire is by default.
 
     Returns:
         A profile that matches `publisher_qos(wire)`.
     """
-    latched = wire.delivery == "latched"
+    latched = wire.delivery == "latched" if latched is None else latched
     return _profile(
         reliable=latched if reliable is None else reliable and wire.delivery != "best_effort",
         latched=latched,

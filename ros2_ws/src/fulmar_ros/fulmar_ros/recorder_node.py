@@ -19,6 +19,7 @@ from fulmar_ros.bag_ring import BagRing
 from fulmar_ros.bag_thread import BagThread
 from fulmar_ros.bag_writer import BagWriter, check_free
 from fulmar_ros.fault_signs import fault_finder
+from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.provenance import attachments
 from fulmar_ros.qos import EVERYTHING, subscriber_qos
@@ -48,15 +49,19 @@ class RecorderNode(Node):
         self._robot = self.get_namespace().strip("/") or "robot"
         self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
         self._run_info, self._attachments = settings.run(), settings.files()
-        classes = {wire: _message_class(wire) for wire in WIRES if wire.recorded}
-        self._topics = {
-            wire: self.resolve_topic_name(wire.name) for wire, kind in classes.items() if kind is not None
-        }
+        found = {wire: _message_class(wire) for wire in WIRES if wire.recorded}
+        classes = {wire: kind for wire, kind in found.items() if kind is not None}
+        self._topics = {wire: self.resolve_topic_name(wire.name) for wire in classes}
         self._ring = self._new_ring() if settings.mode == "ring" else None
         self._thread = BagThread(self._ring or self._open_bag(), on_error=self.get_logger().error)
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         for wire, topic in self._topics.items():
+            if wire.source == "operator" and wire.delivery == "latched":
+                subscribe_operator(
+                    self, classes[wire], wire, self._keep(topic), topic=topic, depth=EVERYTHING, raw=True
+                )
+                continue
             qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
             self.create_subscription(classes[wire], topic, self._keep(topic), qos, raw=True)
         self._health = RecorderHealth(
@@ -110,7 +115,6 @@ class RecorderNode(Node):
 
     def _keep(self, topic: str) -> Callable[[bytes], None]:
         put = self._thread.put
-        # No time of sending: the EventsExecutor of rclpy 7.1.6 fails on callbacks that ask for message info.
         return lambda data: put(topic, data, time.time_ns())
 
     def _attach_provenance(self) -> None:

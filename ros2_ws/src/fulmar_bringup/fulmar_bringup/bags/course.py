@@ -29,11 +29,11 @@ from fulmar_core.tasks import Task, load_task
 from fulmar_core.topics import (
     ACTION,
     BLOCK,
-    GOAL_WIRES,
     OBSERVATION,
     OBSTACLES,
     VELOCITY_COMMAND,
     command_wire,
+    goal_wires,
 )
 from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.message_reader import goal_of, obstacles_of
@@ -61,7 +61,7 @@ class Course:
     goals: tuple[Told, ...]
     obstacles: tuple[Told, ...]
     blocks: tuple[Told, ...]
-    presses: tuple[Told, ...]  # of the e-stop: true or false
+    presses: tuple[Told, ...]  # of the e-stop, see `presses_of`
     changes: tuple[Told, ...]  # folder and SHA-256 of policies that took over
     warnings: tuple[str, ...]
 
@@ -296,12 +296,14 @@ def _goals(
     bag: Bag, task: Task, asked: PoseTuple | None, begin_ns: int, warnings: list[str]
 ) -> tuple[Told, ...]:
     found = []
-    for index, (log, message) in enumerate(messages(bag.of(GOAL_WIRES[task.goal_topic]))):
-        goal, problem = goal_of(message)
-        if goal is None:
-            warnings.append(f"a message of {task.goal_topic} was left out: {problem}.")
-            continue
-        found.append(Told(log, stamp_of(message), goal, index))
+    for wire in goal_wires(task.goal_topic):
+        for index, (log, message) in enumerate(messages(bag.of(wire))):
+            goal, problem = goal_of(message)
+            if goal is None:
+                warnings.append(f"a message of {wire.name} was left out: {problem}.")
+                continue
+            found.append(Told(log, stamp_of(message), goal, index))
+    found.sort(key=lambda told: told.log_ns)
     if asked is not None:
         found = [Told(begin_ns, 0, _goal(asked))]
     return tuple(found)

@@ -10,11 +10,12 @@ from fulmar_bringup.bags.decode import messages
 from fulmar_bringup.bags.told import Told
 from fulmar_core.errors import BagError
 from fulmar_core.safety.area import NO_AREA
-from fulmar_core.safety.estop import EstopWatch
-from fulmar_core.topics import ESTOP, METADATA, SWAP
+from fulmar_core.safety.estop import TIMEOUT_NS, EstopWatch
+from fulmar_core.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP
 
 # A message reaches the controller and the recorder at different times; what lies within is for the record to tell.
 SLACK_NS = 50_000_000
+RELEASED = "released"  # a reset, among the messages of the e-stop
 
 
 class Limits(TypedDict):
@@ -64,8 +65,29 @@ def begins_with_its_run(info: Mapping[str, Any]) -> bool:
 
 
 def presses_of(bag: Bag) -> tuple[Told, ...]:
-    """What the e-stop said: true is pressed."""
-    return tuple(Told(log, 0, bool(message.data)) for log, message in messages(bag.of(ESTOP)))
+    """Messages of the e-stop, true for pressed, and its resets, `RELEASED`, in their order.
+
+    Bags made before resets had a topic of their own do not list that topic: there the first "false" later than the
+    timeout after a press ends it, as it did then.
+    """
+    said = [Told(log, 0, bool(message.data)) for log, message in messages(bag.of(ESTOP))]
+    if bag.topic_name(ESTOP_RELEASED) not in bag.topics:
+        return tuple(_with_resets(said))
+    said += [Told(log, 0, RELEASED) for log, _ in messages(bag.of(ESTOP_RELEASED))]
+    return tuple(sorted(said, key=lambda each: each.log_ns))
+
+
+def _with_resets(said: list[Told]) -> list[Told]:
+    result: list[Told] = []
+    pressed_ns: int | None = None
+    for each in said:
+        if each.what:
+            pressed_ns = each.log_ns
+        elif pressed_ns is not None and each.log_ns - pressed_ns > TIMEOUT_NS:
+            result.append(Told(each.log_ns, 0, RELEASED))
+            pressed_ns = None
+        result.append(each)
+    return result
 
 
 def changes_of(bag: Bag) -> tuple[Told, ...]:
@@ -112,6 +134,11 @@ class RecordedEstop:
             return early
         return "" if acted else late or early
 
+    @property
+    def pressed(self) -> bool:
+        """Whether it was pressed without a doubt since the last reset, at the time of the last call."""
+        return self._late.watch.pressed and self._early.watch.pressed
+
     def holds(self, log_ns: int) -> bool:
         """Whether it was heard, and stopped everything without a doubt, at a time of the record [ns]."""
         return all(ear.reason(log_ns) and ear.watch.heard for ear in (self._late, self._early))
@@ -129,6 +156,9 @@ class _Ear:
     def reason(self, log_ns: int) -> str:
         now_ns = log_ns + self._offset_ns
         while self._next is not None and self._next.log_ns <= now_ns:
-            self.watch.hear(self._next.what, self._next.log_ns)
+            if self._next.what == RELEASED:
+                self.watch.release(self._next.log_ns)
+            else:
+                self.watch.hear(self._next.what, self._next.log_ns)
             self._next = next(self._rest, None)
         return self.watch.reason(now_ns)

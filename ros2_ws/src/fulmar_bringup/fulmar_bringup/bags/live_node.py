@@ -32,6 +32,7 @@ from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.topics import (
     ACTION,
     BLOCK,
+    GOAL_POSES,
     GOAL_WIRES,
     METADATA,
     OBSERVATION,
@@ -98,6 +99,8 @@ def rerun_through_node(
         raise BagError(
             f"{bag.path}: its e-stop goes by the clock on the wall, not by steps. Use --through direct."
         )
+    if len(bag.of(GOAL_POSES)):
+        raise BagError(f"{bag.path}: has goals on {GOAL_POSES.name}. Use --through direct.")
     if course.changes:
         raise BagError(f"{bag.path}: its policy was changed on the way. Use --through direct.")
     settings = course.settings

@@ -1,6 +1,6 @@
-"""The emergency stop: what who owns the button decides, and what who hears it must do. No clock, no ROS.
+"""The emergency stop: the button that one node owns, and the rules of every node that obeys it. No clock, no ROS.
 
-Fail-safe by liveness: a stop that falls silent counts as pressed.
+A press latches until a reset. An e-stop node that falls silent counts as pressed.
 """
 
 from __future__ import annotations
@@ -13,57 +13,71 @@ SILENT = f"{HOLDS} silent"  # and how the one does that nobody may have given by
 
 
 class EstopWatch:
-    """Judges from what is heard on the wire whether anything may move."""
+    """Decides from the messages of the e-stop whether anything may move.
+
+    One press latches, from any publisher. Only `release`, which follows a successful reset, ends it. An e-stop node
+    shows that it is alive by its messages; once it has said "released", its silence stops the robot too.
+    """
 
     def __init__(self, *, required: bool, timeout_ns: int = TIMEOUT_NS) -> None:
-        """Begin without having heard anything.
+        """Begin without any message.
 
         Args:
-            required: Whether nothing may move before an e-stop is heard. Where it is not, one that was heard once must
-                still go on.
+            required: Whether nothing may move before an e-stop node says "released". Where it is not, one that was
+                there once must still go on.
             timeout_ns: Longest silence, > 0 [ns].
         """
         self._required, self._timeout_ns = required, timeout_ns
-        self._heard_ns: int | None = None
-        self._pressed_ns: int | None = None
-        self._released = False
-        self._orphaned = False  # pressed, and its button has fallen silent since
-        self.was_released = False  # whether it ever allowed anything
+        self._pressed = False
+        self._alive_ns: int | None = None  # newest message, since one said "released"
+        self.was_released = not required  # whether it ever allowed anything
 
     def hear(self, pressed: bool, now_ns: int) -> None:
-        """Note a message, at this time of a steady clock [ns].
+        """Take a message of the e-stop, at this time of a steady clock [ns].
 
-        Of two buttons the pressed one counts: a release within the timeout after a press is not believed. Nor is one
-        from a button that was silent while it was pressed: whoever started it anew knows nothing of the press. A reset
-        says "pressed" first, which makes it believed.
+        A "released" shows that an e-stop node is there, and that it was not pressed as far as it knows; it does not
+        end a press. A press alone shows no node: it may be the one message of any publisher.
         """
-        silent = self._heard_ns is not None and now_ns - self._heard_ns > self._timeout_ns
-        self._orphaned = not pressed and (self._orphaned or (silent and not self._released))
-        self._heard_ns = now_ns
         if pressed:
-            self._pressed_ns = now_ns
-            self._released = False
-        elif not self._orphaned and (
-            self._pressed_ns is None or now_ns - self._pressed_ns > self._timeout_ns
-        ):
-            self._released = True
-            self.was_released = True
+            self._pressed = True
+        if not pressed or self._alive_ns is not None:
+            self._alive_ns = now_ns
+        self.was_released = self.was_released or not (pressed or self._pressed)
+
+    def release(self, now_ns: int) -> None:
+        """End a press: a reset has succeeded, at this time of the same clock [ns].
+
+        A reset without an e-stop node also ends the silence of one that is gone: where one is required, it must be
+        started again.
+        """
+        self._pressed = False
+        if self._silent_ns(now_ns) > self._timeout_ns:
+            self._alive_ns = None
 
     @property
     def heard(self) -> bool:
-        """Whether there is, or was, one."""
-        return self._heard_ns is not None
+        """Whether it has been pressed since the last reset, or an e-stop node is, or was, there."""
+        return self._pressed or self._alive_ns is not None
+
+    @property
+    def pressed(self) -> bool:
+        """Whether it has been pressed since the last reset."""
+        return self._pressed
 
     def reason(self, now_ns: int) -> str:
         """Why nothing may move at this time of the same clock; empty if it may [ns]."""
-        if self._heard_ns is None:
+        if self._pressed:
+            return f"{HOLDS} pressed. Reset it: fulmar estop --reset"
+        if self._alive_ns is None:
             return f"{HOLDS} none is heard, and one is required" if self._required else ""
-        silent_ns = now_ns - self._heard_ns
+        silent_ns = self._silent_ns(now_ns)
         if silent_ns > self._timeout_ns:
             return f"{SILENT} for {silent_ns / 1e6:.0f} ms (limit {self._timeout_ns / 1e6:.0f} ms)"
-        if self._orphaned:
-            return f"{HOLDS} it was pressed when it fell silent. Reset it: fulmar estop --reset"
-        return "" if self._released else f"{HOLDS} pressed"
+        return ""
+
+    def _silent_ns(self, now_ns: int) -> int:
+        """Time since the newest message of an e-stop node, 0 where there was none [ns]."""
+        return 0 if self._alive_ns is None else now_ns - self._alive_ns
 
 
 class EstopButton:

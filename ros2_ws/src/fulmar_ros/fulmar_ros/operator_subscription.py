@@ -1,0 +1,95 @@
+"""Subscriptions of operator wires: from volatile and from latched publishers, each message once."""
+
+from __future__ import annotations
+
+import inspect
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+from fulmar_core.topics import Wire
+from fulmar_ros.qos import STREAM_DEPTH, subscriber_qos
+
+SUBSCRIPTIONS = 2  # of one latched wire, as its publishers count them
+REMEMBERED = 5000  # messages by which a second delivery is recognised; the middleware keeps no more for a reader
+
+
+def subscribe_operator(
+    node: Node,
+    kind: type,
+    wire: Wire,
+    callback: Callable[..., None],
+    *,
+    topic: str = "",
+    depth: int | None = None,
+    raw: bool = False,
+    with_info: bool = False,
+) -> list[Subscription]:
+    """Subscribe a latched wire to publishers of either durability.
+
+    A publisher with default settings is volatile and never matches a transient-local subscription; a volatile
+    subscription misses what a latched publisher sent before. Both together receive everything, and the second delivery
+    of a message is dropped.
+
+    Args:
+        node: Owner of the subscriptions.
+        kind: Message class of the wire.
+        wire: A latched wire.
+        callback: Called with each message once, and, if asked for, with its info.
+        topic: Name of the topic, where it is another than the wire's.
+        depth: Messages that may wait for the callback; as of `subscriber_qos`. By default enough that the message of
+            one publisher does not overwrite that of another.
+        raw: Deliver serialized messages.
+        with_info: Call back with the message info too.
+
+    Returns:
+        The subscriptions, for `Node.destroy_subscription`.
+    """
+    depth = max(wire.latest, STREAM_DEPTH) if depth is None else depth
+    once = _Once(callback, with_info=with_info)
+    return [
+        node.create_subscription(
+            kind,
+            topic or wire.name,
+            once,
+            subscriber_qos(wire, reliable=True, depth=depth, latched=latched),
+            raw=raw,
+            # A volatile publisher does not match the latched subscription, which is no fault.
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=not latched),
+        )
+        for latched in (False, True)
+    ]
+
+
+class _Once:
+    """A callback of several subscriptions that passes each message on once.
+
+    A message is recognised by when and as which of its publisher's it was sent.
+    """
+
+    # Asks rclpy for message info.
+    __signature__ = inspect.signature(lambda message, info: None)
+
+    def __init__(self, callback: Callable[..., None], *, with_info: bool) -> None:
+        self._callback, self._with_info = callback, with_info
+        self._order: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)
+        self._known: set[tuple[int, int]] = set()
+
+    def __call__(self, *received: Any) -> None:
+        # The EventsExecutor of rclpy 7.1 passes message and info as one tuple, other executors as two arguments.
+        message, info = received if len(received) == 2 else received[0]
+        key = (info["source_timestamp"], info["publication_sequence_number"])
+        if key in self._known:
+            return
+        if len(self._order) == REMEMBERED:
+            self._known.discard(self._order[0])
+        self._order.append(key)
+        self._known.add(key)
+        if self._with_info:
+            self._callback(message, info)
+        else:
+            self._callback(message)
