@@ -40,6 +40,7 @@ class Neighbour:
     def __init__(self, robot: str = ROBOT) -> None:
         self.node = Node("neighbour", namespace=f"/{robot}")
         self.robot = load_robot(robot)
+        self._goals = 0
         self.applied: list[np.ndarray] = []
         self.commands: list[np.ndarray] = []
         self.said: dict[str, tuple[str, dict[str, str]]] = {}
@@ -94,8 +95,9 @@ class Neighbour:
         return message
 
     def give_goal(self) -> None:
-        """Ask for a pose far away, so that valves open."""
-        self.goal_publisher.publish(goal_message(goal_at((4.0, 0.0, 0.0)), "goal_pose", 1))
+        """Ask for a pose far away, so that valves open; each time anew."""
+        self._goals += 1
+        self.goal_publisher.publish(goal_message(goal_at((4.0, 0.0, 0.0)), "goal_pose", self._goals))
 
     def odometry(
         self, stamp_ns: int, spoil: Callable[[Odometry], None] = lambda _message: None, x: float = 0.0

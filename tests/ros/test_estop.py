@@ -6,16 +6,20 @@ import json
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from fulmar_bringup import robot_operator
 from fulmar_bringup.commands.estop import estop
+from fulmar_bringup.reset_robots import release_without_node
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
 from fulmar_ros.estop_node import EstopNode
@@ -110,16 +114,84 @@ def test_an_e_stop_whose_process_dies_stops_the_robot_by_its_silence(
     until(lambda: "silent" in neighbour.said["plant"][0])
 
 
+def publish_once(neighbour: Neighbour, pressed: bool, qos: QoSProfile | int) -> None:
+    """One message, as a plain node publishes it: matched, sent, gone."""
+    publisher = neighbour.node.create_publisher(Bool, ESTOP.name, qos)
+    until(lambda: publisher.get_subscription_count() >= 1)
+    time.sleep(0.1)  # a match is seen here a moment before the other side is ready
+    publisher.publish(Bool(data=pressed))
+    publisher.wait_for_all_acked(Duration(seconds=1.0))
+    neighbour.node.destroy_publisher(publisher)
+
+
+def closed_in_time_and_for_good(neighbour: Neighbour) -> None:
+    """Valves close within the watchdog time, and stay closed while commands go on."""
+    since = time.monotonic()
+    until(lambda: not drive(neighbour))
+    assert time.monotonic() - since < 0.4
+    for _ in range(40):  # longer than the e-stop's timeout
+        time.sleep(0.02)
+        assert not drive(neighbour)
+
+
+DEFAULT_QOS = 10  # what rclpy makes of a depth: reliable, volatile
+
+
+@pytest.mark.parametrize("latched", [False, True])
+def test_one_message_of_any_publisher_stops_the_robot_until_its_node_is_reset(
+    neighbour: Neighbour, plant: PlantNode, button: EstopNode, latched: bool
+) -> None:
+    said: list[bool] = []
+    neighbour.node.create_subscription(
+        Bool, ESTOP.name, lambda message: said.append(message.data), subscriber_qos(ESTOP, reliable=True)
+    )
+    until(lambda: drive(neighbour) and False in said)
+    publish_once(neighbour, True, publisher_qos(ESTOP) if latched else DEFAULT_QOS)
+    closed_in_time_and_for_good(neighbour)
+    assert said[-3:] == [True] * 3  # the node holds the press too
+    neighbour.command([0.0] * 8)
+    time.sleep(0.1)
+    assert ask(neighbour, ESTOP_RESET).success
+    until(lambda: drive(neighbour))
+    time.sleep(0.3)
+    assert said[-2:] == [False] * 2  # its own last "pressed" does not press it again
+
+
+@pytest.mark.parametrize("latched", [False, True])
+def test_one_message_stops_a_robot_without_an_e_stop_node_until_a_reset(
+    neighbour: Neighbour, plant: PlantNode, latched: bool
+) -> None:
+    until(lambda: drive(neighbour))
+    publish_once(neighbour, True, publisher_qos(ESTOP) if latched else DEFAULT_QOS)
+    closed_in_time_and_for_good(neighbour)
+    publish_once(neighbour, False, DEFAULT_QOS)
+    moving = threading.Event()
+    driver = threading.Thread(
+        target=lambda: [drive(neighbour) for _ in iter(lambda: moving.wait(0.02), True)]
+    )
+    driver.start()
+    assert "not zero" in release_without_node(neighbour.node, NAMESPACE)[1]
+    moving.set()
+    driver.join()
+    neighbour.command([0.0] * 8)
+    time.sleep(0.5)
+    assert not neighbour.applied[-1].any()
+    assert release_without_node(neighbour.node, NAMESPACE)[0]
+    until(lambda: drive(neighbour))
+    time.sleep(0.8)
+    until(lambda: drive(neighbour))  # the two messages did not make the plant wait for a node
+
+
 def test_a_press_outlives_the_process_of_its_button(neighbour: Neighbour, plant: PlantNode) -> None:
-    """Pressed, killed, started anew: nothing moves before somebody resets it."""
+    """Pressed, killed, started anew: nothing moves before a reset."""
     publisher = neighbour.node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
     until(lambda: drive(neighbour))
     until(lambda: publisher.publish(Bool(data=True)) or "pressed" in neighbour.said.get("plant", ("",))[0])
-    until(lambda: not drive(neighbour) and "silent" in neighbour.said["plant"][0])
+    until(lambda: not drive(neighbour))
+    neighbour.node.destroy_publisher(publisher)
     arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
     node = EstopNode(lambda _code: None, cli_args=arguments)
     with spinning(node, lambda error: pytest.fail(repr(error))):
-        until(lambda: not drive(neighbour) and "when it fell silent" in neighbour.said["plant"][0])
         for _ in range(50):
             time.sleep(0.02)
             assert not drive(neighbour)
@@ -195,7 +267,7 @@ def test_an_e_stop_node_that_hangs_keeps_neither_its_robot_nor_another_from_bein
         assert not said["a_robot"]["done"]  # it has no plant that could hear
         assert done.returncode == 1
         assert "Traceback" not in done.stderr
-        until(lambda: not drive(neighbour) and "silent" in neighbour.said["plant"][0])
+        until(lambda: not drive(neighbour) and "e-stop: pressed" in neighbour.said["plant"][0])
         for node in nodes:
             node.send_signal(signal.SIGCONT)
         for _ in range(60):  # they still say "released"

@@ -198,7 +198,7 @@ class TestEstop:
         guard.estop.hear(True, 0)
         guard.offer(NAMES, GOOD, 1)
         guard.estop.hear(False, 400 * MS)
-        guard.estop.hear(False, 600 * MS)
+        guard.estop.release(600 * MS)
         assert not guard.output(601 * MS).any()
         guard.offer(NAMES, GOOD, 602 * MS)
         assert guard.output(603 * MS).tolist() == GOOD
@@ -311,7 +311,7 @@ class TestSlew:
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from(["offer", "hand", "press", "release", "back", "wait"]),
+            st.sampled_from(["offer", "hand", "press", "released", "reset", "back", "wait"]),
             st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=10),
             st.integers(0, 300),
         ),
@@ -328,8 +328,10 @@ def test_whatever_comes_the_output_is_a_command_within_limits_and_safe_under_the
             guard.offer(NAMES, values, now)
         elif what == "hand":
             guard.offer_by_hand(NAMES, values, now)
-        elif what in ("press", "release"):
+        elif what in ("press", "released"):
             guard.estop.hear(what == "press", now)
+        elif what == "reset":
+            guard.estop.release(now)
         elif what == "back":
             guard.give_back(now)
         output = guard.output(now)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -23,13 +22,43 @@ def test_where_one_is_required_nothing_moves_before_it_is_heard():
     assert watch.reason(6) == ""
 
 
-def test_pressed_stops_and_released_lets_go():
+def test_one_press_holds_although_the_node_goes_on_saying_released():
+    watch = EstopWatch(required=False)
+    watch.hear(False, 0)
+    watch.hear(True, 10 * MS)
+    for t in range(100, 5000, 100):
+        watch.hear(False, t * MS)
+        assert "pressed" in watch.reason(t * MS)
+    watch.release(5000 * MS)
+    assert watch.reason(5000 * MS) == ""
+
+
+def test_one_press_without_any_node_holds_until_a_reset_and_needs_no_node_then():
     watch = EstopWatch(required=False)
     watch.hear(True, 0)
     assert "pressed" in watch.reason(1)
-    watch.hear(False, TIMEOUT_NS)
-    watch.hear(False, TIMEOUT_NS + 1)
-    assert watch.reason(TIMEOUT_NS + 2) == ""
+    assert "pressed" in watch.reason(3_600_000 * MS)
+    watch.release(3_600_000 * MS)
+    assert watch.reason(7_200_000 * MS) == ""
+    assert not watch.heard
+
+
+def test_a_press_of_another_publisher_shows_no_node_where_one_is_required():
+    watch = EstopWatch(required=True)
+    watch.hear(True, 0)
+    watch.release(1)
+    assert "none is heard" in watch.reason(2)
+    watch.hear(False, 3)
+    assert watch.reason(4) == ""
+
+
+def test_a_press_right_after_a_reset_holds():
+    watch = EstopWatch(required=False)
+    watch.hear(True, 0)
+    watch.release(1)
+    watch.hear(True, 2)
+    watch.hear(False, 3)
+    assert "pressed" in watch.reason(4)
 
 
 def test_silence_beyond_the_timeout_stops_also_where_none_was_required():
@@ -37,6 +66,30 @@ def test_silence_beyond_the_timeout_stops_also_where_none_was_required():
     watch.hear(False, 0)
     assert watch.reason(TIMEOUT_NS) == ""
     assert "silent for" in watch.reason(TIMEOUT_NS + MS)
+
+
+def test_a_reset_does_not_end_the_silence_that_follows_it():
+    watch = EstopWatch(required=False)
+    watch.hear(False, 0)
+    watch.hear(True, 100 * MS)
+    watch.release(200 * MS)
+    assert watch.reason(200 * MS) == ""
+    assert "silent for" in watch.reason(701 * MS)
+
+
+def test_a_reset_without_a_node_ends_the_silence_of_one_that_is_gone():
+    watch = EstopWatch(required=False)
+    watch.hear(False, 0)
+    assert "silent for" in watch.reason(600 * MS)
+    watch.release(600 * MS)
+    assert watch.reason(5000 * MS) == ""
+
+
+def test_a_reset_without_a_node_does_not_do_where_one_is_required():
+    watch = EstopWatch(required=True)
+    watch.hear(False, 0)
+    watch.release(600 * MS)
+    assert "none is heard" in watch.reason(600 * MS)
 
 
 def test_of_two_buttons_the_pressed_one_counts():
@@ -47,18 +100,15 @@ def test_of_two_buttons_the_pressed_one_counts():
         assert watch.reason((t + 20) * MS)
 
 
-def test_a_press_outlives_its_button_until_a_reset_which_begins_with_another_press():
+def test_a_press_outlives_its_node_until_a_reset():
     watch = EstopWatch(required=False)
-    watch.hear(True, 0)
-    assert "silent" in watch.reason(3000 * MS)
-    for t in range(3000, 6000, 100):  # started anew, it knows nothing
+    watch.hear(False, 0)
+    watch.hear(True, 100 * MS)
+    for t in range(3000, 6000, 100):  # started again, the node does not know of the press
         watch.hear(False, t * MS)
         assert "Reset it" in watch.reason(t * MS)
-    watch.hear(True, 6000 * MS)
-    watch.hear(False, 6100 * MS)
-    assert watch.reason(6100 * MS)
-    watch.hear(False, 6600 * MS)
-    assert watch.reason(6600 * MS) == ""
+    watch.release(6000 * MS)
+    assert watch.reason(6000 * MS) == ""
 
 
 def test_a_button_that_was_silent_for_a_while_but_not_pressed_is_believed_again():
@@ -103,29 +153,34 @@ def test_one_quiet_source_does_not_hide_another_that_is_not():
 
 
 @given(
-    st.lists(st.tuples(st.booleans(), st.integers(1, 400)), min_size=1, max_size=40),
+    st.lists(st.tuples(st.sampled_from(("press", "false", "reset")), st.integers(1, 400)), min_size=1, max_size=40),
     st.integers(0, 2000),
 )
 @hypothesis_settings(max_examples=100, deadline=None)
-def test_nothing_moves_within_the_timeout_after_a_press_whatever_else_is_said(messages, later_ms):
-    watch, now, last_press = EstopWatch(required=False), 0, None
-    for pressed, gap_ms in messages:
+def test_nothing_moves_after_a_press_before_a_reset_whatever_else_is_said(messages, later_ms):
+    watch, now, pressed = EstopWatch(required=False), 0, False
+    for said, gap_ms in messages:
         now += gap_ms * MS
-        watch.hear(pressed, now)
-        last_press = now if pressed else last_press
+        if said == "reset":
+            watch.release(now)
+            pressed = False
+        else:
+            watch.hear(said == "press", now)
+            pressed = pressed or said == "press"
     now += later_ms * MS
     moves = watch.reason(now) == ""
-    if moves and last_press is not None:
-        assert now - last_press > TIMEOUT_NS
+    assert not (moves and pressed)
     if later_ms * MS > TIMEOUT_NS:
-        assert not moves
+        assert not (moves and watch.heard)
 
 
-@pytest.mark.parametrize("required", [True, False])
-def test_it_tells_whether_it_ever_allowed_anything(required):
-    watch = EstopWatch(required=required)
+def test_it_tells_whether_it_ever_allowed_anything():
+    watch = EstopWatch(required=True)
     watch.hear(True, 0)
     assert not watch.was_released
-    watch.hear(False, TIMEOUT_NS)
-    watch.hear(False, TIMEOUT_NS + 1)
+    watch.hear(False, 1)
+    assert not watch.was_released
+    watch.release(2)
+    watch.hear(False, 3)
     assert watch.was_released
+    assert EstopWatch(required=False).was_released

@@ -16,9 +16,10 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from fulmar_bringup.reset_robots import release_without_node, robots_to_reset
 from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, spaces_with, stop_robots
 from fulmar_core.errors import RunFailed
-from fulmar_core.topics import STATUS, SWAP
+from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP
 from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
@@ -87,6 +88,17 @@ class Operator:
     def stop_all(self, robot: str | None) -> list[Stopped]:
         """Stop every robot, or one; see `stop_robots`."""
         return stop_robots(self._node, robot, find_s=FIND_S)
+
+    def reset_all(self, robot: str | None) -> dict[str, Answer]:
+        """Reset the e-stop of every robot, or of one, by namespace; see `reset_robots`."""
+        with_node, without = robots_to_reset(self._node, robot, find_s=FIND_S)
+        services = {space: f"{space}/{ESTOP_RESET}" for space in sorted(with_node)}
+        said = self.ask_all(list(services.values()))
+        came = {
+            space: said[name] or (False, "its e-stop node does not answer")
+            for space, name in services.items()
+        }
+        return came | {space: release_without_node(self._node, space) for space in sorted(without)}
 
     def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
         """Ask a controller to go on with another policy.

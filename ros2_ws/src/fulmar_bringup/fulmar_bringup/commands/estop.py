@@ -26,9 +26,9 @@ def estop(
 ) -> None:
     """Press the emergency stop of every robot in this ROS domain: actuators go to their safe state, at once.
 
-    A robot whose e-stop node hangs, or that runs without one, is stopped too, and stays so until one is started and
-    reset. After a reset controllers wait for a new goal. Exit code 1 if a robot could not be stopped, or a reset was
-    refused.
+    A robot whose e-stop node hangs, or that runs without one, is stopped too. Every press holds until a reset, which a
+    robot without an e-stop node takes as well. After a reset controllers wait for a new goal. Exit code 1 if a robot
+    could not be stopped, or a reset was refused.
 
     Try:
 
@@ -36,20 +36,11 @@ def estop(
 
     fulmar estop floating_platform --reset
     """
-    from fulmar_bringup.robot_operator import FIND_S, operator
-    from fulmar_core.topics import ESTOP_RESET
+    from fulmar_bringup.robot_operator import operator
 
     with operator() as person:
         if reset:
-            asked = {
-                space: f"{space}/{ESTOP_RESET}"
-                for space in person.robots_with(ESTOP_RESET, robot, wait_s=FIND_S)
-            }
-            said = person.ask_all(list(asked.values()))
-            came = {
-                space: said[name] or (False, "its e-stop node does not answer")
-                for space, name in asked.items()
-            }
+            came = person.reset_all(robot)
         else:
             came = {one.space: one.answer or _unanswered(one) for one in person.stop_all(robot)}
     answers = [
@@ -58,11 +49,8 @@ def estop(
     if not answers:
         whom = f"'{robot}'" if robot else "any robot"
         raise RunFailed(
-            f"no e-stop of {whom} is heard in this ROS domain. Check ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE, "
-            "or cut the power."
-            if not reset
-            else f"no e-stop node of {whom} is heard in this ROS domain. Start one: "
-            "python -m fulmar_ros.estop_node --ros-args -r __ns:=/ROBOT -p robot:=ROBOT"
+            f"no plant and no e-stop node of {whom} is found in this ROS domain. Check ROS_DOMAIN_ID and "
+            "ROS_AUTOMATIC_DISCOVERY_RANGE" + (", or cut the power." if not reset else ".")
         )
     if as_json:
         print_json({"robots": answers})
@@ -78,6 +66,6 @@ def _unanswered(robot: Stopped) -> tuple[bool, str]:
     if robot.heard:
         return (
             True,
-            "stopped on the wire, since no e-stop node answers: it stays so until one is started and reset",
+            "stopped on the wire, since no e-stop node answers: it stays so until `fulmar estop --reset`",
         )
     return False, "no e-stop node answers, and nobody hears the wire: cut the power"
