@@ -22,6 +22,7 @@ from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.topics import (
     COMMAND,
     ESTOP,
+    ESTOP_RELEASED,
     GOAL_POSE,
     IMU,
     ODOMETRY,
@@ -174,7 +175,9 @@ def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
 ) -> None:
     """What a deployed controller may know."""
     heard = {subscription.topic_name for subscription in controller.subscriptions}
-    assert heard == {f"{NAMESPACE}/{wire.name}" for wire in (ODOMETRY, GOAL_POSE, ESTOP, SWAP)}
+    assert heard == {
+        f"{NAMESPACE}/{wire.name}" for wire in (ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP)
+    }
     assert f"{NAMESPACE}/{TRUTH.name}" not in heard
     assert {STATUS.name, IMU.name}.isdisjoint(heard)
 

@@ -12,15 +12,16 @@ import rclpy
 from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import goal_at
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ESTOP, GOAL_POSE
+from fulmar_core.topics import ESTOP, ESTOP_RELEASED, GOAL_POSE
 from fulmar_ros.controller_node import ControllerNode
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import spinning
 from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
@@ -137,7 +138,7 @@ def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_told_aga
     button.pressed = None
     until(lambda: overseer.controller.values["goal_stamp_ns"] == "0")
     button.pressed = False
-    other.create_subscription(PoseStamped, GOAL_POSE.name, lambda _: None, subscriber_qos(GOAL_POSE))
+    subscribe_operator(other, PoseStamped, GOAL_POSE, lambda _: None)
     giving.join()
     assert not failures
     assert overseer.controller.values["goal_stamp_ns"] == "5"
@@ -146,34 +147,19 @@ def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_told_aga
 def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_told_again_by_itself(
     operated: tuple[Supervisor, Button, Node],
 ) -> None:
-    overseer, button, _ = operated
+    overseer, button, other = operated
     button.pressed = True
     until(lambda: "e-stop: pressed" in reason(overseer))
     failures: list[Exception] = []
     giving = give(overseer, failures)
-    until(lambda: overseer.controller.values.get("goal_refused") == "e-stop: pressed")
+    until(lambda: overseer.controller.values.get("goal_refused", "").startswith("e-stop: pressed"))
     button.pressed = False
+    released = other.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
+    until(lambda: released.get_subscription_count() > 0)
+    time.sleep(0.1)
+    assert "e-stop: pressed" in reason(overseer)  # the node, started again, says "released"
+    released.publish(String())
     until(lambda: "no odom yet" in reason(overseer))
     giving.join()
     assert failures
-    assert overseer.controller.values["goal_stamp_ns"] == "0"
-
-
-def test_a_press_that_silence_hid_ends_the_giving_and_a_reset_moves_nothing(
-    operated: tuple[Supervisor, Button, Node],
-) -> None:
-    overseer, button, _ = operated
-    for pressed, words in ((True, "e-stop: pressed"), (None, "e-stop: silent")):
-        button.pressed = pressed
-        until(lambda words=words: words in reason(overseer))
-    failures: list[Exception] = []
-    giving = give(overseer, failures)
-    until(lambda: "e-stop: silent" in overseer.controller.values.get("goal_refused", ""))
-    button.pressed = False  # started anew, it knows nothing of the press
-    giving.join()
-    assert "it was pressed when it fell silent" in str(failures[0])
-    button.pressed = True  # a reset says so first
-    until(lambda: "e-stop: pressed" in reason(overseer))
-    button.pressed = False
-    until(lambda: "no odom yet" in reason(overseer))
     assert overseer.controller.values["goal_stamp_ns"] == "0"

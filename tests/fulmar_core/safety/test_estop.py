@@ -153,7 +153,9 @@ def test_one_quiet_source_does_not_hide_another_that_is_not():
 
 
 @given(
-    st.lists(st.tuples(st.sampled_from(("press", "false", "reset")), st.integers(1, 400)), min_size=1, max_size=40),
+    st.lists(
+        st.tuples(st.sampled_from(("press", "false", "reset")), st.integers(1, 400)), min_size=1, max_size=40
+    ),
     st.integers(0, 2000),
 )
 @hypothesis_settings(max_examples=100, deadline=None)

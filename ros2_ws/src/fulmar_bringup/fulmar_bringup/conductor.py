@@ -37,6 +37,7 @@ from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.estop import HOLDS
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from hardware_drivers.settings import load_hardware
@@ -165,7 +166,7 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
             )
         overseer.start_plant(starting, lambda: group.last_words("plant"))
         with time_bar("running", plan.duration_s) as moved:
-            _wait_for_end(plan, overseer, group, moved)
+            _wait_for_end(plan, overseer, group, moved, end_on_estop=request.end_on_estop)
     except RunFailed as error:
         time.sleep(LAST_WORDS_S)
         return _with_plant_reaction(str(error), overseer)
@@ -173,16 +174,26 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
 
 
 def _wait_for_end(
-    plan: RunPlan, overseer: Supervisor, group: ProcessGroup, moved: Callable[[float], None]
+    plan: RunPlan,
+    overseer: Supervisor,
+    group: ProcessGroup,
+    moved: Callable[[float], None],
+    *,
+    end_on_estop: bool,
 ) -> None:
+    """Watch a run until its time is over; an e-stop holds the robot meanwhile, and ends the run only if asked to."""
     began = time.monotonic()
     plant_limit_s, controller_limit_s = _silence_limits_s(plan)
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
 
+    def failed() -> bool:
+        held = overseer.plant.message.startswith(HOLDS) and not end_on_estop
+        return overseer.plant.level == "error" and not held
+
     def running() -> None:
         raise_if_ended(group)
         moved(_passed_s(plan, overseer.plant))
-        if overseer.plant.level == "error":
+        if failed():
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":
             raise RunFailed(f"controller: {overseer.controller.message}")
@@ -192,7 +203,7 @@ def _wait_for_end(
             raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
 
     def finished() -> bool:
-        return overseer.plant.values.get("mode") == "finished" or overseer.plant.level == "error"
+        return overseer.plant.values.get("mode") == "finished" or failed()
 
     overseer.wait_until(finished, running)
     running()

@@ -43,7 +43,7 @@ class Finding:
 def diagnose() -> list[Finding]:
     """Run every check."""
     findings = [_python(), *(_part(module, extra) for module, extra in PARTS.items())]
-    checks: tuple[Callable[[], Finding], ...] = (_configs, _policies, _ros_round_trip, _timing, _disk)
+    checks: tuple[Callable[[], Finding], ...] = (_configs, _policies, _ros_round_trip, _wires, _timing, _disk)
     return findings + [check() for check in checks]
 
 
@@ -110,6 +110,24 @@ def _ros_round_trip() -> Finding:
         return Finding("ROS 2 publish and receive", False, "no message came back within 5 s", _ROS_ADVICE)
     domain = os.environ.get("ROS_DOMAIN_ID", "0")
     return Finding("ROS 2 publish and receive", True, f"{best:.2f} ms (median) in domain {domain}")
+
+
+def _wires() -> Finding:
+    """Whether what is published for the robots of this domain can reach them."""
+    try:
+        from fulmar_bringup.robot_operator import operator
+
+        with operator() as person:
+            robots, unfit = person.look_at_wires()
+    except Exception as error:  # noqa: BLE001 - whatever keeps ROS from working is the finding
+        return Finding("running robots", False, f"{type(error).__name__}: {error}", _ROS_ADVICE)
+    names = ", ".join(sorted(space.strip("/") for space in robots)) or "none in this domain"
+    return Finding(
+        "running robots",
+        not unfit,
+        "; ".join(unfit) or names,
+        "Give that publisher the type of the wire, and reliable quality of service: README, 'The wires'.",
+    )
 
 
 _ROS_ADVICE = "Is loopback up and /dev/shm writable, and not full? Try another ROS_DOMAIN_ID."

@@ -55,6 +55,7 @@ class RunRequest:
     record: Path  # folder of the bag; must not exist
     command: str  # command line, for the record
     mission: Goal = field(compare=False)  # everything that the task is about; `goal` is a part of it
+    end_on_estop: bool = False  # the run ends, and fails, when an e-stop stops the robot
 
 
 def plan_run(

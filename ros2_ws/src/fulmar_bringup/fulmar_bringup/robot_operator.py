@@ -17,6 +17,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from fulmar_bringup.reset_robots import release_without_node, robots_to_reset
+from fulmar_bringup.running_robots import running_robots, unfit_publishers
 from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, spaces_with, stop_robots
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP
@@ -99,6 +100,11 @@ class Operator:
             for space, name in services.items()
         }
         return came | {space: release_without_node(self._node, space) for space in sorted(without)}
+
+    def look_at_wires(self) -> tuple[set[str], list[str]]:
+        """Namespaces of the robots that run here, and publishers on their wires from which nothing arrives."""
+        spaces = running_robots(self._node)
+        return spaces, unfit_publishers(self._node, spaces)
 
     def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
         """Ask a controller to go on with another policy.

@@ -9,6 +9,8 @@ import numpy as np
 
 from fulmar_bringup.run_judgement import Judgement, judge
 from fulmar_bringup.run_record import HealthSample, RunRecord
+from fulmar_core.safety.estop import HOLDS
+from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 
 ASKED = ("robot", "task", "controller", "backend", "seed")
 PERCENTILES = ("p50", "p99", "max")
@@ -56,8 +58,32 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "overruns": _total(plant, controller, "overruns"),
         "watchdog_trips": _total(plant, None, "watchdog_trips"),
         "actuator_use": _use(judgement),
+        "estop_pressed": estop_pressed(record),
+        "warnings": warnings_of(record),
         "bag": str(record.path),
     }
+
+
+def estop_pressed(record: RunRecord) -> bool:
+    """Whether a press of the e-stop stopped the robot while the plant ran."""
+    return any(_stopped_by(sample, f"{HOLDS} pressed") for sample in record.health)
+
+
+def warnings_of(record: RunRecord) -> list[str]:
+    """What a reader of the result should know, each once: a press of the e-stop, and wires that do not fit."""
+    found = dict.fromkeys(
+        warning
+        for sample in record.health
+        for warning in sample.values.get(WIRE_WARNINGS, "").split(BETWEEN)
+        if warning
+    )
+    pressed = ["the e-stop was pressed and held the robot until a reset"] if estop_pressed(record) else []
+    return [*pressed, *found]
+
+
+def _stopped_by(sample: HealthSample, reason: str) -> bool:
+    running = sample.name.endswith(": plant") and sample.values.get("mode") == "running"
+    return running and sample.message.startswith(reason)
 
 
 def latencies_ms(record: RunRecord) -> np.ndarray:

@@ -38,6 +38,7 @@ from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
 from fulmar_ros.standby import Standby
+from fulmar_ros.wire_watch import WireWatch
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 SAFE_REPEATS = 5
@@ -120,6 +121,7 @@ class ControllerNode(LifecycleNode):
             lockstep=self.settings.lockstep,
         )
         self.wires.publish_metadata(self._succession.current.metadata)
+        self._wire_watch = WireWatch(self, self.wires.subscribed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._tell_idle_status)
         self.inputs.set(configured=True, latched_fault="")
@@ -366,6 +368,7 @@ class ControllerNode(LifecycleNode):
 
     def _tell_idle_status(self) -> None:
         """Where no control step does it."""
+        self._status.wire_problems = self._wire_watch.look()
         if self.settings.lockstep or not self.inputs.flags.activated or self.inputs.flags.latched_fault:
             self._tell_status(self.inputs.decide())
 

@@ -6,6 +6,7 @@ import time
 
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.succession import Succession
+from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.controller_inputs import Refusal
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.health import Health
@@ -22,6 +23,7 @@ class ControllerStatus:
     Attributes:
         steps: Control steps so far.
         inference_ms: Time that the controller took to act.
+        wire_problems: Publishers from which nothing arrives, in words.
     """
 
     def __init__(self, mission: Mission, swap: PolicySwap, *, goals_streamed: bool) -> None:
@@ -29,6 +31,7 @@ class ControllerStatus:
         self._mission, self._swap, self._goals_streamed = mission, swap, goals_streamed
         self.steps = 0
         self.inference_ms = Spread()
+        self.wire_problems: list[str] = []
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
 
@@ -69,13 +72,14 @@ class ControllerStatus:
             standby.sha256,
             succession.fell_back,
             self._swap.said,
+            *self.wire_problems,
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < PERIOD_S:
             return
         self._said, self._said_at = changed, now
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
-        level = "warn" if level == "ok" and succession.fell_back else level
+        level = "warn" if level == "ok" and (succession.fell_back or self.wire_problems) else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
         values = {
             "mode": decision.mode.value,
@@ -90,6 +94,7 @@ class ControllerStatus:
             "goal_refused": refusal.reason,
             "goal_refused_stamp_ns": str(refusal.stamp_ns),
             "goals_done": str(mission.done),
+            WIRE_WARNINGS: BETWEEN.join(self.wire_problems),
             "steps": str(self.steps),
             "observation_age_ms": f"{age_ms:.1f}",
             "control_rate_hz": f"{deadlines.rate_hz:.4f}",
@@ -98,4 +103,5 @@ class ControllerStatus:
             **self.inference_ms.percentiles("inference_ms"),
             **deadlines.period_error_ms.percentiles("period_error_ms"),
         }
-        health.publish(level, decision.reason or decision.mode.value, values)
+        message = decision.reason or BETWEEN.join(self.wire_problems) or decision.mode.value
+        health.publish(level, message, values)

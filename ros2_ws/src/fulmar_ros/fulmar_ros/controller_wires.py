@@ -122,8 +122,11 @@ class ControllerWires:
         ]
         for goal in goal_wires(task.goal_topic):
             self._subscriptions += subscribe_operator(node, TYPES[goal.name], goal, on_goal)
+        reliably = [ESTOP, ESTOP_RELEASED, SWAP, *goal_wires(task.goal_topic)]
         if sees_obstacles(task):
             self._subscriptions += subscribe_operator(node, MarkerArray, OBSTACLES, on_obstacles)
+            reliably.append(OBSTACLES)
+        self.subscribed = {ODOMETRY: lockstep, **dict.fromkeys(reliably, True)}  # and whether reliably
         if isinstance(task, PushBlock):
             self._subscriptions.append(
                 node.create_subscription(

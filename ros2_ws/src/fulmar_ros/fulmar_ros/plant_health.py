@@ -10,6 +10,7 @@ from rclpy.lifecycle import LifecycleNode
 
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.topics import DIAGNOSTICS
+from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.health import Health
 from fulmar_ros.lockstep_loop import LockstepLoop
 from fulmar_ros.plant_wires import PlantWires
@@ -17,6 +18,7 @@ from fulmar_ros.qos import publisher_qos
 from fulmar_ros.realtime_loop import RealtimeLoop
 from fulmar_ros.simulated_time import SimulatedTime
 from fulmar_ros.wall_time import WallTime
+from fulmar_ros.wire_watch import WireWatch
 
 LOOK_S = 0.1  # how soon a change is noticed
 AT_LEAST_S = 1.0  # how often it is said without a change
@@ -46,6 +48,7 @@ class PlantHealth:
         """Begin to publish."""
         self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._health = Health(f"{self._robot}: plant", [self._publisher])
+        self._wire_watch = WireWatch(node, self._wires.subscribed)
         self._timer = node.create_timer(LOOK_S, self.tell)
 
     def close(self, node: LifecycleNode) -> None:
@@ -69,7 +72,8 @@ class PlantHealth:
         """Publish when something changed, and now and then."""
         level, message, key = self._verdict()
         more = self.more()
-        warning = more.get("warning", "")
+        unfit = BETWEEN.join(self._wire_watch.look())
+        warning = more.get("warning", "") or unfit
         if warning and level == "ok":
             level, message = "warn", warning
         changed = (self.mode, self.reason, key, warning, self._guard.watchdog.trips, self._guard.rejected)
@@ -77,7 +81,7 @@ class PlantHealth:
         if changed == self._said and now - self._said_at < AT_LEAST_S:
             return
         self._said, self._said_at = changed, now
-        self._health.publish(level, message, self._values() | more)
+        self._health.publish(level, message, self._values() | {WIRE_WARNINGS: unfit} | more)
 
     def _verdict(self) -> tuple[str, str, str]:
         """Level, message, and what of the message counts as a change."""

@@ -125,6 +125,13 @@ class PlantWires:
         if not lockstep:
             teleop = subscriber_qos(TELEOP, reliable=True)
             self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, teleop))
+        # What it subscribes, and whether reliably.
+        self.subscribed = {
+            wire: lockstep,
+            ESTOP: True,
+            ESTOP_RELEASED: True,
+            **({} if lockstep else {TELEOP: True}),
+        }
         self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
 
     def destroy(self, node: LifecycleNode) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -98,6 +99,13 @@ def run(
     estop: Annotated[
         bool,
         typer.Option("--estop", help="Run an e-stop node; nothing moves without it. See `fulmar estop`."),
+    ] = False,
+    end_on_estop: Annotated[
+        bool,
+        typer.Option(
+            "--end-on-estop",
+            help="An e-stop ends the run, which then failed; by default the robot waits for a reset and a new goal.",
+        ),
     ] = False,
     fallback: Annotated[
         str | None,
@@ -204,7 +212,7 @@ def run(
     require(  # the nodes would fail for want of them one by one
         *modules_of(controller, backend, guards=plan.guards, hardware=plan.hardware, emulated=emulate)
     )
-    outcome = conduct(request)
+    outcome = conduct(replace(request, end_on_estop=end_on_estop))
     if as_json:
         print_json(outcome.summary)
     else:
@@ -275,6 +283,7 @@ def verdict(summary: dict[str, Any]) -> str:
             f"  {summary['steps']} commands, latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms; "
             f"{summary['overruns']} overruns, {summary['watchdog_trips']} watchdog trips"
         )
+    lines += [f"  warning: {warning}" for warning in summary["warnings"]]
     if summary["bag"] is None:
         lines.append("  nothing was recorded")
     else:
