@@ -23,6 +23,8 @@ from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_HEALTH,
+    ACTUATORS_STATE,
+    AIR_BEARING,
     BLOCK,
     DIAGNOSTICS,
     ESTOP,
@@ -42,6 +44,7 @@ from fulmar_ros.health import Health
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
+APPLIED_DEPTH = 50  # states of the actuators that may wait while this process does something else
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 
 
@@ -61,6 +64,8 @@ class ControllerWires:
         on_block: Callable[[PoseStamped], None],
         on_estop: Callable[[Bool], None],
         on_swap: Callable[[String], None],
+        on_applied: Callable[[JointState], None],
+        on_bearing: Callable[[Bool], None] | None,
         lockstep: bool,
     ) -> None:
         """Create every endpoint.
@@ -76,6 +81,8 @@ class ControllerWires:
             on_block: Told where the block is.
             on_estop: Told whether the e-stop is pressed.
             on_swap: Told which policy shall go on.
+            on_applied: Receives what the actuators do, of robots whose actuators can be watched.
+            on_bearing: Receives whether the air bearing is on; None where there is none.
             lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag
                 behind.
         """
@@ -110,7 +117,19 @@ class ControllerWires:
         self._write_observation = VectorWriter(controller.observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
         goal = GOAL_WIRES[task.goal_topic]
-        self._subscriptions = [
+        self._node = node
+        self._subscriptions = []
+        # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
+        if on_bearing is not None:
+            self._subscriptions.append(
+                node.create_subscription(Bool, AIR_BEARING.name, on_bearing, subscriber_qos(AIR_BEARING))
+            )
+        if can_be_watched(robot):
+            applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
+            self._subscriptions.append(
+                node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied)
+            )
+        self._subscriptions += [
             node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
             node.create_subscription(TYPES[goal.name], goal.name, on_goal, subscriber_qos(goal)),
             node.create_subscription(Bool, ESTOP.name, on_estop, subscriber_qos(ESTOP)),
@@ -133,6 +152,10 @@ class ControllerWires:
     def subscribers(self) -> int:
         """Matched subscriptions of the command."""
         return int(self._command.get_subscription_count())
+
+    def state_published(self) -> bool:
+        """Whether a plant publishes what its actuators do."""
+        return bool(self._node.count_publishers(ACTUATORS_STATE.name))
 
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""

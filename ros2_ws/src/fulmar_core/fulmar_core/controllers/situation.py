@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulmar_core.controllers.seen import Reader, Vector
+from fulmar_core.health.applied import Applied
 from fulmar_core.health.suspicion import Suspicion
-from fulmar_core.health.thruster_health import ThrusterHealth
+from fulmar_core.health.thruster_health import Health, ThrusterHealth
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.robot import Robot
 
@@ -57,14 +58,16 @@ class Watch:
         place = suspicion.position if self._sees_pose else UNSEEN
         heading = suspicion.heading if self._sees_pose else UNSEEN
         self._estimator = ThrusterHealth(robot, replace(suspicion, position=place, heading=heading))
-        self._closed = robot.actuators.safe_command
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
         self._estimator.reset()
-        self._heading: np.ndarray | None = None  # expected at the next observation
-        self._command: np.ndarray | None = None
+        self._heading: np.ndarray | None = None  # at the last observation
+        self._rate: np.ndarray = np.zeros(())  # turn rate, same
+        self._applied: np.ndarray | Applied | None = None  # since the last observation
+        self._passed_s = self._dt  # since then
+        self.health: Health | None = None  # what is believed, in the world of this class
 
     def look(self, observation: np.ndarray) -> Situation:
         """Take an observation, shape (n,) or (rows, n); another number of rows than before begins anew."""
@@ -73,16 +76,14 @@ class Watch:
             self.reset()
         raw = raw_situation(reader, observation)
         u, v, r = raw.motion
-        yaw = -raw.turn if self._sees_pose or self._heading is None else self._heading
+        yaw = -raw.turn
+        if not self._sees_pose and self._heading is not None:
+            yaw = self._heading + self._passed_s * self._rate
         (x, y), (vx, vy) = _turned(yaw, (-raw.goal[0], -raw.goal[1]), (u, v))
-        command = (
-            self._command
-            if self._command is not None
-            else np.broadcast_to(self._closed, (*shape, len(self._closed)))
-        )
-        health = self._estimator.see(PlanarState(x, y, yaw, vx, vy, r), command, self._dt)
+        health = self._estimator.see(PlanarState(x, y, yaw, vx, vy, r), self._applied, self._passed_s)
+        self.health = health
         x, y, yaw, vx, vy, r = (health.motion[..., i] for i in range(6))
-        self._heading = yaw + self._dt * r
+        self._heading, self._rate = yaw, r
         force = (health.push[..., 0], health.push[..., 1])
         goal, velocity, force = _turned(-yaw, (-x, -y), (vx, vy), force)
         turn = np.asarray(wrapped(-yaw))
@@ -93,8 +94,12 @@ class Watch:
         return Situation(goal, turn, (*velocity, r), push, health.alive)
 
     def acts(self, command: np.ndarray) -> None:
-        """Hear what is commanded until the next observation, shape (..., n)."""
-        self._command = command
+        """Take a command for what is applied until the next observation, unless `see_applied` corrects it, (..., n)."""
+        self._applied, self._passed_s = command, self._dt
+
+    def see_applied(self, applied: Applied | None) -> None:
+        """Take what was applied since the last observation of one robot; None where that is not known."""
+        self._applied, self._passed_s = applied, applied.duration_s if applied else self._dt
 
 
 def _turned(angle: np.ndarray, *vectors: Vector) -> list[Vector]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.errors import ConfigError
+from fulmar_core.health.applied import Applied
 from fulmar_core.health.push_filter import PushFilter
 from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.planar import COLUMNS, PlanarState
@@ -77,25 +78,25 @@ class ThrusterHealth:
         self._chance = self._prior
         self._count = 0
 
-    def see(self, measured: PlanarState, command: np.ndarray, dt: float) -> Health:
+    def see(self, measured: PlanarState, applied: np.ndarray | Applied | None, dt: float) -> Health:
         """Take a measurement.
 
         Args:
-            measured: Odometry now, shapes (...,).
-            command: What was commanded since the last measurement, shape (..., n); another shape begins anew.
+            measured: Odometry now, shapes (...,); another shape than before begins anew.
+            applied: What the valves did since the last measurement: one command, shape (..., n), or several of one
+                robot. None where that is not known: then nothing is learned of valves and push.
             dt: How long that was, a multiple of the physics step [s].
 
         Returns:
             What is believed now.
         """
-        command = np.asarray(command, dtype=float)
-        seen = np.empty((*command.shape[:-1], 6))
-        for i, name in enumerate(COLUMNS):
-            seen[..., i] = getattr(measured, name)
+        seen = np.stack([np.asarray(getattr(measured, name), dtype=float) for name in COLUMNS], axis=-1)
         if self._state is None or self._state.shape[:-2] != seen.shape[:-1]:
             self._begin(seen)
+        elif applied is None:
+            self._restart_motion(seen)
         else:
-            self._follow(seen, command, dt)
+            self._follow(seen, applied, dt)
         return self._believed()
 
     def _begin(self, seen: np.ndarray) -> None:
@@ -105,11 +106,19 @@ class ThrusterHealth:
         self._yaw = seen[..., 2].copy()
         self._count = 0
 
-    def _follow(self, seen: np.ndarray, command: np.ndarray, dt: float) -> None:
+    def _restart_motion(self, seen: np.ndarray) -> None:
+        """Go on from the measurement with what is believed of valves and push: what moved the body is not known."""
+        assert self._state is not None
+        self._state = self._state.copy()
+        self._state[..., :6] = seen[..., None, :]
+        self._yaw = seen[..., 2].copy()
+        self._count = 0
+
+    def _follow(self, seen: np.ndarray, applied: np.ndarray | Applied, dt: float) -> None:
         assert self._state is not None
         equations = self._equations(dt)
         turned = self._turn(seen[..., 2]) @ equations.driven
-        ahead = self._state @ equations.step + self._wrenches(command) @ turned
+        ahead = self._state @ equations.step + self._driven(applied, turned)
         off = seen[..., None, :] - ahead[..., :6]
         off[..., 2] = _wrapped(off[..., 2])
         found = off @ equations.gain(self._count)
@@ -122,6 +131,28 @@ class ThrusterHealth:
         change = self._suspicion.change * dt
         chance *= (1.0 - change) / chance.sum(axis=-1, keepdims=True)
         self._chance = chance + change * self._prior
+
+    def _driven(self, applied: np.ndarray | Applied, turned: np.ndarray) -> np.ndarray:
+        """What the valves add to the state within the interval under each hypothesis, shape (..., hypotheses, 9).
+
+        Args:
+            applied: As in `see`.
+            turned: What a wrench in the body's frame does that holds for the whole interval, shape (..., 3, 9).
+        """
+        if not isinstance(applied, Applied):
+            return np.asarray(self._wrenches(np.asarray(applied, dtype=float)) @ turned)
+        if len(applied.seconds) == 1:
+            return np.asarray(self._wrenches(applied.commands[0]) @ turned)
+        seconds, tick = applied.seconds, self._robot.timing.physics_dt
+        whole = float(seconds.sum())
+        # An early push moves the body farther than a late one: it has the rest of the interval to do so.
+        rest = whole - np.cumsum(seconds)
+        place = seconds * (2.0 * rest + seconds + tick) / (whole * (whole + tick))
+        speed = seconds / whole
+        wrenches = np.stack([self._wrenches(command) for command in applied.commands])
+        driven = np.tensordot(speed, wrenches, 1) @ turned
+        driven[..., :3] = np.tensordot(place, wrenches, 1) @ turned[..., :3]
+        return np.asarray(driven)
 
     def _wrenches(self, command: np.ndarray) -> np.ndarray:
         """Force ahead, to the left and yaw moment of the valves under each hypothesis, shape (..., hypotheses, 3)."""
