@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -64,14 +64,15 @@ class AppliedHistory:
             kept_ns: Forget what is older than the newest by more [ns].
         """
         self._hold_ns, self._kept_ns = hold_ns, kept_ns
-        self._states: deque[tuple[int, np.ndarray]] = deque()
+        self._stamps: list[int] = []
+        self._commands: list[np.ndarray] = []
         self._lock = threading.Lock()
 
     @property
     def newest_ns(self) -> int:
         """Stamp of the newest state; -1 without any [ns]."""
         with self._lock:
-            return self._states[-1][0] if self._states else -1
+            return self._stamps[-1] if self._stamps else -1
 
     def add(self, stamp_ns: int, command: np.ndarray) -> None:
         """Take a state that holds from its stamp on; one that is older than the newest begins anew.
@@ -81,11 +82,12 @@ class AppliedHistory:
             command: Shape (n,).
         """
         with self._lock:
-            if self._states and stamp_ns < self._states[-1][0]:
-                self._states.clear()
-            self._states.append((stamp_ns, command))
-            while stamp_ns - self._states[0][0] > self._kept_ns:
-                self._states.popleft()
+            old = len(self._stamps)
+            if not old or stamp_ns >= self._stamps[-1]:
+                old = bisect_left(self._stamps, stamp_ns - self._kept_ns)
+            del self._stamps[:old], self._commands[:old]
+            self._stamps.append(stamp_ns)
+            self._commands.append(command)
 
     def between(self, begin_ns: int, end_ns: int) -> Applied | None:
         """What was applied in an interval.
@@ -100,14 +102,13 @@ class AppliedHistory:
         if end_ns <= begin_ns:
             return None
         with self._lock:
-            states = [state for state in self._states if state[0] < end_ns]
-        first = next((i for i in reversed(range(len(states))) if states[i][0] <= begin_ns), None)
-        if first is None:
-            return None
+            first, last = bisect_right(self._stamps, begin_ns) - 1, bisect_left(self._stamps, end_ns)
+            if first < 0:
+                return None
+            stamps, states = self._stamps[first:last], self._commands[first:last]
         commands: list[np.ndarray] = []
         lengths: list[int] = []
-        ends = [stamp for stamp, _ in states[first + 1 :]] + [end_ns]
-        for (stamp, command), until in zip(states[first:], ends, strict=True):
+        for stamp, command, until in zip(stamps, states, [*stamps[1:], end_ns], strict=True):
             if until - stamp > self._hold_ns:
                 return None
             length = until - max(stamp, begin_ns)
