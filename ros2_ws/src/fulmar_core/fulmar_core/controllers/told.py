@@ -40,7 +40,8 @@ class Told:
         """Build the estimator; rate of the observations in Hz."""
         self._task, reader = task, Reader(robot, task)
         self._estimates_pose = reader.heads and not (reader.tracks or reader.passes)
-        self._watch = Watch(robot, reader, Suspicion(), 1.0 / control_hz)
+        # Networks were trained on an estimator that takes no body for held.
+        self._watch = Watch(robot, reader, Suspicion(held=0.0), 1.0 / control_hz)
 
     def reset(self) -> None:
         """Forget everything."""

@@ -21,11 +21,16 @@ class Suspicion:
     drift_torque: float = 0.003  # same [N·m]
     failure: float = 0.02  # chance that an actuator is lost, before anything is seen [-]
     change: float = 1e-3  # chance that what is lost changes, in one second [-]
+    # Evidence that the body is held rather than its valves dead, as log-likelihood; two dead valves are 8, and a hold is
+    # rarer than they are. 0: nothing is looked for [-].
+    held: float = 12.0
     surprise: float = 16.0  # largest weight of one measurement against a hypothesis, as log-likelihood [-]
 
     def __post_init__(self) -> None:
         """Refuse what no filter exists for."""
-        if min(getattr(self, field.name) for field in fields(self)) <= 0.0:
-            raise ValueError("every number of a suspicion must be greater than 0.")
+        if min(getattr(self, field.name) for field in fields(self) if field.name != "held") <= 0.0:
+            raise ValueError("every number of a suspicion must be greater than 0; 'held' may be 0.")
+        if self.held < 0.0:
+            raise ValueError(f"'held' = {self.held:g} must not be negative.")
         if max(self.failure, self.change) >= 0.5:
             raise ValueError("'failure' and 'change' must be less than one half.")

@@ -19,6 +19,7 @@ import numpy as np
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.applied import Applied
+from fulmar_core.health.hold_detector import HoldDetector
 from fulmar_core.health.push_filter import PushFilter
 from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.planar import COLUMNS, PlanarState
@@ -37,6 +38,7 @@ class Health:
         np.ndarray
     )  # (..., 6) the measured columns without their noise, of the likeliest set [m, rad, m/s, rad/s]
     push: np.ndarray  # (..., 3) force from outside along the world's x and y [N], torque [N·m]
+    held: np.ndarray  # (...,) whether something keeps the body from moving: then nothing is learned of the others
 
 
 class ThrusterHealth:
@@ -105,6 +107,8 @@ class ThrusterHealth:
         self._chance = np.broadcast_to(self._prior, self._state.shape[:-1])
         self._yaw = seen[..., 2].copy()
         self._count = 0
+        self._hold = HoldDetector(self._suspicion, seen.shape[:-1])
+        self._kept = self._state[..., 6:], self._chance  # from before anything spoke for a hold
 
     def _restart_motion(self, seen: np.ndarray) -> None:
         """Go on from the measurement with what is believed of valves and push: what moved the body is not known."""
@@ -126,11 +130,34 @@ class ThrusterHealth:
         self._state = ahead + found[..., :9]
         odd = found[..., 9:]
         surprise = 0.5 * (odd * odd).sum(axis=-1)
-        surprise -= surprise.min(axis=-1, keepdims=True)
+        least = surprise.min(axis=-1, keepdims=True)
+        surprise -= least
         chance = self._chance * np.exp(-np.minimum(surprise, self._suspicion.surprise))
+        free = least[..., 0] - np.log(chance.sum(axis=-1))
         change = self._suspicion.change * dt
         chance *= (1.0 - change) / chance.sum(axis=-1, keepdims=True)
         self._chance = chance + change * self._prior
+        if self._suspicion.held:
+            self._heed_hold(seen, free, applied, dt)
+
+    def _heed_hold(self, seen: np.ndarray, surprise: np.ndarray, applied: np.ndarray | Applied, dt: float) -> None:
+        """Learn nothing from a body that is held, and forget what was learned while it was not known to be."""
+        assert self._state is not None
+        commands = applied.commands if isinstance(applied, Applied) else np.asarray(applied)
+        thrust = np.any(commands > 0.0) if isinstance(applied, Applied) else np.any(commands > 0.0, axis=-1)
+        self._hold.look(seen, surprise, thrust, dt)
+        push, chance = self._kept
+        held, innocent = self._hold.held, self._hold.innocent[..., None]
+        if held.any():
+            at_rest = seen.copy()
+            at_rest[..., 3:] = 0.0
+            still = np.concatenate((np.broadcast_to(at_rest[..., None, :], (*push.shape[:-1], 6)), push), axis=-1)
+            self._state = np.where(held[..., None, None], still, self._state)
+            self._chance = np.where(held[..., None], chance, self._chance)
+        self._kept = (
+            np.where(innocent[..., None], self._state[..., 6:], push),
+            np.where(innocent, self._chance, chance),
+        )
 
     def _driven(self, applied: np.ndarray | Applied, turned: np.ndarray) -> np.ndarray:
         """What the valves add to the state within the interval under each hypothesis, shape (..., hypotheses, 9).
@@ -189,6 +216,7 @@ class ThrusterHealth:
             self._alive[best],
             motion.reshape(*best.shape, 6),
             (self._chance[..., None, :] @ self._state[..., 6:])[..., 0, :],
+            self._hold.held,
         )
 
 
