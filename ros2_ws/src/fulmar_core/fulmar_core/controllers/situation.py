@@ -10,6 +10,7 @@ from fulmar_core.controllers.seen import Reader, Vector
 from fulmar_core.health.applied import Applied
 from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.health.thruster_health import Health, ThrusterHealth
+from fulmar_core.health.valve_trials import ValveTrials
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.robot import Robot
 
@@ -24,7 +25,7 @@ class Situation:
     turn: np.ndarray  # wanted heading minus heading, 0 where a task has none [rad]
     motion: tuple[np.ndarray, np.ndarray, np.ndarray]  # speed ahead, to the left [m/s], turn rate [rad/s]
     push: np.ndarray  # force and torque from outside, shape (..., 3) [N, N, N·m]
-    alive: np.ndarray | None  # 1, or 0 for a dead valve, shape (..., n); None where nobody looks
+    alive: np.ndarray | None  # 1, or 0 for a valve not to be opened, shape (..., n); None where nothing is estimated
 
 
 def raw_situation(reader: Reader, observation: np.ndarray) -> Situation:
@@ -58,11 +59,14 @@ class Watch:
         place = suspicion.position if self._sees_pose else UNSEEN
         heading = suspicion.heading if self._sees_pose else UNSEEN
         self._estimator = ThrusterHealth(robot, replace(suspicion, position=place, heading=heading))
+        self._trials = ValveTrials(suspicion.retry_s) if suspicion.retry_s else None
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
         self._estimator.reset()
+        if self._trials is not None:
+            self._trials.reset()
         self._heading: np.ndarray | None = None  # at the last observation
         self._rate: np.ndarray = np.zeros(())  # turn rate, same
         self._applied: np.ndarray | Applied | None = None  # since the last observation
@@ -91,7 +95,14 @@ class Watch:
             goal, turn = raw.goal, raw.turn
         push = health.push.copy()
         push[..., 0], push[..., 1] = force
-        return Situation(goal, turn, (*velocity, r), push, health.alive)
+        alive = health.alive
+        if self._trials is not None:
+            alive = self._trials.allowed(alive, self._opened(), self._passed_s)
+        return Situation(goal, turn, (*velocity, r), push, alive)
+
+    def _opened(self) -> np.ndarray | None:
+        """What was open since the last observation; None where that is not known."""
+        return self._applied.commands.max(axis=0) if isinstance(self._applied, Applied) else self._applied
 
     def acts(self, command: np.ndarray) -> None:
         """Take a command for what is applied until the next observation, unless `see_applied` corrects it, (..., n)."""

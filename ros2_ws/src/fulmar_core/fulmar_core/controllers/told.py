@@ -40,8 +40,8 @@ class Told:
         """Build the estimator; rate of the observations in Hz."""
         self._task, reader = task, Reader(robot, task)
         self._estimates_pose = reader.heads and not (reader.tracks or reader.passes)
-        # Networks were trained on an estimator that takes no body for held.
-        self._watch = Watch(robot, reader, Suspicion(held=0.0), 1.0 / control_hz)
+        # Networks learn on an estimator that takes no body for held and has no valve tried again.
+        self._watch = Watch(robot, reader, Suspicion(held=0.0, retry_s=0.0), 1.0 / control_hz)
 
     def reset(self) -> None:
         """Forget everything."""

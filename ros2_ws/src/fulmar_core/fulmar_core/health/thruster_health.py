@@ -144,7 +144,7 @@ class ThrusterHealth:
         """Learn nothing from a body that is held, and forget what was learned while it was not known to be."""
         assert self._state is not None
         commands = applied.commands if isinstance(applied, Applied) else np.asarray(applied)
-        thrust = np.any(commands > 0.0) if isinstance(applied, Applied) else np.any(commands > 0.0, axis=-1)
+        thrust = np.asarray(np.any(commands > 0.0, axis=None if isinstance(applied, Applied) else -1))
         self._hold.look(seen, surprise, thrust, dt)
         push, chance = self._kept
         held, innocent = self._hold.held, self._hold.innocent[..., None]
