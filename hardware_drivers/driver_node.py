@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from fulmar_core.backend import AirBearing, Backend, Device
+from fulmar_core.backend import Backend, Device
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
-from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_sender
 from fulmar_ros.plant_node import DONE, PlantNode
 from fulmar_ros.plant_settings import PlantSettings
@@ -48,10 +47,9 @@ class DriverSettings(PlantSettings):
 
 
 class DriverNode(PlantNode):
-    """The plant node with a machine for its backend, and with what machines have besides: a bearing, a health."""
+    """The plant node with a machine for its backend, which has a health of its own."""
 
     settings: DriverSettings
-    _air: AirBearingWires | None = None
 
     def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
         """Read the parameters and, unless told otherwise, start.
@@ -69,22 +67,11 @@ class DriverNode(PlantNode):
         device = self._backend
         if outcome == DONE and device is not None:
             self.health.more = device.health  # type: ignore[attr-defined]
-            if isinstance(device, AirBearing):
-                self._air = AirBearingWires(self, device)
         return outcome
-
-    def stop(self) -> None:
-        """Last words, also of the bearing."""
-        super().stop()
-        if self._air is not None:
-            self._air.tell()
 
     def _dismantle(self) -> None:
         super()._dismantle()
         self.health.more = dict
-        if self._air is not None:
-            self._air.destroy(self)
-            self._air = None
 
     def _motion_capture(self) -> None:
         """The room has its own; a device stands in for none."""

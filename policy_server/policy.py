@@ -12,6 +12,8 @@ import onnxruntime
 from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.told import told_for
 from fulmar_core.errors import BundleError
+from fulmar_core.health.applied import Applied
+from fulmar_core.health.thruster_health import Health
 from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import GOLDEN, NETWORK, Bundle, Golden, Passport, check_fit, read_bundle
 from fulmar_core.robot import Robot
@@ -88,6 +90,16 @@ class Policy:
         if self._told:
             self._told.acts(command)
         return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
+
+    def see_applied(self, applied: Applied | None) -> None:
+        """See `ActuatorObserver`; nothing to a network that is not given estimates."""
+        if self._told:
+            self._told.see_applied(applied)
+
+    @property
+    def health(self) -> Health | None:
+        """What is estimated of valves and push for the network; None where it is not given that."""
+        return self._told.health if self._told else None
 
     def metadata(self) -> dict[str, Any]:
         """The passport, with the name of the controller."""

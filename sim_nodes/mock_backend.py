@@ -56,6 +56,13 @@ class MockBackend:
             self._place = np.concatenate((x, y))
         return self._sample()
 
+    def stand(self, ticks: int = 1) -> Sample:
+        """Let time pass for a body that nothing moves; see `CanStand.stand`."""
+        still = np.zeros(1)
+        self._world.begin(np.array(self.robot.actuators.safe_command), ticks, rigid_of(self._state[0]))
+        self._state = PlanarState(self._state.x, self._state.y, self._state.yaw, still, still, still)
+        return self._sample()
+
     def make_safe(self) -> None:
         """Nothing to do: a command acts only during a step."""
 

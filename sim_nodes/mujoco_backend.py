@@ -87,6 +87,19 @@ class MujocoBackend:
         truth, imu = self._read()
         return self._sample(truth, imu, world.measure(truth))
 
+    def stand(self, ticks: int = 1) -> Sample:
+        """Let time pass for a body that nothing moves; see `CanStand.stand`."""
+        data, world, rest = self.data, self._world, np.array(self.robot.actuators.safe_command, dtype=float)
+        world.begin(rest, ticks, self._truth)
+        dt = self.robot.timing.physics_dt
+        for _ in range(ticks):
+            world.actuation.advance(dt, latest_s=world.latest_s)
+        self._scene.machine.drive(self.model, data, rest, world.actuation.gain[:, 0], (0.0, 0.0, 0.0))
+        data.qvel[:] = 0.0
+        data.time += ticks * dt
+        truth, imu = self._read()
+        return self._sample(truth, imu, world.measure(truth))
+
     def make_safe(self) -> None:
         """Bring the actuators to rest."""
         self.data.ctrl[:] = 0.0

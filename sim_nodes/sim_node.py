@@ -13,12 +13,19 @@ from fulmar_core.tasks.push_block import PushBlock
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node
+from sim_nodes.on_air import CanStand, OnAir
 
 BACKENDS = ("mujoco", "mock")
 
 
 def make_backend(robot: Robot, settings: PlantSettings) -> Backend:
-    """Build the backend that the parameters name; only that one is imported."""
+    """Build the backend that the parameters name, on air where the robot has a bearing."""
+    backend = _simulator(robot, settings)
+    return OnAir(backend, load_scenario(settings.scenario)) if robot.air_bearing else backend
+
+
+def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
+    """The simulator that the parameters name; only that one is imported."""
     task = load_task(settings.task)
     if settings.backend == "mujoco":
         from sim_nodes.mujoco_backend import MujocoBackend

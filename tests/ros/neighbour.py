@@ -12,12 +12,14 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.topics import (
     ACTUATORS_STATE,
+    AIR_BEARING,
     COMMAND,
     DIAGNOSTICS,
     GOAL_POSE,
@@ -64,6 +66,8 @@ class Neighbour:
             PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE)
         )
 
+        self.bearing = self.node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
+        self.bearing.publish(Bool(data=True))
         self.drive = self.node.create_publisher(
             TwistStamped, VELOCITY_COMMAND.name, publisher_qos(VELOCITY_COMMAND)
         )

@@ -187,6 +187,7 @@ class Robot:
     sensors: Sensors
     limits: Limits
     hydrodynamics: Hydrodynamics | None = None  # of a hull that swims
+    air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
 
     def __post_init__(self) -> None:
         """Refuse wheels that swim or stand outside of the body."""
@@ -197,6 +198,8 @@ class Robot:
             )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
+        if self.air_bearing and not (isinstance(self.actuators, Thrusters) and self.hydrodynamics is None):
+            raise ValueError("'air_bearing' is for robots on the floor with thrusters; leave it out.")
         late_s = self.actuators.response.latest_s
         if self.timing.is_over_within(late_s):
             raise ValueError(

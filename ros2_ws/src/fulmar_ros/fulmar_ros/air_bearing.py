@@ -8,6 +8,7 @@ from std_srvs.srv import SetBool
 
 from fulmar_core.backend import AirBearing
 from fulmar_core.topics import AIR_BEARING
+from fulmar_ros.patience import FLUSH_S, flush
 from fulmar_ros.qos import publisher_qos
 
 SERVICE = "air_bearing/enable"
@@ -30,11 +31,17 @@ class AirBearingWires:
         self._publisher = node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
         self._service = node.create_service(SetBool, SERVICE, self._switch)
         self._timer = node.create_timer(LOOK_S, self._look)
+        self.tell()
 
     def tell(self) -> None:
         """Publish the state now."""
         self._said, self._silent_s = self._bearing.bearing_on, 0.0
         self._publisher.publish(Bool(data=self._said))
+
+    def tell_everybody(self) -> None:
+        """Publish the state now, and wait, not for ever, until every subscriber has it."""
+        self.tell()
+        flush([self._publisher], FLUSH_S)
 
     def destroy(self, node: Node) -> None:
         """Give every endpoint back."""

@@ -57,6 +57,7 @@ class ControllerInputs:
         self._settings = settings
         self._control_ns = round(1e9 / settings.control_rate(robot))
         self._flags = settings.flags(robot)
+        self._bearing: bool | None = None if settings.has_bearing(robot) else True  # None: not received yet
         self._estop = EstopWatch(required=settings.estop)
         self._gate = settings.input_gate(robot)
         self._newest_epoch = self._acted_epoch = 0  # of the newest measurement, and of the last control step
@@ -120,6 +121,18 @@ class ControllerInputs:
         """Take a reset of the e-stop."""
         with self.lock:
             self._estop.release(time.monotonic_ns())
+
+    @property
+    def bearing_known(self) -> bool:
+        """Whether the state of the air bearing has come, or there is none."""
+        return self._bearing is not None
+
+    def take_bearing(self, on: bool) -> None:
+        """Take the state of the air bearing; once it is on again, what controllers remember is of no use."""
+        with self.lock:
+            self._anew = self._anew or (on and self._bearing is False)
+            self._bearing = on
+            self._change(bearing_off=not on)
 
     def take_goal(self, message: GoalMessage) -> str:
         """Take a goal; none while a heard e-stop holds."""

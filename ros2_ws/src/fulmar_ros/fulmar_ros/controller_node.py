@@ -11,6 +11,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
@@ -18,7 +19,10 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.health.applied import report_applied
+from fulmar_core.health.beliefs import BeliefReader, Beliefs
 from fulmar_core.health.informer import Informer
+from fulmar_core.health.thruster_health import Health, can_be_watched
 from fulmar_core.observation import slewed
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode
@@ -33,7 +37,7 @@ from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.message_reader import measurement_of
+from fulmar_ros.message_reader import measurement_of, stamp_ns
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -83,7 +87,9 @@ class ControllerNode(LifecycleNode):
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
         self._pause_ns = self.settings.pause_ns(self.robot)
-        self._actuators = ActuatorWatch(self._pause_ns)
+        self._actuators = ActuatorWatch(self._pause_ns, self.settings.hold_ns(self.robot))
+        self._belief_reader = BeliefReader(self.robot) if can_be_watched(self.robot) else None
+        self._beliefs = Beliefs()
         self._beat = ControlBeat(
             1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
         )
@@ -118,6 +124,8 @@ class ControllerNode(LifecycleNode):
             on_estop=self._on_estop,
             on_estop_released=self._on_estop_released,
             on_swap=self._on_swap,
+            on_applied=self._on_applied,
+            on_bearing=self._on_bearing if self.settings.has_bearing(self.robot) else None,
             lockstep=self.settings.lockstep,
         )
         self.wires.publish_metadata(self._succession.current.metadata)
@@ -226,17 +234,32 @@ class ControllerNode(LifecycleNode):
             return
         self._go_on()
 
+    def _on_applied(self, message: JointState) -> None:
+        if tuple(message.name) == self.robot.actuators.names and len(message.effort) == len(message.name):
+            self._actuators.history.add(stamp_ns(message.header.stamp), np.array(message.effort))
+        self._go_on()
+
+    def _on_bearing(self, message: Bool) -> None:
+        self.inputs.take_bearing(bool(message.data))
+        self._tell_status(self.inputs.decide())
+        self._go_on()
+
     def _go_on(self) -> None:
         """Take the odometry that has waited."""
         late, self._late = self._late, None
         if late is not None:
-            self._on_odometry(late)
+            self._take_odometry(late, again=False)
 
     def _on_odometry(self, message: Odometry) -> None:
+        # A plant in lock step asks again: what has not come by then got lost.
+        again = self._late is not None and self._late.header.stamp == message.header.stamp
+        self._take_odometry(message, again=again)
+
+    def _take_odometry(self, message: Odometry, *, again: bool) -> None:
         if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
             return  # the plant asks again
         measurement = measurement_of(message)
-        if self.settings.lockstep and self.inputs.mission.lacks_something_of(measurement.stamp_ns):
+        if self.settings.lockstep and self._lacks_something_of(measurement.stamp_ns, again=again):
             self._late = message
             return
         if self.settings.lockstep and measurement.stamp_ns == self._answered_ns:
@@ -249,6 +272,14 @@ class ControllerNode(LifecycleNode):
         if usable:
             self._beat.follow(measurement.stamp_ns)
         self._beat.wake()
+
+    def _lacks_something_of(self, stamp: int, *, again: bool) -> bool:
+        """Whether something is on its way in lock step that belongs to a measurement."""
+        if self.inputs.mission.lacks_something_of(stamp) or not self.inputs.bearing_known:
+            return True
+        if again or self._belief_reader is None or not self._actuators.lacks(stamp, self._answered_ns):
+            return False
+        return self.wires.state_published()
 
     def _step(self) -> None:
         """One beat of the clock."""
@@ -268,8 +299,8 @@ class ControllerNode(LifecycleNode):
                 decision = self.inputs.arbitrate()
                 self._begin_anew()
                 observation = self._observe(measurement) if decision.may_act and measurement else None
-            before, informer = self._answer, self._succession.current.informer
-            health = self._watch(measurement, before, informer) if informer.listens else None
+            informer = self._succession.current.informer
+            health = self._watch(measurement, informer) if informer.listens else None
             if observation is not None:
                 command, action, problem = self._act(observation)
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
@@ -285,9 +316,10 @@ class ControllerNode(LifecycleNode):
             self._judge(problem)
             self.inputs.acted += 1
         if not informer.listens:  # only for others: the command does not wait for it
-            health = self._watch(measurement, before, informer)
-        if health is not None:
-            self.wires.publish_actuators_health(health, stamp)
+            health = self._watch(measurement, informer)
+        if health is not None and self.wires.health_wanted:
+            self.wires.publish_actuators_health(health.effectiveness, stamp)
+        self._note_beliefs(health)
         self._tell_status(decision)
 
     def _speak(self, publish: Callable[[], None]) -> bool:
@@ -308,12 +340,16 @@ class ControllerNode(LifecycleNode):
         if jumped or anew:
             self.controller.reset()
 
-    def _watch(
-        self, measurement: Measurement | None, command: np.ndarray, informer: Informer
-    ) -> np.ndarray | None:
+    def _watch(self, measurement: Measurement | None, informer: Informer) -> Health | None:
         if measurement is None:
             return None
-        return self._actuators.see(measurement, command, informer, wanted=self.wires.health_wanted)
+        return self._actuators.see(measurement, informer, wanted=self.wires.health_wanted)
+
+    def _note_beliefs(self, health: Health | None) -> None:
+        """Keep what is believed of valves and push: by the controller's own observer, else by ours."""
+        believed = getattr(self.controller, "health", None) or health
+        if self._belief_reader is not None and believed is not None:
+            self._beliefs = self._belief_reader.read(believed)
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""
@@ -325,6 +361,7 @@ class ControllerNode(LifecycleNode):
         observation = mission.observe(measurement.state, measurement.stamp_ns, self._answer)
         assert mission.goal is not None
         tell_course(self.controller, mission.goal)
+        report_applied(self.controller, self._actuators.since_observation(measurement.stamp_ns))
         return observation
 
     def _act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:
@@ -381,4 +418,5 @@ class ControllerNode(LifecycleNode):
             epoch=self.inputs.epoch,
             last_input_ns=self.inputs.flags.last_input_ns,
             refusal=self.inputs.refusal,
+            beliefs=self._beliefs,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from fulmar_core.health.beliefs import Beliefs
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.succession import Succession
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
@@ -49,6 +50,7 @@ class ControllerStatus:
         epoch: int,
         last_input_ns: int | None,
         refusal: Refusal,
+        beliefs: Beliefs,
     ) -> None:
         """Publish, if it is time to.
 
@@ -60,6 +62,7 @@ class ControllerStatus:
             epoch: Jumps of the measurements so far.
             last_input_ns: When the newest measurement came, on the steady clock [ns].
             refusal: Of the newest goal.
+            beliefs: Of the actuators, where they are a warning.
         """
         mission, standby = self._mission, succession.current
         changed = (
@@ -73,13 +76,16 @@ class ControllerStatus:
             succession.fell_back,
             self._swap.said,
             *self.wire_problems,
+            beliefs.dead,
+            len(beliefs.words),
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < PERIOD_S:
             return
         self._said, self._said_at = changed, now
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
-        level = "warn" if level == "ok" and (succession.fell_back or self.wire_problems) else level
+        doubtful = succession.fell_back or self.wire_problems or beliefs.words
+        level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
         values = {
             "mode": decision.mode.value,
@@ -88,6 +94,8 @@ class ControllerStatus:
             "controller": standby.controller.name,
             "fell_back": succession.fell_back,
             "swap": self._swap.said,
+            "believed_dead": ", ".join(beliefs.dead),
+            "beliefs": "; ".join(beliefs.words),
             "epoch": str(epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
             "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),
@@ -103,5 +111,5 @@ class ControllerStatus:
             **self.inference_ms.percentiles("inference_ms"),
             **deadlines.period_error_ms.percentiles("period_error_ms"),
         }
-        message = decision.reason or BETWEEN.join(self.wire_problems) or decision.mode.value
-        health.publish(level, message, values)
+        warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
+        health.publish(level, decision.reason or warnings or decision.mode.value, values)

@@ -23,6 +23,8 @@ from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_HEALTH,
+    ACTUATORS_STATE,
+    AIR_BEARING,
     BLOCK,
     DIAGNOSTICS,
     ESTOP,
@@ -44,6 +46,7 @@ from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
+APPLIED_DEPTH = 50  # states of the actuators that may wait while this process does something else
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 
 
@@ -64,6 +67,8 @@ class ControllerWires:
         on_estop: Callable[[Bool], None],
         on_estop_released: Callable[[String], None],
         on_swap: Callable[[String], None],
+        on_applied: Callable[[JointState], None],
+        on_bearing: Callable[[Bool], None] | None,
         lockstep: bool,
     ) -> None:
         """Create every endpoint.
@@ -80,6 +85,8 @@ class ControllerWires:
             on_estop: Told whether the e-stop is pressed.
             on_estop_released: Called after each reset of the e-stop.
             on_swap: Told which policy shall go on.
+            on_applied: Receives what the actuators do, of robots whose actuators can be watched.
+            on_bearing: Receives whether the air bearing is on; None where there is none.
             lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag
                 behind.
         """
@@ -114,7 +121,19 @@ class ControllerWires:
         self._write_observation = VectorWriter(controller.observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
         released = subscriber_qos(ESTOP_RELEASED, reliable=True)
-        self._subscriptions = [
+        self._node = node
+        self._subscriptions = []
+        # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
+        if on_bearing is not None:
+            self._subscriptions.append(
+                node.create_subscription(Bool, AIR_BEARING.name, on_bearing, subscriber_qos(AIR_BEARING))
+            )
+        if can_be_watched(robot):
+            applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
+            self._subscriptions.append(
+                node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied)
+            )
+        self._subscriptions += [
             node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
             *subscribe_operator(node, Bool, ESTOP, on_estop),
             node.create_subscription(String, ESTOP_RELEASED.name, on_estop_released, released),
@@ -140,6 +159,10 @@ class ControllerWires:
     def subscribers(self) -> int:
         """Matched subscriptions of the command."""
         return int(self._command.get_subscription_count())
+
+    def state_published(self) -> bool:
+        """Whether a plant publishes what its actuators do."""
+        return bool(self._node.count_publishers(ACTUATORS_STATE.name))
 
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.backend import Backend, Sample
+from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.errors import LockstepError
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
@@ -34,6 +34,7 @@ class LockstepLoop:
         *,
         control_hz: float,
         answer_timeout_s: float,
+        publish_bearing: Callable[[], None] = lambda: None,
     ) -> None:
         """Join the parts.
 
@@ -44,12 +45,15 @@ class LockstepLoop:
             clock: Stamps of the states.
             control_hz: Command rate [Hz].
             answer_timeout_s: Longest wait for one answer [s].
+            publish_bearing: Publishes the state of the air bearing, and waits until every subscriber has it.
         """
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
         robot: Robot = backend.robot
         self._substeps = robot.timing.substeps(control_hz)
         self._dt = self._substeps * robot.timing.physics_dt
         self._answer_timeout_s = answer_timeout_s
+        self._publish_bearing = publish_bearing
+        self._bearing_on: bool | None = None  # as it was published
         self.steps = 0
 
     def run(
@@ -83,6 +87,7 @@ class LockstepLoop:
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp = self._clock.now_ns
         began = time.monotonic()
+        grounded = self._tell_bearing()
         self._wires.publish_sample(sample, stamp)
         with self._wires.lock:
             while not self._wires.wait_for_answer(stamp, RESEND_S):
@@ -99,5 +104,17 @@ class LockstepLoop:
                 self._wires.publish_sample(sample, stamp, resend=True)
             # The very command that answered: how long its answer or this thread took does not matter here.
             command = self._guard.answer(time.monotonic_ns())
+        if grounded:
+            command = self._backend.robot.actuators.safe_command  # what the backend does with any other
         self._wires.publish_applied(command, stamp)
         return command
+
+    def _tell_bearing(self) -> bool:
+        """Publish a change of the air bearing before the state that it is true of; returns whether it is off."""
+        if not isinstance(self._backend, AirBearing):
+            return False
+        on = self._backend.bearing_on
+        if on is not self._bearing_on:
+            self._bearing_on = on
+            self._publish_bearing()
+        return not on

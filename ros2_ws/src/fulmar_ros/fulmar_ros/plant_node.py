@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from fulmar_core.backend import Backend, Sample
+from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
 from fulmar_core.errors import FulmarError
@@ -17,6 +17,7 @@ from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
+from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
 from fulmar_ros.motion_capture import MotionCapture
@@ -70,6 +71,7 @@ class PlantNode(LifecycleNode):
         load_task(self.settings.task)
         self._make_backend, self._request_exit, self._simulated = make_backend, request_exit, simulated
         self._backend: Backend | None = None
+        self._air: AirBearingWires | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self.health = PlantHealth(self.robot.name)
@@ -111,6 +113,8 @@ class PlantNode(LifecycleNode):
             mocap=self._motion_capture(),
             lockstep=self.settings.lockstep,
         )
+        if isinstance(self._backend, AirBearing):
+            self._air = AirBearingWires(self, self._backend)
         self._make_loops(self._backend)
         self.health.open(self)
         return DONE
@@ -159,6 +163,8 @@ class PlantNode(LifecycleNode):
                 self._make_safe()
             finally:
                 self._backend.close()
+                if self._air is not None:
+                    self._air.tell()
 
     def run_episode(self, episode: Episode, *, number: int, seed: int, steps: int, on_step: OnStep) -> None:
         """Run one episode in lock step, from the caller's thread, on a configured node.
@@ -194,6 +200,7 @@ class PlantNode(LifecycleNode):
             self.clock,
             control_hz=self.settings.control_rate(self.robot),
             answer_timeout_s=self.settings.answer_timeout_s,
+            publish_bearing=self._air.tell_everybody if self._air else lambda: None,
         )
         self._realtime = RealtimeLoop(backend, self.wires, self.guard, self.clock, rate=self.settings.rate)
         self.health.watch(
@@ -214,6 +221,9 @@ class PlantNode(LifecycleNode):
         self.stop()
         if self._backend is not None:
             self._backend = None
+            if self._air is not None:
+                self._air.destroy(self)
+                self._air = None
             self.wires.destroy(self)
             self.health.close(self)
 

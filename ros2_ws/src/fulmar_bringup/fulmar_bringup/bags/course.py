@@ -28,6 +28,8 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.topics import (
     ACTION,
+    ACTUATORS_STATE,
+    AIR_BEARING,
     BLOCK,
     OBSERVATION,
     OBSTACLES,
@@ -62,6 +64,8 @@ class Course:
     obstacles: tuple[Told, ...]
     blocks: tuple[Told, ...]
     presses: tuple[Told, ...]  # of the e-stop, see `presses_of`
+    bearing: tuple[Told, ...]  # the air bearing: true is on; empty where nothing is recorded of one
+    applied: Vectors  # what the actuators did from each stamp on; empty where that is not recorded
     changes: tuple[Told, ...]  # folder and SHA-256 of policies that took over
     warnings: tuple[str, ...]
 
@@ -176,6 +180,12 @@ def course_of(
             for index, (log, m) in enumerate(messages(bag.of(BLOCK)))
         ),
         presses=presses_of(bag),
+        bearing=tuple(
+            Told(log, 0, bool(m.data), index) for index, (log, m) in enumerate(messages(bag.of(AIR_BEARING)))
+        ),
+        applied=_checked(
+            joint_vectors(bag.of(ACTUATORS_STATE), "effort"), names, ACTUATORS_STATE.name, warnings
+        ),
         changes=changes_of(bag),
         warnings=tuple(warnings),
     )

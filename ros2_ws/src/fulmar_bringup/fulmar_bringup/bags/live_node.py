@@ -17,7 +17,7 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bringup.bags.contents import Bag, json_object
@@ -31,6 +31,8 @@ from fulmar_bringup.system import Guards
 from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.topics import (
     ACTION,
+    ACTUATORS_STATE,
+    AIR_BEARING,
     BLOCK,
     GOAL_POSES,
     GOAL_WIRES,
@@ -42,9 +44,11 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     command_wire,
 )
+from fulmar_ros.convert import VectorWriter
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.middleware import set_up_middleware
+from fulmar_ros.patience import FLUSH_S, flush
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
@@ -179,6 +183,8 @@ class _Wires:
         self.goal = node.create_publisher(TYPES[goal.name], goal.name, publisher_qos(goal))
         self.obstacles = node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
         self.block = node.create_publisher(PoseStamped, BLOCK.name, publisher_qos(BLOCK))
+        self.bearing = node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
+        self.applied = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
         wire = command_wire(course.robot)
         by_velocity = wire is VELOCITY_COMMAND
         self._listen(TwistStamped if by_velocity else JointState, wire, self._hear_command)
@@ -244,7 +250,9 @@ def _feed(
 
     wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
     time.sleep(SETTLE_S)
-    told = {name: course.before(getattr(course, name)) for name in ("goals", "obstacles", "blocks")}
+    wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].what)))
+    told = {name: course.before(getattr(course, name)) for name in ("goals", "obstacles", "blocks", "bearing")}
+    applied_at = np.searchsorted(course.applied.stamp_ns, course.stamp_ns)  # the first state of each step or after it
     count, width = len(course), len(course.robot.actuators.names)
     actions, commands = np.full((count, width), np.nan), np.full((count, width), np.nan)
     shown: list[np.ndarray | None] = [None] * count
@@ -269,6 +277,7 @@ def _feed(
         with heard.changed:
             both = heard.changed.wait_for(heard.reasons_for(stamp), REASONING_S if expects else 0.0)
         commands[step] = heard.commands[stamp]
+        _tell_applied(course, step, applied_at, commands[step], wires)
         if both:
             acted[step] = True
             shown[step], actions[step] = heard.observations[stamp], heard.actions[stamp]
@@ -278,6 +287,20 @@ def _feed(
         observations.reshape(count, terms), heard.names, actions, commands, acted, tuple([""] * count)
     )
     return answers, heard.metadata.get("sha256")
+
+
+def _tell_applied(
+    course: Course, step: int, applied_at: np.ndarray, answer: np.ndarray, wires: _Wires
+) -> None:
+    """Publish what the actuators did from a step to the next as recorded; the answer where that is not known."""
+    write = VectorWriter(course.robot.actuators.names)
+    end = int(applied_at[step + 1]) if step + 1 < len(course) else len(course.applied)
+    for index in range(int(applied_at[step]), end):
+        wires.applied.publish(
+            write.write(course.applied.values[index], int(course.applied.stamp_ns[index]))
+        )
+    if not len(course.applied):
+        wires.applied.publish(write.write(answer, int(course.stamp_ns[step])))
 
 
 def _answered(heard: _Heard, stamp: int) -> bool:
@@ -291,6 +314,7 @@ def _raw_messages(bag: Bag, course: Course, odometry: str | None) -> dict[str, l
         "goals": bag.of(GOAL_WIRES[course.task.goal_topic]).data,
         "obstacles": bag.of(OBSTACLES).data,
         "blocks": bag.of(BLOCK).data,
+        "bearing": bag.of(AIR_BEARING).data,
     }
 
 
@@ -305,10 +329,17 @@ def _tell(
     streamed: bool,
 ) -> None:
     """Publish what was told before a step, as the very bytes that were recorded, and wait until it is known."""
-    publishers = {"obstacles": wires.obstacles, "goals": wires.goal, "blocks": wires.block}
+    publishers = {
+        "bearing": wires.bearing,
+        "obstacles": wires.obstacles,
+        "goals": wires.goal,
+        "blocks": wires.block,
+    }
     echoes = {"obstacles": "obstacles_stamp_ns", "goals": "goal_stamp_ns"}
     for name, publisher in publishers.items():
         for each in told[name].get(step, ()):
             publisher.publish(raw[name][each.index])
+            if name == "bearing":
+                flush([publisher], FLUSH_S)  # its state has no stamp: it must come before the odometry
             if name in echoes and not (streamed and name == "goals"):
                 wait(heard.echo_of(echoes[name], each.stamp_ns), START_TIMEOUT_S, f"did not take its {name}")

@@ -17,6 +17,7 @@ from fulmar_bringup.bags.told import ABSENT
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import BagError, FulmarError, RunFailed
+from fulmar_core.health.applied import Applied, AppliedHistory, report_applied
 from fulmar_core.health.informer import Informer
 from fulmar_core.observation import slewed
 from fulmar_core.planar import planar_of
@@ -123,6 +124,11 @@ class _Rerun:
         # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
         self._gated = source == "odometry" and (course.settings.lockstep or not course.own)
         self._estop = RecordedEstop(course.presses, required=self._gated and course.settings.estop)
+        self._history = AppliedHistory(course.settings.hold_ns(robot))
+        self._states_fed = 0  # states of the actuators that the history has taken
+        self._observed_ns = 0  # stamp of the newest observation
+        # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
+        self._bearing_on = not course.bearing or bool(course.bearing[0].what)
         self._fed = 0
         self._problem, self._outside, self._fault = "", "", ""
         self._acted = 0  # control steps
@@ -139,6 +145,7 @@ class _Rerun:
         actions, commands = np.full((count, actuators), np.nan), np.tile(self._safe, (count, 1)).astype(float)
         acted, reasons = np.zeros(count, dtype=bool), [""] * count
         goals = course.before(course.goals)
+        bearing = course.before(course.bearing)
         obstacles, blocks = course.before(course.obstacles), course.before(course.blocks)
         changes = course.before(course.changes) if self._load else {}
         self._controller.reset()
@@ -148,6 +155,10 @@ class _Rerun:
                 self._mission.see_obstacles(told.what, told.stamp_ns)
             for told in blocks.get(step, ()):
                 self._mission.see_block(told.what, told.stamp_ns)
+            for told in bearing.get(step, ()):
+                if told.what and not self._bearing_on:
+                    self._controller.reset()
+                self._bearing_on = told.what
             for told in goals.get(step, ()):
                 if self._estop.holds(told.log_ns) or self._mission.is_void(told.what, told.stamp_ns):
                     self._mission.skip(told.stamp_ns)
@@ -169,6 +180,8 @@ class _Rerun:
                 self._inform(step)
                 if acted[step]:
                     self._tell_course()
+                    report_applied(self._controller, self._applied(self._observed_ns, stamp))
+                    self._observed_ns = stamp
                     actions[step] = self._act(shown[step])
             except Exception as error:  # noqa: BLE001 - whatever a controller raises, as in the node
                 reasons[step] = self._give_up(step, error)
@@ -208,6 +221,7 @@ class _Rerun:
             geofence=self._robot.limits.geofence,
             estop=stopped,
             outside=self._outside,
+            bearing_off=not self._bearing_on,
             active_s=self._acted * self._control_ns / 1e9,
             max_run_time_s=course.settings.max_run_time_s,
         )
@@ -263,7 +277,21 @@ class _Rerun:
         if not 0 < passed_ns <= self._pause_ns:
             informer.reset()
         self._seen_ns = stamp
-        informer.see(planar_of(self._states[sample]), self._answer, passed_ns / 1e9)
+        applied = self._applied(stamp - passed_ns, stamp)
+        informer.see(planar_of(self._states[sample]), applied, passed_ns / 1e9)
+
+    def _applied(self, begin_ns: int, end_ns: int) -> Applied | None:
+        """What the actuators did between two measurements; the recorded command where the bag holds no more of it."""
+        if not 0 < end_ns - begin_ns <= self._pause_ns:
+            return None
+        states = self._course.applied
+        if not len(states):
+            return Applied(np.array([self._answer], dtype=float), np.array([1e-9 * (end_ns - begin_ns)]))
+        while self._states_fed < len(states) and states.stamp_ns[self._states_fed] < end_ns:
+            index = self._states_fed
+            self._states_fed += 1
+            self._history.add(int(states.stamp_ns[index]), states.values[index])
+        return self._history.between(begin_ns, end_ns)
 
     def _tell_course(self) -> None:
         """Tell the controller the whole course, if it wants to know and there is one."""

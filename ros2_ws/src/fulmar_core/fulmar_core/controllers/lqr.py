@@ -24,7 +24,9 @@ from fulmar_core.controllers.valve_allocation import ValveAllocation
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.dynamics.free_body import free_body_step
+from fulmar_core.health.applied import Applied
 from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.thruster_health import Health
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -165,6 +167,16 @@ class Lqr(Law):
         if self.watch:
             self.watch.acts(chosen)
         return chosen
+
+    def see_applied(self, applied: Applied | None) -> None:
+        """See `ActuatorObserver`."""
+        if self.watch:
+            self.watch.see_applied(applied)
+
+    @property
+    def health(self) -> Health | None:
+        """What the observer believes of valves and push; None without one, or before the first observation."""
+        return self.watch.health if self.watch else None
 
     def _steady(self, command: np.ndarray) -> np.ndarray:
         """What was chosen last, until valves have had the time to open and close."""

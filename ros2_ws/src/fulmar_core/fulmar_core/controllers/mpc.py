@@ -19,6 +19,8 @@ from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.controllers.situation import Situation, Watch
 from fulmar_core.controllers.valve_allocation import ValveAllocation
+from fulmar_core.health.applied import Applied
+from fulmar_core.health.thruster_health import Health
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
@@ -99,6 +101,15 @@ class Mpc(Law):
         chosen = self.plan(now)
         self._watch.acts(chosen)
         return chosen
+
+    def see_applied(self, applied: Applied | None) -> None:
+        """See `ActuatorObserver`."""
+        self._base.see_applied(applied)
+
+    @property
+    def health(self) -> Health | None:
+        """As of `Lqr`."""
+        return self._base.health
 
     def plan(self, now: Situation) -> np.ndarray:
         """Valves to open now, shape (..., n).

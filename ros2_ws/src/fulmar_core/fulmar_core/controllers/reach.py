@@ -38,6 +38,10 @@ class Reach:
         table = np.unique(np.round(np.array(sides), 6), axis=0)
         self._normals, self._levels = table[:, :2], table[:, 2]
 
+    def holds(self, push: np.ndarray) -> np.ndarray:
+        """Whether the valves can bring up the opposite of a push in the body's frame, shape (..., 2) to (...,) [N]."""
+        return np.asarray(np.all(self._levels + push @ self._normals.T >= 0.0, axis=-1))
+
     def along(self, direction: np.ndarray, push: np.ndarray) -> np.ndarray:
         """Largest total force straight along a direction.
 

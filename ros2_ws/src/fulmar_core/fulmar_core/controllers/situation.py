@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulmar_core.controllers.seen import Reader, Vector
+from fulmar_core.health.applied import Applied
 from fulmar_core.health.suspicion import Suspicion
-from fulmar_core.health.thruster_health import ThrusterHealth
+from fulmar_core.health.thruster_health import Health, ThrusterHealth
+from fulmar_core.health.valve_trials import ValveTrials
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.robot import Robot
 
@@ -23,7 +25,7 @@ class Situation:
     turn: np.ndarray  # wanted heading minus heading, 0 where a task has none [rad]
     motion: tuple[np.ndarray, np.ndarray, np.ndarray]  # speed ahead, to the left [m/s], turn rate [rad/s]
     push: np.ndarray  # force and torque from outside, shape (..., 3) [N, N, N·m]
-    alive: np.ndarray | None  # 1, or 0 for a dead valve, shape (..., n); None where nobody looks
+    alive: np.ndarray | None  # 1, or 0 for a valve not to be opened, shape (..., n); None where nothing is estimated
 
 
 def raw_situation(reader: Reader, observation: np.ndarray) -> Situation:
@@ -57,14 +59,19 @@ class Watch:
         place = suspicion.position if self._sees_pose else UNSEEN
         heading = suspicion.heading if self._sees_pose else UNSEEN
         self._estimator = ThrusterHealth(robot, replace(suspicion, position=place, heading=heading))
-        self._closed = robot.actuators.safe_command
+        self._trials = ValveTrials(suspicion.retry_s) if suspicion.retry_s else None
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
         self._estimator.reset()
-        self._heading: np.ndarray | None = None  # expected at the next observation
-        self._command: np.ndarray | None = None
+        if self._trials is not None:
+            self._trials.reset()
+        self._heading: np.ndarray | None = None  # at the last observation
+        self._rate: np.ndarray = np.zeros(())  # turn rate, same
+        self._applied: np.ndarray | Applied | None = None  # since the last observation
+        self._passed_s = self._dt  # since then
+        self.health: Health | None = None  # what is believed, in the world of this class
 
     def look(self, observation: np.ndarray) -> Situation:
         """Take an observation, shape (n,) or (rows, n); another number of rows than before begins anew."""
@@ -73,16 +80,14 @@ class Watch:
             self.reset()
         raw = raw_situation(reader, observation)
         u, v, r = raw.motion
-        yaw = -raw.turn if self._sees_pose or self._heading is None else self._heading
+        yaw = -raw.turn
+        if not self._sees_pose and self._heading is not None:
+            yaw = self._heading + self._passed_s * self._rate
         (x, y), (vx, vy) = _turned(yaw, (-raw.goal[0], -raw.goal[1]), (u, v))
-        command = (
-            self._command
-            if self._command is not None
-            else np.broadcast_to(self._closed, (*shape, len(self._closed)))
-        )
-        health = self._estimator.see(PlanarState(x, y, yaw, vx, vy, r), command, self._dt)
+        health = self._estimator.see(PlanarState(x, y, yaw, vx, vy, r), self._applied, self._passed_s)
+        self.health = health
         x, y, yaw, vx, vy, r = (health.motion[..., i] for i in range(6))
-        self._heading = yaw + self._dt * r
+        self._heading, self._rate = yaw, r
         force = (health.push[..., 0], health.push[..., 1])
         goal, velocity, force = _turned(-yaw, (-x, -y), (vx, vy), force)
         turn = np.asarray(wrapped(-yaw))
@@ -90,11 +95,22 @@ class Watch:
             goal, turn = raw.goal, raw.turn
         push = health.push.copy()
         push[..., 0], push[..., 1] = force
-        return Situation(goal, turn, (*velocity, r), push, health.alive)
+        alive = health.alive
+        if self._trials is not None:
+            alive = self._trials.allowed(alive, self._opened(), self._passed_s)
+        return Situation(goal, turn, (*velocity, r), push, alive)
+
+    def _opened(self) -> np.ndarray | None:
+        """What was open since the last observation; None where that is not known."""
+        return self._applied.commands.max(axis=0) if isinstance(self._applied, Applied) else self._applied
 
     def acts(self, command: np.ndarray) -> None:
-        """Hear what is commanded until the next observation, shape (..., n)."""
-        self._command = command
+        """Take a command for what is applied until the next observation, unless `see_applied` corrects it, (..., n)."""
+        self._applied, self._passed_s = command, self._dt
+
+    def see_applied(self, applied: Applied | None) -> None:
+        """Take what was applied since the last observation of one robot; None where that is not known."""
+        self._applied, self._passed_s = applied, applied.duration_s if applied else self._dt
 
 
 def _turned(angle: np.ndarray, *vectors: Vector) -> list[Vector]:

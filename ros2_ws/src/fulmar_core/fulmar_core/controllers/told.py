@@ -11,8 +11,9 @@ import numpy as np
 from fulmar_core.controllers.seen import Reader
 from fulmar_core.controllers.situation import Situation, Watch
 from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.health.applied import Applied
 from fulmar_core.health.suspicion import Suspicion
-from fulmar_core.health.thruster_health import can_be_watched
+from fulmar_core.health.thruster_health import Health, can_be_watched
 from fulmar_core.observation import Observer
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
@@ -39,7 +40,8 @@ class Told:
         """Build the estimator; rate of the observations in Hz."""
         self._task, reader = task, Reader(robot, task)
         self._estimates_pose = reader.heads and not (reader.tracks or reader.passes)
-        self._watch = Watch(robot, reader, Suspicion(), 1.0 / control_hz)
+        # Networks learn on an estimator that takes no body for held and has no valve tried again.
+        self._watch = Watch(robot, reader, Suspicion(held=0.0, retry_s=0.0), 1.0 / control_hz)
 
     def reset(self) -> None:
         """Forget everything."""
@@ -55,6 +57,15 @@ class Told:
     def acts(self, commands: np.ndarray) -> None:
         """Hear what is commanded until the next observations, shape (rows, valves)."""
         self._watch.acts(np.asarray(commands, dtype=float))
+
+    def see_applied(self, applied: Applied | None) -> None:
+        """See `ActuatorObserver`."""
+        self._watch.see_applied(applied)
+
+    @property
+    def health(self) -> Health | None:
+        """What is believed of valves and push; None before the first observation."""
+        return self._watch.health
 
 
 def _seen_from_goal(situation: Situation) -> tuple[PlanarState, Goal]:

@@ -22,6 +22,8 @@ from fulmar_core.rotation import Array
 
 Range = tuple[float, float]
 
+BEARING = 4  # stream of random numbers, beside those of `counter_rng` and of the simulation
+
 
 @dataclass(frozen=True)
 class Push:
@@ -176,15 +178,37 @@ class Scenario:
     slope: Slope = Slope()
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
+    # Of robots with an air bearing, in simulated plants and emulated devices; batches know neither.
+    bearing_late_s: Range = (0.0, 0.0)  # it carries the robot so long after the start, drawn from the seed [s]
+    held_s: Range = (0.0, 0.0)  # from when to when, after the start, a hand holds the robot where it is [s]
 
     def __post_init__(self) -> None:
-        """Refuse what would do nothing."""
+        """Refuse what would do nothing, and times without meaning."""
+        for name in ("bearing_late_s", "held_s"):
+            low, high = getattr(self, name)
+            if not 0.0 <= low <= high < math.inf:
+                raise ValueError(f"'{name}' must be [low, high] with 0 <= low <= high, found [{low}, {high}].")
         its = self.sensing
         if not self.sensor_noise and (its.noise, its.bias, its.delay_s, its.dropout) != (1.0, 1.0, 0.0, 0.0):
             raise ValueError(
                 "noise, bias, delay_s and dropout of 'sensing' do nothing where 'sensor_noise' is false. "
                 "Set it to true, or leave them out."
             )
+
+
+def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:
+    """How long after the start of an episode the air bearing carries the robot [s].
+
+    Args:
+        scenario: Says between which times it lies.
+        seed: Of the run.
+        number: Of the episode.
+    """
+    low, high = scenario.bearing_late_s
+    if low == high:
+        return low
+    draws = Draws(seed, np.array([number]), np.array([0]), BEARING)
+    return float(draws.uniform(low, high)[0])
 
 
 def longest_delay(robot: Robot, scenario: Scenario) -> float:

@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.health.applied import Applied
 from fulmar_core.health.thruster_health import Health, ThrusterHealth, can_be_watched
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
@@ -40,13 +41,13 @@ class Informer:
             self._health.reset()
 
     def see(
-        self, measured: PlanarState, command: np.ndarray, dt: float, *, wanted: bool = False
+        self, measured: PlanarState, applied: np.ndarray | Applied | None, dt: float, *, wanted: bool = False
     ) -> Health | None:
         """Take a measurement, and tell the controller.
 
         Args:
             measured: Odometry now, shapes (...,).
-            command: What was commanded since the last measurement, shape (..., n).
+            applied: What was applied since the last measurement, as in `ThrusterHealth.see`.
             dt: How long that was [s].
             wanted: Whether somebody else wants to know as well.
 
@@ -55,7 +56,7 @@ class Informer:
         """
         if self._health is None or not (wanted or self._listener):
             return None
-        health = self._health.see(measured, command, dt)
+        health = self._health.see(measured, applied, dt)
         if self._listener is not None:
             self._listener.inform(health)
         return health

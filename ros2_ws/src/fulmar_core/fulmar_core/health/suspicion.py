@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 
+MAY_BE_0 = ("held", "retry_s")
+
+
 @dataclass(frozen=True)
 class Suspicion:
     """Standard deviations and chances; our values, chosen on the conditions of the DRIFT benchmark."""
@@ -21,11 +24,19 @@ class Suspicion:
     drift_torque: float = 0.003  # same [N·m]
     failure: float = 0.02  # chance that an actuator is lost, before anything is seen [-]
     change: float = 1e-3  # chance that what is lost changes, in one second [-]
+    # Evidence that the body is held rather than its valves dead, as log-likelihood; two dead valves are 8, and a hold is
+    # rarer than they are. 0: nothing is looked for [-].
+    held: float = 12.0
+    # A valve that is believed dead is opened once more after so long, and again after twice as long: a trial of a dead
+    # valve costs one opening without effect. 0: never [s].
+    retry_s: float = 6.0
     surprise: float = 16.0  # largest weight of one measurement against a hypothesis, as log-likelihood [-]
 
     def __post_init__(self) -> None:
         """Refuse what no filter exists for."""
-        if min(getattr(self, field.name) for field in fields(self)) <= 0.0:
-            raise ValueError("every number of a suspicion must be greater than 0.")
+        if min(getattr(self, field.name) for field in fields(self) if field.name not in MAY_BE_0) <= 0.0:
+            raise ValueError("every number of a suspicion must be greater than 0; 'held' and 'retry_s' may be 0.")
+        if min(getattr(self, name) for name in MAY_BE_0) < 0.0:
+            raise ValueError("'held' and 'retry_s' must not be negative.")
         if max(self.failure, self.change) >= 0.5:
             raise ValueError("'failure' and 'change' must be less than one half.")

@@ -18,6 +18,8 @@ import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.errors import ConfigError
+from fulmar_core.health.applied import Applied
+from fulmar_core.health.hold_detector import HoldDetector
 from fulmar_core.health.push_filter import PushFilter
 from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.planar import COLUMNS, PlanarState
@@ -36,6 +38,7 @@ class Health:
         np.ndarray
     )  # (..., 6) the measured columns without their noise, of the likeliest set [m, rad, m/s, rad/s]
     push: np.ndarray  # (..., 3) force from outside along the world's x and y [N], torque [N·m]
+    held: np.ndarray  # (...,) whether something keeps the body from moving: then nothing is learned of the others
 
 
 class ThrusterHealth:
@@ -77,25 +80,25 @@ class ThrusterHealth:
         self._chance = self._prior
         self._count = 0
 
-    def see(self, measured: PlanarState, command: np.ndarray, dt: float) -> Health:
+    def see(self, measured: PlanarState, applied: np.ndarray | Applied | None, dt: float) -> Health:
         """Take a measurement.
 
         Args:
-            measured: Odometry now, shapes (...,).
-            command: What was commanded since the last measurement, shape (..., n); another shape begins anew.
+            measured: Odometry now, shapes (...,); another shape than before begins anew.
+            applied: What the valves did since the last measurement: one command, shape (..., n), or several of one
+                robot. None where that is not known: then nothing is learned of valves and push.
             dt: How long that was, a multiple of the physics step [s].
 
         Returns:
             What is believed now.
         """
-        command = np.asarray(command, dtype=float)
-        seen = np.empty((*command.shape[:-1], 6))
-        for i, name in enumerate(COLUMNS):
-            seen[..., i] = getattr(measured, name)
+        seen = np.stack([np.asarray(getattr(measured, name), dtype=float) for name in COLUMNS], axis=-1)
         if self._state is None or self._state.shape[:-2] != seen.shape[:-1]:
             self._begin(seen)
+        elif applied is None:
+            self._restart_motion(seen)
         else:
-            self._follow(seen, command, dt)
+            self._follow(seen, applied, dt)
         return self._believed()
 
     def _begin(self, seen: np.ndarray) -> None:
@@ -104,12 +107,22 @@ class ThrusterHealth:
         self._chance = np.broadcast_to(self._prior, self._state.shape[:-1])
         self._yaw = seen[..., 2].copy()
         self._count = 0
+        self._hold = HoldDetector(self._suspicion, seen.shape[:-1])
+        self._kept = self._state[..., 6:], self._chance  # from before anything spoke for a hold
 
-    def _follow(self, seen: np.ndarray, command: np.ndarray, dt: float) -> None:
+    def _restart_motion(self, seen: np.ndarray) -> None:
+        """Go on from the measurement with what is believed of valves and push: what moved the body is not known."""
+        assert self._state is not None
+        self._state = self._state.copy()
+        self._state[..., :6] = seen[..., None, :]
+        self._yaw = seen[..., 2].copy()
+        self._count = 0
+
+    def _follow(self, seen: np.ndarray, applied: np.ndarray | Applied, dt: float) -> None:
         assert self._state is not None
         equations = self._equations(dt)
         turned = self._turn(seen[..., 2]) @ equations.driven
-        ahead = self._state @ equations.step + self._wrenches(command) @ turned
+        ahead = self._state @ equations.step + self._driven(applied, turned)
         off = seen[..., None, :] - ahead[..., :6]
         off[..., 2] = _wrapped(off[..., 2])
         found = off @ equations.gain(self._count)
@@ -117,11 +130,56 @@ class ThrusterHealth:
         self._state = ahead + found[..., :9]
         odd = found[..., 9:]
         surprise = 0.5 * (odd * odd).sum(axis=-1)
-        surprise -= surprise.min(axis=-1, keepdims=True)
+        least = surprise.min(axis=-1, keepdims=True)
+        surprise -= least
         chance = self._chance * np.exp(-np.minimum(surprise, self._suspicion.surprise))
+        free = least[..., 0] - np.log(chance.sum(axis=-1))
         change = self._suspicion.change * dt
         chance *= (1.0 - change) / chance.sum(axis=-1, keepdims=True)
         self._chance = chance + change * self._prior
+        if self._suspicion.held:
+            self._heed_hold(seen, free, applied, dt)
+
+    def _heed_hold(self, seen: np.ndarray, surprise: np.ndarray, applied: np.ndarray | Applied, dt: float) -> None:
+        """Learn nothing from a body that is held, and forget what was learned while it was not known to be."""
+        assert self._state is not None
+        commands = applied.commands if isinstance(applied, Applied) else np.asarray(applied)
+        thrust = np.asarray(np.any(commands > 0.0, axis=None if isinstance(applied, Applied) else -1))
+        self._hold.look(seen, surprise, thrust, dt)
+        push, chance = self._kept
+        held, innocent = self._hold.held, self._hold.innocent[..., None]
+        if held.any():
+            at_rest = seen.copy()
+            at_rest[..., 3:] = 0.0
+            still = np.concatenate((np.broadcast_to(at_rest[..., None, :], (*push.shape[:-1], 6)), push), axis=-1)
+            self._state = np.where(held[..., None, None], still, self._state)
+            self._chance = np.where(held[..., None], chance, self._chance)
+        self._kept = (
+            np.where(innocent[..., None], self._state[..., 6:], push),
+            np.where(innocent, self._chance, chance),
+        )
+
+    def _driven(self, applied: np.ndarray | Applied, turned: np.ndarray) -> np.ndarray:
+        """What the valves add to the state within the interval under each hypothesis, shape (..., hypotheses, 9).
+
+        Args:
+            applied: As in `see`.
+            turned: What a wrench in the body's frame does that holds for the whole interval, shape (..., 3, 9).
+        """
+        if not isinstance(applied, Applied):
+            return np.asarray(self._wrenches(np.asarray(applied, dtype=float)) @ turned)
+        if len(applied.seconds) == 1:
+            return np.asarray(self._wrenches(applied.commands[0]) @ turned)
+        seconds, tick = applied.seconds, self._robot.timing.physics_dt
+        whole = float(seconds.sum())
+        # An early push moves the body farther than a late one: it has the rest of the interval to do so.
+        rest = whole - np.cumsum(seconds)
+        place = seconds * (2.0 * rest + seconds + tick) / (whole * (whole + tick))
+        speed = seconds / whole
+        wrenches = np.stack([self._wrenches(command) for command in applied.commands])
+        driven = np.tensordot(speed, wrenches, 1) @ turned
+        driven[..., :3] = np.tensordot(place, wrenches, 1) @ turned[..., :3]
+        return np.asarray(driven)
 
     def _wrenches(self, command: np.ndarray) -> np.ndarray:
         """Force ahead, to the left and yaw moment of the valves under each hypothesis, shape (..., hypotheses, 3)."""
@@ -158,6 +216,7 @@ class ThrusterHealth:
             self._alive[best],
             motion.reshape(*best.shape, 6),
             (self._chance[..., None, :] @ self._state[..., 6:])[..., 0, :],
+            self._hold.held,
         )
 
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 
+BEARING_OFF = "the air bearing is off"
+
+
 class Mode(Enum):
     """Stages of a controller, in the order in which it goes through them."""
 
@@ -32,6 +35,7 @@ class Flags:
     lacking: str = "goal"  # what there is none of yet, where `has_goal` is false
     estop: str = ""  # why the emergency stop holds, empty if it does not
     outside: str = ""  # how the robot left the area that it may be in, empty if it did not
+    bearing_off: bool = False  # the robot has an air bearing that is not known to be on
     active_s: float = 0.0  # how long it has been acting [s]
     max_run_time_s: float = 0.0  # and how long it may; 0: for ever [s]
 
@@ -78,6 +82,8 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
         return Decision(Mode.ARMED, False, flags.input_problem)
     if flags.outside:
         return Decision(Mode.ARMED, False, flags.outside)
+    if flags.bearing_off:
+        return Decision(Mode.ARMED, False, BEARING_OFF)
     if not flags.has_goal:
         return Decision(Mode.ARMED, False, f"no {flags.lacking} yet")
     if not flags.goal_distance <= flags.geofence:  # so that a distance that is not a number is beyond it too

@@ -1,0 +1,90 @@
+"""A simulated platform on its air bearing: it stands where it is without air, or while a hand holds it."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from fulmar_core.backend import Backend, Sample
+from fulmar_core.disturbances.scenario import Scenario, bearing_late_s
+from fulmar_core.episode import Episode
+
+
+class CanStand(Backend, Protocol):
+    """A simulator whose body can be kept where it is."""
+
+    def stand(self, ticks: int = 1) -> Sample:
+        """Let time pass for a body that nothing moves.
+
+        Args:
+            ticks: Number of physics steps, >= 1.
+
+        Returns:
+            Sample at their end; the body is at rest.
+        """
+        ...
+
+
+class OnAir:
+    """A simulator with an `AirBearing`, whose valve is open from the start.
+
+    Air carries the body a while after the valve has opened, as the scenario says. Until then the other valves stay
+    closed, as the drivers of real platforms keep them.
+    """
+
+    def __init__(self, backend: CanStand, scenario: Scenario) -> None:
+        """Put a simulator on air.
+
+        Args:
+            backend: The simulator.
+            scenario: Says when the bearing carries the robot, and when a hand holds it.
+        """
+        self.robot, self._backend, self._scenario = backend.robot, backend, scenario
+        self._safe = self.robot.actuators.safe_command
+        self._lock = threading.Lock()
+        self._open = True  # the bearing's valve
+        self._late_s = scenario.bearing_late_s[0]
+        self._passed_s = 0.0  # since the start
+        self._opened_s = 0.0  # when the valve was opened
+
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
+        """Begin anew; see `Backend.reset`."""
+        with self._lock:
+            self._late_s = bearing_late_s(self._scenario, seed=seed, number=number)
+            self._passed_s = self._opened_s = 0.0
+        return self._backend.reset(episode, seed=seed, number=number)
+
+    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+        """Apply a command, or closed valves while the bearing is off; see `Backend.step`."""
+        on, (grip_s, release_s) = self.bearing_on, self._scenario.held_s
+        applied = np.asarray(command, dtype=float) if on else self._safe
+        held = grip_s <= self._passed_s < release_s
+        sample = self._backend.step(applied, ticks) if on and not held else self._backend.stand(ticks)
+        with self._lock:
+            self._passed_s += ticks * self.robot.timing.physics_dt
+        return replace(sample, applied=applied)
+
+    def make_safe(self) -> None:
+        """See `Backend.make_safe`; the bearing stays as it is."""
+        self._backend.make_safe()
+
+    def close(self) -> None:
+        """See `Backend.close`."""
+        self._backend.close()
+
+    @property
+    def bearing_on(self) -> bool:
+        """See `AirBearing`."""
+        with self._lock:
+            return self._open and self._passed_s - self._opened_s >= self._late_s - 1e-9
+
+    def set_bearing(self, on: bool) -> str:
+        """See `AirBearing`."""
+        with self._lock:
+            if on and not self._open:
+                self._opened_s = self._passed_s
+            self._open = on
+        return ""
