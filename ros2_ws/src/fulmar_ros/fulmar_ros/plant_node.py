@@ -110,6 +110,7 @@ class PlantNode(LifecycleNode):
             odometry=self.settings.publishes_odometry,
             mocap=self._motion_capture(),
             lockstep=self.settings.lockstep,
+            simulated_time=self.clock if isinstance(self.clock, SimulatedTime) else None,
         )
         self._make_loops(self._backend)
         self.health.open(self)
@@ -214,8 +215,8 @@ class PlantNode(LifecycleNode):
         self.stop()
         if self._backend is not None:
             self._backend = None
+            self.health.close(self)  # first: it looks at the wires
             self.wires.destroy(self)
-            self.health.close(self)
 
     def _run(self, backend: Backend) -> None:
         try:
