@@ -259,6 +259,57 @@ class TestHand:
         assert guard.give_back(0)
 
 
+TWO = ["/floating_platform/controller", "/floating_platform/stranger"]
+
+
+class TestCommandWriters:
+    """Two nodes that publish commands."""
+
+    def test_while_two_nodes_publish_commands_the_valves_are_closed(self, guard):
+        guard.offer(NAMES, GOOD, 0)
+        guard.writers.see(TWO, 1 * MS)
+        assert not guard.output(1 * MS).any()
+        assert not guard.answer(1 * MS).any()
+        guard.offer(NAMES, GOOD, 2 * MS)
+        assert not guard.output(2 * MS).any()
+        assert guard.command.tolist() == [0.0] * 8  # nothing is left for the end of the hold
+
+    def test_the_reason_names_both_nodes(self, guard):
+        guard.writers.see(TWO, 0)
+        assert "2 nodes publish commands, and only one may: " + ", ".join(TWO) in guard.writers.reason(0)
+
+    def test_after_one_is_gone_and_a_settle_time_the_other_is_obeyed(self, guard):
+        guard.writers.see(TWO, 0)
+        guard.writers.see([], 10 * MS)
+        guard.offer(NAMES, GOOD, 990 * MS)
+        assert not guard.output(990 * MS).any()
+        guard.offer(NAMES, GOOD, 1_010 * MS)
+        assert guard.output(1_010 * MS).tolist() == GOOD
+        assert guard.writers.reason(1_010 * MS) == ""
+
+    def test_one_node_is_obeyed(self, guard):
+        guard.writers.see(TWO[:1], 0)
+        guard.offer(NAMES, GOOD, 0)
+        assert guard.output(0).tolist() == GOOD
+
+    def test_a_person_drives_although_two_controllers_do_not(self, guard):
+        guard.writers.see(TWO, 0)
+        guard.offer_by_hand(NAMES, GOOD, 1 * MS)
+        assert guard.output(1 * MS).tolist() == GOOD
+        guard.offer_by_hand(NAMES, [0.0] * 8, 2 * MS)
+        assert guard.give_back(3 * MS) == ""
+        guard.offer(NAMES, GOOD, 4 * MS)
+        assert not guard.output(4 * MS).any()
+
+    def test_wheels_slow_down_instead_of_locking(self, base):
+        for k in range(6):
+            base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
+        base.writers.see(TWO, 510 * MS)
+        assert base.output(510 * MS)[0] == pytest.approx(0.45)
+        assert 0.0 < base.output(700 * MS)[0] < 0.4
+        assert base.output(1_200 * MS)[0] == 0.0
+
+
 BASE = load_robot("turtlebot2").actuators
 
 
@@ -302,6 +353,23 @@ class TestSlew:
         assert base.output(520 * MS)[0] > 0.4
         assert base.output(620 * MS)[0] == pytest.approx(0.45 - 0.09, abs=0.02)
         assert base.output(1200 * MS)[0] == 0.0
+
+    @pytest.mark.parametrize("rate", [1, 2, 4])
+    def test_commands_without_stamps_are_slewed_by_the_time_of_the_plant(self, base, rate):
+        """At rate 4 a control period takes a quarter of it by the steady clock."""
+        for k in range(6):
+            base.offer(BASE.names, [0.45, 0.0], 100 * k * MS // rate, plant_ns=100 * k * MS)
+        assert base.command[0] == pytest.approx(0.45)
+
+    def test_commands_by_hand_are_slewed_by_the_time_of_the_plant_too(self, base):
+        for k in range(6):
+            base.offer_by_hand(BASE.names, [0.45, 0.0], 25 * k * MS, plant_ns=100 * k * MS)
+        assert base.command[0] == pytest.approx(0.45)
+
+    def test_a_plant_whose_time_stands_still_moves_no_actuator_on(self, base):
+        for k in range(6):
+            base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, plant_ns=0)
+        assert base.command[0] == pytest.approx(0.09)
 
     def test_valves_have_no_slew(self, guard):
         guard.offer(NAMES, GOOD, 0)

@@ -70,6 +70,7 @@ class PlantHealth:
 
     def tell(self) -> None:
         """Publish when something changed, and now and then."""
+        self._wires.see_writers()
         level, message, key = self._verdict()
         more = self.more()
         unfit = BETWEEN.join(self._wire_watch.look())
@@ -87,6 +88,9 @@ class PlantHealth:
         """Level, message, and what of the message counts as a change."""
         if self.mode == "fault":
             return "error", self.reason, "fault"
+        contested = self._contested()
+        if contested:
+            return "error", f"{contested}. Actuators in their safe state until the others stop.", contested
         if self.mode == "running" and self._realtime is not None:
             now = time.monotonic_ns()
             late_s = self._realtime.since_tick_s(now)
@@ -114,6 +118,12 @@ class PlantHealth:
         if self.mode == "waiting" and self.awaited:
             return "ok", f"waiting: {self._wires.subscribers()} of {self.awaited} listen", ""
         return "ok", self.mode, ""
+
+    def _contested(self) -> str:
+        """Which nodes publish commands, where two do and one has the actuators."""
+        with self._wires.lock:
+            contested = self._guard.writers.reason(time.monotonic_ns())
+        return "" if self._guard.person or self.mode == "finished" else contested
 
     def _estop(self) -> tuple[str, str, str] | None:
         """The verdict while the e-stop holds: before it ever allowed anything it is a state, after that an event."""

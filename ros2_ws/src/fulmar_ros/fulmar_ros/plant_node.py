@@ -112,6 +112,7 @@ class PlantNode(LifecycleNode):
             odometry=self.settings.publishes_odometry,
             mocap=self._motion_capture(),
             lockstep=self.settings.lockstep,
+            simulated_time=self.clock if isinstance(self.clock, SimulatedTime) else None,
         )
         if isinstance(self._backend, AirBearing):
             self._air = AirBearingWires(self, self._backend)
@@ -221,11 +222,11 @@ class PlantNode(LifecycleNode):
         self.stop()
         if self._backend is not None:
             self._backend = None
+            self.health.close(self)  # first: it looks at the wires
             if self._air is not None:
                 self._air.destroy(self)
                 self._air = None
             self.wires.destroy(self)
-            self.health.close(self)
 
     def _run(self, backend: Backend) -> None:
         try:

@@ -37,6 +37,7 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     command_wire,
 )
+from fulmar_ros.command_writers import writers_of
 from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
 from fulmar_ros.deadline import Spread
 from fulmar_ros.message_reader import stamp_ns
@@ -45,6 +46,7 @@ from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.sent_states import SentStates
+from fulmar_ros.simulated_time import SimulatedTime
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
@@ -63,6 +65,7 @@ class PlantWires:
         odometry: bool = True,
         mocap: MotionCapture | None = None,
         lockstep: bool = False,
+        simulated_time: SimulatedTime | None = None,
     ) -> None:
         """Create every endpoint.
 
@@ -75,6 +78,7 @@ class PlantWires:
             mocap: Publish its poses, of which an estimator makes odometry.
             lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
                 clock, without it, a person may take the actuators, and commands go before other work.
+            simulated_time: Clock of a simulated plant, by which actuators follow commands.
         """
         self._mocap = mocap
         self._prior = lockstep  # whether the threads that commands pass have what priority they need
@@ -85,6 +89,7 @@ class PlantWires:
         self.answers = 0  # states that a command has answered
         self.listening = True  # whether commands of controllers are heard
         self._guard = guard
+        self._simulated_time = simulated_time
         self._sent = SentStates(guard.watchdog.timeout_ns)
         # Who knows where the robot is from elsewhere answers stamps of another clock.
         self._knows_ages = simulated or odometry
@@ -231,13 +236,25 @@ class PlantWires:
 
     def _on_teleop(self, message: JointState) -> None:
         with self.lock:
-            self._guard.offer_by_hand(message.name, message.effort, time.monotonic_ns())
+            self._guard.offer_by_hand(
+                message.name, message.effort, time.monotonic_ns(), plant_ns=self._plant_ns
+            )
 
     def _on_give_back(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         with self.lock:
             problem = self._guard.give_back(time.monotonic_ns())
         response.success, response.message = not problem, problem or "the controller has the robot again"
         return response
+
+    def see_writers(self) -> None:
+        """Report to the guard which nodes publish commands."""
+        writers = writers_of(self._node, self._commands)
+        with self.lock:
+            self._guard.writers.see(writers, time.monotonic_ns())
+
+    @property
+    def _plant_ns(self) -> int | None:
+        return None if self._simulated_time is None else self._simulated_time.now_ns
 
     def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
         now = time.monotonic_ns()
@@ -246,9 +263,12 @@ class PlantWires:
         if not self._prior:
             take_priority_with_helpers(CONTROL_PRIORITY)
             self._prior = True
+        self.see_writers()  # before the first command of a second publisher is carried out
         with self.lock:
             outdated = self._knows_ages and self._sent.outdated(stamp, now)
-            taken = self._guard.offer(names, values, now, stamp_ns=stamp, outdated=outdated)
+            taken = self._guard.offer(
+                names, values, now, stamp_ns=stamp, outdated=outdated, plant_ns=self._plant_ns
+            )
             latency_ns = self._sent.answered(stamp, now)
             if taken and latency_ns is not None:
                 self.latency_ms.add(latency_ns / 1e6)

@@ -1,10 +1,10 @@
-"""Commands that nobody may carry out: nonsense from a stranger while the controller hangs, and such that come late."""
+"""Commands that must not be carried out: invalid, late, or from a second node."""
 
 from __future__ import annotations
 
 import math
-import signal
 import threading
+from dataclasses import replace
 
 import rclpy
 from geometry_msgs.msg import TwistStamped
@@ -20,6 +20,8 @@ from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.qos import publisher_qos
 
 STRANGER_S = 0.02  # between its commands
+DISCOVERY_S = 0.3  # until nodes on one computer know of a new publisher, and for the look of a tenth of a second
+COMMANDS = Surroundings(spoilt=None)
 
 
 def commands_not_a_number(live: LiveSystem) -> Outcome:
@@ -48,36 +50,47 @@ def commands_late(live: LiveSystem) -> Outcome:
     return stopped(live, since_s, limit_s)
 
 
-def _nonsense(live: LiveSystem, names: list[str], values: list[float]) -> Outcome:
-    """Nonsense must not feed the watchdog, nor reach an actuator."""
-    wire = command_wire(live.robot)
+def commands_from_another_node(live: LiveSystem) -> Outcome:
+    """A second node publishes good commands while the controller goes on: the plant obeys neither, and names both."""
+    wire, robot = command_wire(live.robot), live.robot
+    message = _message(live, list(robot.actuators.names), [1.0] * len(robot.actuators.names))
     node = rclpy.create_node("stranger", namespace=f"/{live.plan.robot}")
     over = threading.Event()
     try:
-        if wire is VELOCITY_COMMAND:
-            publisher = node.create_publisher(TwistStamped, wire.name, publisher_qos(wire))
-            twist = TwistStamped()
-            twist.twist.linear.x, twist.twist.angular.z = values
-            message: TwistStamped | JointState = twist
-        else:
-            publisher = node.create_publisher(JointState, wire.name, publisher_qos(wire))
-            message = JointState(name=names, effort=values)
+        since_s = live.until_it_moves()
+        publisher = node.create_publisher(type(message), wire.name, publisher_qos(wire))
 
         def talk() -> None:
             while not over.wait(STRANGER_S):
                 publisher.publish(message)
 
-        since_s = live.until_it_moves()
-        live.send("controller", signal.SIGSTOP)
         thread = threading.Thread(target=talk, name="stranger", daemon=True)
         thread.start()
         try:
-            return stopped(live, since_s, live.silenced_s)
+            outcome = stopped(live, since_s, DISCOVERY_S + live.tick_s + live.ramp_s)
         finally:
             over.set()
             thread.join()
     finally:
         node.destroy_node()
+    names = f"/{live.plan.robot}/controller, /{live.plan.robot}/stranger"
+    return replace(outcome, passed=outcome.passed and names in outcome.reaction)
+
+
+def _nonsense(live: LiveSystem, names: list[str], values: list[float]) -> Outcome:
+    """Nonsense must not feed the watchdog, nor reach an actuator."""
+    message = _message(live, names, values)
+    since_s = live.until_it_moves()
+    live.spoiler.spoil = lambda _good: message
+    return stopped(live, since_s, live.silenced_s)
+
+
+def _message(live: LiveSystem, names: list[str], values: list[float]) -> TwistStamped | JointState:
+    if command_wire(live.robot) is not VELOCITY_COMMAND:
+        return JointState(name=names, effort=values)
+    twist = TwistStamped()
+    twist.twist.linear.x, twist.twist.angular.z = values
+    return twist
 
 
 def _without_names(robot: Robot) -> str:
@@ -85,8 +98,9 @@ def _without_names(robot: Robot) -> str:
 
 
 COMMAND_FAULTS = (
-    Fault(commands_not_a_number),
-    Fault(commands_of_wrong_length, why_not=_without_names),
-    Fault(commands_with_wrong_names, why_not=_without_names),
-    Fault(commands_late, Surroundings(spoilt=None)),
+    Fault(commands_not_a_number, COMMANDS),
+    Fault(commands_of_wrong_length, COMMANDS, _without_names),
+    Fault(commands_with_wrong_names, COMMANDS, _without_names),
+    Fault(commands_late, COMMANDS),
+    Fault(commands_from_another_node),
 )

@@ -9,6 +9,7 @@ import numpy as np
 from fulmar_core.actuators.slowdown import slowed
 from fulmar_core.robot import Actuators, Rolling
 from fulmar_core.safety.command_gate import command_problem, name_problem
+from fulmar_core.safety.command_writers import CommandWriters
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 
@@ -31,6 +32,7 @@ class ActuatorGuard:
         rejected: How many commands could not be carried out.
         last_rejection: Why not the last of them.
         person: Whether a person has the actuators.
+        writers: Which nodes publish the controller's commands; of two none is obeyed.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class ActuatorGuard:
         """
         self._actuators, self.watchdog = actuators, watchdog
         self.estop = estop or EstopWatch(required=False)
+        self.writers = CommandWriters()
         self._control_dt, self._lockstep = control_dt, lockstep
         self.rejected = 0
         self.last_rejection = ""
@@ -76,6 +79,7 @@ class ActuatorGuard:
         *,
         stamp_ns: int | None = None,
         outdated: bool = False,
+        plant_ns: int | None = None,
     ) -> bool:
         """Take a controller's command if it can be carried out and no person has the actuators.
 
@@ -88,6 +92,7 @@ class ActuatorGuard:
             now_ns: Steady clock [ns].
             stamp_ns: Stamp of the observation that it answers; None or 0 where the sender sets none [ns].
             outdated: Whether that observation is known to be older than the watchdog.
+            plant_ns: Time of a simulated plant, by which actuators follow; `now_ns` by default [ns].
 
         Returns:
             Whether it was taken.
@@ -100,11 +105,18 @@ class ActuatorGuard:
         if not self._check(names, values, self._stamp_problem(stamp_ns or 0, outdated=outdated)):
             return False
         answers_anew = bool(stamp_ns) and (stamp_ns or 0) > self._stamp_ns
-        self._take(values, now_ns, self._control_dt if answers_anew else None)
+        self._take(values, now_ns, plant_ns, self._control_dt if answers_anew else None)
         self._stamp_ns = stamp_ns or self._stamp_ns
         return True
 
-    def offer_by_hand(self, names: Sequence[str], values: Sequence[float], now_ns: int) -> bool:
+    def offer_by_hand(
+        self,
+        names: Sequence[str],
+        values: Sequence[float],
+        now_ns: int,
+        *,
+        plant_ns: int | None = None,
+    ) -> bool:
         """Take a person's command if it can be carried out, and the actuators with it; arguments as of `offer`."""
         if not self._check(names, values, None):
             return False
@@ -113,7 +125,7 @@ class ActuatorGuard:
                 return False
             self.person = True
             self.command = self._actuators.safe_command  # what the controller wanted is over
-        self._take(values, now_ns, None)
+        self._take(values, now_ns, plant_ns, None)
         return True
 
     def give_back(self, now_ns: int) -> str:
@@ -156,8 +168,9 @@ class ActuatorGuard:
         return min((end for end in ends if end is not None), default=None)
 
     def _stopped(self, now_ns: int) -> int | None:
-        """Since when the e-stop holds; None if it does not."""
-        if not self.estop.reason(now_ns):
+        """Since when the e-stop, or a second publisher of commands, holds the robot; None if neither does."""
+        contested = not self.person and self.writers.reason(now_ns)
+        if not self.estop.reason(now_ns) and not contested:
             self._stopped_ns = None
         elif self._stopped_ns is None:
             self._stopped_ns = now_ns
@@ -185,27 +198,30 @@ class ActuatorGuard:
             self.last_rejection = problem
         return not problem
 
-    def _take(self, values: Sequence[float], now_ns: int, seconds: float | None) -> None:
+    def _take(
+        self, values: Sequence[float], now_ns: int, plant_ns: int | None, seconds: float | None
+    ) -> None:
         """Take a good command; `seconds` is the time it has had to change in, None for that since the last one."""
+        time_ns = now_ns if plant_ns is None else plant_ns
         if self._stopped(now_ns) is not None:
             if not isinstance(self._actuators, Rolling) or not np.any(self.output(now_ns)):
                 self.command = self._actuators.safe_command  # nothing is left to slow down from
         else:
             if self.watchdog.expired(now_ns) and not self._lockstep:
                 self.command = self.output(now_ns)  # where wheels have slowed down to
-            self.command = self._slewed(np.asarray(values, dtype=float), now_ns, seconds)
-        self._taken_ns = now_ns
+            self.command = self._slewed(np.asarray(values, dtype=float), time_ns, seconds)
+        self._taken_ns = time_ns
         self.watchdog.feed(now_ns)
 
-    def _slewed(self, values: np.ndarray, now_ns: int, seconds: float | None) -> np.ndarray:
+    def _slewed(self, values: np.ndarray, time_ns: int, seconds: float | None) -> np.ndarray:
         """Within the limits, and no further from the command before than actuators follow."""
         wanted: np.ndarray = self._actuators.limited(values)
         slew = self._actuators.response.slew
         if not slew or not self._control_dt:
             return wanted
         if seconds is None:
-            since_s = self._control_dt if self._taken_ns is None else (now_ns - self._taken_ns) / 1e9
-            seconds = min(self._control_dt, since_s)
+            since_s = self._control_dt if self._taken_ns is None else (time_ns - self._taken_ns) / 1e9
+            seconds = max(0.0, min(self._control_dt, since_s))
         most = seconds * np.asarray(slew) * (1.0 + 1e-9)
         # Who keeps to the limit already gets the very command, to the last bit.
         within = np.abs(wanted - self.command) <= most
