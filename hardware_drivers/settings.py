@@ -13,6 +13,7 @@ from fulmar_core.robot import Actuators, load_robot
 
 # A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
 LONGEST_LINGER_S = 2.0
+UNARMED = "not armed: arm: true or --arm"  # what a boat says that may not arm
 
 
 def check_linger(linger_s: float) -> None:
@@ -157,6 +158,7 @@ class MavlinkBoat:
     trim_us: int = 1500
     span_us: int = 400  # of a full deflection
     silent_s: float = 1.0
+    arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; without it, it only listens
 
     def __post_init__(self) -> None:
         """Refuse channels that MAVLink's override does not have, and pulses beyond those of servos."""

@@ -51,6 +51,11 @@ def broken_configs(tmp_path, monkeypatch):
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
         ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
         ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device neither waits nor hurries"),
+        ([*RUN, "--arm"], "--arm is for boats with an autopilot"),
+        (
+            ["run", "kingfisher", "--backend", "hardware", "--hardware", "kingfisher_ardupilot", "--emulate"],
+            "not armed: arm: true or --arm",
+        ),
         ([*RUN, "--emulate"], "--hardware and --emulate go with --backend hardware, not with mujoco."),
         (
             [*RUN, "--backend", "hardware", "--hardware", "zero_g_lap"],
