@@ -28,6 +28,7 @@ from hardware_drivers.settings import (
 )
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
 from hardware_drivers.valve_message import to_message
+from hardware_drivers.wiring import channel_velocity, channels
 
 
 @dataclass(frozen=True)
@@ -124,9 +125,20 @@ class DriverNode(PlantNode):
     def _by_topic(self, robot: Robot, hardware: Hardware) -> Device | None:
         driver = hardware.driver
         if isinstance(driver, VelocityTopic):
-            return TopicDriver(robot, velocity_sender(self, driver.topic, stamped=driver.stamped))
+            send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped)
+            track = robot.actuators.track  # type: ignore[union-attr]  # settings refuse any other
+
+            def send_wheels(command: np.ndarray) -> None:
+                speed, turn_rate = (float(value) for value in command)
+                send_velocity(np.array(channel_velocity(driver.wiring, track, speed, turn_rate)))
+
+            return TopicDriver(robot, send_wheels)
         if isinstance(driver, ThrustTopic):
-            return TopicDriver(robot, thrust_sender(self, driver.topic))
+            send_thrust = thrust_sender(self, driver.topic)
+            return TopicDriver(
+                robot,
+                lambda command: send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command)))),
+            )
         if isinstance(driver, ValveTopic):
             publish = valve_sender(self, driver.topic)
 

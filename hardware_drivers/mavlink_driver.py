@@ -23,6 +23,7 @@ from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.ports import patiently, write_at_once
 from hardware_drivers.settings import UNARMED, MavlinkBoat
 from hardware_drivers.thrust import bounded
+from hardware_drivers.wiring import channels as wired
 
 Address = tuple[int, int]  # system and component
 HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
@@ -210,7 +211,7 @@ def override_of(settings: MavlinkBoat, left: float, right: float) -> list[int]:
         left: Share of full thrust, -1 to 1; see `bounded`.
         right: Same.
     """
-    left, right = bounded(left, right)
+    left, right = wired(settings.wiring, *bounded(left, right))
     channels = [NO_CHANGE] * 8
     shares = {
         settings.steering_channel: 0.5 * (left - right),

@@ -62,10 +62,6 @@ def broken_configs(tmp_path, monkeypatch):
             "unknown hardware 'zero_g_lap'. Did you mean 'zero_g_lab'?",
         ),
         ([*RUN, "--backend", "hardware", "--hardware", "turtlebot2"], "is the hardware of 'turtlebot2'"),
-        (
-            [*RUN, "--backend", "hardware", "--hardware", "zero_g_lab_valve_node", "--emulate"],
-            "there is no emulator for driver 'valve_topic'",
-        ),
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),
         ([*RUN, "--goal", "1,2"], "--goal = '1,2' must be three finite numbers"),
         ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),

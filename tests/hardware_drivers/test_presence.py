@@ -43,7 +43,7 @@ def test_a_port_on_the_command_line_counts_and_not_the_file_s(tmp_path):
 def test_a_port_that_this_user_may_not_use_is_reported_with_the_group(tmp_path, monkeypatch):
     (tmp_path / "port").touch()
     monkeypatch.setattr("os.access", lambda *_: False)
-    with pytest.raises(DeviceError, match="may not use the port.*dialout"):
+    with pytest.raises(DeviceError, match=r"may not use the port.*dialout"):
         check_presence(Kobuki("kobuki", str(tmp_path / "port")))
 
 

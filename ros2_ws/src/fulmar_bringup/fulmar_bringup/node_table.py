@@ -28,7 +28,7 @@ from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
 from hardware_drivers.settings import load_hardware
 
-Parameter = bool | int | float | str | list[float] | list[int]
+Parameter = bool | int | float | str | list[float] | list[int] | list[str]
 
 
 @dataclass(frozen=True)
