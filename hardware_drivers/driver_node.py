@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
@@ -16,9 +16,18 @@ from fulmar_ros.plant_node import DONE, PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.devices import make_device
-from hardware_drivers.settings import Hardware, ThrustTopic, ValveTopic, VelocityTopic, load_hardware
+from hardware_drivers.settings import (
+    UNARMED,
+    Hardware,
+    MavlinkBoat,
+    ThrustTopic,
+    ValveTopic,
+    VelocityTopic,
+    load_hardware,
+)
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
 from hardware_drivers.valve_message import to_message
+from hardware_drivers.wiring import channel_velocity, channels
 
 
 @dataclass(frozen=True)
@@ -29,6 +38,7 @@ class DriverSettings(PlantSettings):
     hardware: str = ""  # a name of configs/hardware, or a path that ends in .yaml
     port: str = ""  # takes the place of the hardware file's port
     connect_s: float = 10.0  # wait so long for the device [s]
+    arm: bool = False  # arm an autopilot, as `arm: true` in the hardware file
 
     def __post_init__(self) -> None:
         """Refuse what a real device cannot do."""
@@ -81,15 +91,41 @@ class DriverNode(PlantNode):
         hardware = load_hardware(settings.hardware)
         if hardware.robot != robot.name:
             raise ConfigError(f"{settings.hardware} is of '{hardware.robot}', the robot is '{robot.name}'.")
+        hardware = self._armed(hardware, settings)
         by_topic = self._by_topic(robot, hardware)
         return by_topic or make_device(robot, hardware, port=settings.port, patience_s=settings.connect_s)
+
+    def _armed(self, hardware: Hardware, settings: DriverSettings) -> Hardware:
+        """The hardware file with the parameter `arm`; logs what arming does before anything is sent."""
+        driver = hardware.driver
+        if not isinstance(driver, MavlinkBoat):
+            return hardware
+        driver = replace(driver, arm=driver.arm or settings.arm)
+        self.get_logger().warning(
+            f"autopilot at {settings.port or driver.port}: this driver will set MANUAL, ARM THE BOAT, and override RC "
+            f"channels {driver.steering_channel} (steering) and {driver.throttle_channel} (throttle)."
+            if driver.arm
+            else f"autopilot at {settings.port or driver.port}: {UNARMED}. This driver sends no command."
+        )
+        return replace(hardware, driver=driver)
 
     def _by_topic(self, robot: Robot, hardware: Hardware) -> Device | None:
         driver = hardware.driver
         if isinstance(driver, VelocityTopic):
-            return TopicDriver(robot, velocity_sender(self, driver.topic, stamped=driver.stamped))
+            send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped)
+            track = robot.actuators.track  # type: ignore[union-attr]  # settings refuse any other
+
+            def send_wheels(command: np.ndarray) -> None:
+                speed, turn_rate = (float(value) for value in command)
+                send_velocity(np.array(channel_velocity(driver.wiring, track, speed, turn_rate)))
+
+            return TopicDriver(robot, send_wheels)
         if isinstance(driver, ThrustTopic):
-            return TopicDriver(robot, thrust_sender(self, driver.topic))
+            send_thrust = thrust_sender(self, driver.topic)
+            return TopicDriver(
+                robot,
+                lambda command: send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command)))),
+            )
         if isinstance(driver, ValveTopic):
             publish = valve_sender(self, driver.topic)
 

@@ -20,6 +20,7 @@ from hardware_drivers.local_frame import LocalFrame
 from hardware_drivers.nmea import Decoder
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import KingfisherNmea
+from hardware_drivers.wiring import channels
 
 DAY_MS = 86_400_000
 STOPS = 5
@@ -61,7 +62,8 @@ class KingfisherDriver:
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Send a command; see `Backend.step`."""
         shares = np.asarray(command, dtype=float)
-        self._port.write(protocol.drive(float(shares[0]), float(shares[1])))
+        left, right = channels(self._settings.wiring, float(shares[0]), float(shares[1]))
+        self._port.write(protocol.drive(left, right))
         return self._feedback.sample(shares)
 
     def make_safe(self) -> None:

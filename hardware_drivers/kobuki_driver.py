@@ -28,6 +28,7 @@ from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import Kobuki
 from hardware_drivers.standing_wheels import StandingWheels
 from hardware_drivers.wheel_odometry import WheelOdometry
+from hardware_drivers.wiring import channel_velocity
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous
 STOPS = 5  # the stop goes out this often on the way out
@@ -49,7 +50,7 @@ class KobukiDriver:
             DeviceError: Nothing is there, or it does not speak Kobuki's protocol.
         """
         assert isinstance(robot.actuators, DifferentialDrive)  # settings refuse any other
-        self.robot, self._wheels = robot, robot.actuators
+        self.robot, self._wheels, self._wiring = robot, robot.actuators, settings.wiring
         self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
@@ -117,7 +118,8 @@ class KobukiDriver:
     def _send(self, command: np.ndarray) -> np.ndarray:
         """Send what is allowed of a command, shape (2,), and return it."""
         self._sent = self._allowed(np.asarray(command, dtype=float))
-        self._port.write(base_control(float(self._sent[0]), float(self._sent[1])))
+        speed, turn_rate = (float(value) for value in self._sent)
+        self._port.write(base_control(*channel_velocity(self._wiring, self._wheels.track, speed, turn_rate)))
         return self._sent
 
     def _allowed(self, command: np.ndarray) -> np.ndarray:

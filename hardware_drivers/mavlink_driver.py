@@ -21,8 +21,9 @@ from fulmar_core.robot import Robot
 from hardware_drivers.feedback import Feedback
 from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.ports import patiently, write_at_once
-from hardware_drivers.settings import MavlinkBoat
+from hardware_drivers.settings import UNARMED, MavlinkBoat
 from hardware_drivers.thrust import bounded
+from hardware_drivers.wiring import channels as wired
 
 Address = tuple[int, int]  # system and component
 HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
@@ -34,6 +35,8 @@ RATES_HZ = {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 50.0, "RAW_IMU": 25.0}
 
 class MavlinkDriver:
     """Drives by overriding two RC channels in MANUAL mode, measures by the autopilot's own estimate.
+
+    Without `arm: true` in its settings it measures only: it sets no mode, arms nothing and sends no override.
 
     ArduPilot mixes steering and throttle into two motors: left is throttle + steering, right throttle - steering.
     """
@@ -68,29 +71,33 @@ class MavlinkDriver:
             raise
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Take the place of the episode for where the boat is, and arm; see `Backend.reset`."""
+        """Take the place of the episode for where the boat is, and arm if allowed; see `Backend.reset`."""
         here = self._feedback.newest.odometry.position_in_world - self._heard.shift
         self._heard.shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
-        self._drive(0.0, 0.0)
-        self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        if self._settings.arm:
+            self._drive(0.0, 0.0)
+            self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         return self.step(self.robot.actuators.safe_command)
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
-        """Send a command; see `Backend.step`."""
+        """Send a command, nothing if the boat must not arm; see `Backend.step`."""
+        if not self._settings.arm:
+            return self._feedback.sample(self.robot.actuators.safe_command)
         left, right = (float(share) for share in command)
         self._drive(left, right)
         return self._feedback.sample(np.array([left, right]))
 
     def make_safe(self) -> None:
         """Stop both propellers."""
-        for _ in range(STOPS):
+        for _ in range(STOPS if self._settings.arm else 0):
             self._drive(0.0, 0.0)
 
     def close(self) -> None:
         """Stop, disarm, and let go of the link."""
         try:
             self.make_safe()
-            self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+            if self._settings.arm:
+                self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         except OSError:
             pass  # it is gone; the autopilot stops by its own failsafe
         finally:
@@ -102,6 +109,8 @@ class MavlinkDriver:
         """Battery and arming; see `Device.health`."""
         heard = self._heard
         warning = "" if heard.armed else "the autopilot is not armed: its propellers stand"
+        if not self._settings.arm:
+            warning = UNARMED
         return {"battery_v": heard.voltage, "armed": str(heard.armed).lower(), "warning": warning}
 
     def _prepare(self) -> None:
@@ -109,6 +118,8 @@ class MavlinkDriver:
         for name, rate in RATES_HZ.items():
             kind = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
             self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
+        if not self._settings.arm:
+            return
         manual = 0  # of ArduPilot's rover and boat modes
         self._command(
             mavlink.MAV_CMD_DO_SET_MODE, float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(manual)
@@ -200,7 +211,7 @@ def override_of(settings: MavlinkBoat, left: float, right: float) -> list[int]:
         left: Share of full thrust, -1 to 1; see `bounded`.
         right: Same.
     """
-    left, right = bounded(left, right)
+    left, right = wired(settings.wiring, *bounded(left, right))
     channels = [NO_CHANGE] * 8
     shares = {
         settings.steering_channel: 0.5 * (left - right),

@@ -10,9 +10,11 @@ from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Actuators, load_robot
+from hardware_drivers.wiring import AS_NAMED, check_wiring
 
 # A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
 LONGEST_LINGER_S = 2.0
+UNARMED = "not armed: arm: true or --arm"  # what a boat says that may not arm
 
 
 def check_linger(linger_s: float) -> None:
@@ -87,6 +89,11 @@ class Kobuki:
     port: str  # serial port
     baud: int = 115200
     silent_s: float = 0.3  # a base that reports nothing for so long is gone [s]
+    wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
+
+    def __post_init__(self) -> None:
+        """Refuse a wiring that leaves a side out."""
+        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -96,6 +103,11 @@ class VelocityTopic:
     kind: Literal["velocity_topic"]
     topic: str
     stamped: bool
+    wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
+
+    def __post_init__(self) -> None:
+        """Refuse a wiring that leaves a side out."""
+        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -104,6 +116,11 @@ class ThrustTopic:
 
     kind: Literal["thrust_topic"]
     topic: str
+    wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
+
+    def __post_init__(self) -> None:
+        """Refuse a wiring that leaves a side out."""
+        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -142,6 +159,11 @@ class KingfisherNmea:
     origin: Geodetic | None = None  # where `odom` begins; None: at the first fix
     baud: int = 115200
     silent_s: float = 1.0  # a boat that reports nothing for so long is gone [s]
+    wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
+
+    def __post_init__(self) -> None:
+        """Refuse a wiring that leaves a side out."""
+        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -157,9 +179,12 @@ class MavlinkBoat:
     trim_us: int = 1500
     span_us: int = 400  # of a full deflection
     silent_s: float = 1.0
+    wiring: tuple[str, ...] = AS_NAMED  # propeller that each side of its mixer turns, `-left` where backwards
+    arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; without it, it only listens
 
     def __post_init__(self) -> None:
         """Refuse channels that MAVLink's override does not have, and pulses beyond those of servos."""
+        check_wiring(self.wiring)
         channels = {self.steering_channel, self.throttle_channel}
         if len(channels) != 2 or not channels <= set(range(1, 9)):
             raise ValueError("steering_channel and throttle_channel must be two of 1 to 8.")

@@ -7,11 +7,14 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float32MultiArray, Int16MultiArray
 
 from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import load_scenario
@@ -20,7 +23,7 @@ from fulmar_core.exit_codes import FAILED
 from fulmar_core.priority import PLANT_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DEVICE_STATE, MOCAP, TRUTH
+from fulmar_core.topics import DEVICE_STATE, MOCAP, ODOMETRY, TRUTH
 from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.first_episode import first_episode
@@ -33,10 +36,13 @@ from sim_nodes.emulators.device import EmulatedDevice
 from sim_nodes.emulators.kingfisher import KingfisherEmulator
 from sim_nodes.emulators.kobuki import KobukiEmulator
 from sim_nodes.emulators.links import Link, PtyLink, TcpLink
+from sim_nodes.emulators.topics import BASE_TIMEOUT_S, FOR_EVER_S, TopicDevice, ValveNode
 from sim_nodes.emulators.valves import ValveBank
+from sim_nodes.emulators.wiring import STRAIGHT, Wiring
 from sim_nodes.mujoco_backend import MujocoBackend
 
-DEVICES = ("valves", "kobuki", "kingfisher", "ardupilot")
+DEVICES = ("valves", "kobuki", "kingfisher", "ardupilot", "valve_topic", "velocity_topic", "thrust_topic")
+NONE = -1  # an empty list has no type in ROS
 CATCH_UP = 25  # ticks at most: what a process misses beyond that is gone, as if the world had stood still
 
 
@@ -45,9 +51,13 @@ class EmulatorSettings(PlantSettings):
     """ROS parameters of an emulator; those of a plant say where it begins, and in which world."""
 
     device: str = ""  # one of DEVICES
-    link: str = ""  # path of the pseudo-terminal or the chip to make, tcp:<port>, or udp:<port>
+    link: str = ""  # path of the pseudo-terminal or the chip to make, tcp:<port>, udp:<port>, or a topic
     order: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # which thruster each valve line opens
     active_low: bool = True
+    inverted: bool = False  # a valve node opens its valves at 0
+    stamped: bool = False  # a base takes TwistStamped
+    sides: tuple[str, ...] = STRAIGHT  # that each channel of a base or boat turns, with a '-' where backwards
+    dead: tuple[int, ...] = (NONE,)  # wires that are cut
 
     def __post_init__(self) -> None:
         """Refuse devices that do not exist."""
@@ -78,6 +88,15 @@ class EmulatorNode(Node):
         self._backend = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
         self._sample = self._backend.reset(first_episode(robot, self.settings), seed=self.settings.seed)
         self.device = make_emulator(robot, self._backend, self.settings)
+        self._wiring = Wiring(
+            robot,
+            order=self.settings.order,
+            sides=self.settings.sides,
+            dead=[wire for wire in self.settings.dead if wire != NONE],
+        )
+        self._odometry: Publisher | None = None
+        if isinstance(self.device, TopicDevice):
+            self._listen(self.device)
         self._truth = self.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH))
         self._state = self.create_publisher(JointState, DEVICE_STATE.name, publisher_qos(DEVICE_STATE))
         self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
@@ -111,7 +130,7 @@ class EmulatorNode(Node):
         deadlines, began_s, ticks = Deadlines(dt), time.monotonic(), 0
         while deadlines.wait(self._stop):
             now_s = time.monotonic()
-            command = self.device.command(now_s)
+            command = self._wiring.applied(self.device.command(now_s))
             due = int((now_s - began_s) / dt) - ticks
             for _ in range(max(1, min(due, CATCH_UP))):
                 self._sample = self._backend.step(command)
@@ -121,12 +140,34 @@ class EmulatorNode(Node):
             self._publish(self._sample, stamp_ns)
             self._state.publish(self._write_state.write(command, stamp_ns))
 
+    def _listen(self, device: TopicDevice) -> None:
+        """Take commands from the device's topic, and publish odometry as the node of such a base or boat does."""
+        kind: type = {"valve_topic": Int16MultiArray, "thrust_topic": Float32MultiArray}.get(
+            self.settings.device, TwistStamped if self.settings.stamped else Twist
+        )
+        self.create_subscription(
+            kind, device.address, lambda message: device.receive(values_of(message), time.monotonic()), 1
+        )
+        if self.settings.device != "valve_topic":
+            self._odometry = self.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+            self._write_odometry = OdometryWriter(self._backend.robot.sensors.odometry)
+
     def _publish(self, sample: Sample, stamp_ns: int) -> None:
         if sample.truth is not None:
             self._truth.publish(self._write_truth.write(sample.truth, stamp_ns))
+        if self._odometry is not None and sample.odometry is not None:
+            self._odometry.publish(self._write_odometry.write(sample.odometry, stamp_ns))
         if sample.odometry is not None:
             for sent_ns, state in self._room.see(sample.odometry, stamp_ns):
                 self._mocap.publish(self._write_pose.write(state, sent_ns))
+
+
+def values_of(message: Any) -> list[float]:
+    """The numbers of a command of another stack."""
+    if hasattr(message, "data"):
+        return [float(value) for value in message.data]
+    twist = getattr(message, "twist", message)
+    return [twist.linear.x, twist.angular.z]
 
 
 def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettings) -> EmulatedDevice:
@@ -137,6 +178,12 @@ def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettin
     """
     if settings.device == "valves":
         return ValveBank(Path(settings.link), robot, order=settings.order, active_low=settings.active_low)
+    if settings.device == "valve_topic":
+        return ValveNode(settings.link, settings.order, inverted=settings.inverted)
+    if settings.device == "velocity_topic":
+        return TopicDevice(settings.link, 2, timeout_s=BASE_TIMEOUT_S)
+    if settings.device == "thrust_topic":
+        return TopicDevice(settings.link, 2, timeout_s=FOR_EVER_S)
     if settings.device == "ardupilot":
         from sim_nodes.emulators.ardupilot import ArdupilotEmulator
 

@@ -51,16 +51,17 @@ def broken_configs(tmp_path, monkeypatch):
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
         ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
         ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device neither waits nor hurries"),
+        ([*RUN, "--arm"], "--arm is for boats with an autopilot"),
+        (
+            ["run", "kingfisher", "--backend", "hardware", "--hardware", "kingfisher_ardupilot", "--emulate"],
+            "not armed: arm: true or --arm",
+        ),
         ([*RUN, "--emulate"], "--hardware and --emulate go with --backend hardware, not with mujoco."),
         (
             [*RUN, "--backend", "hardware", "--hardware", "zero_g_lap"],
             "unknown hardware 'zero_g_lap'. Did you mean 'zero_g_lab'?",
         ),
         ([*RUN, "--backend", "hardware", "--hardware", "turtlebot2"], "is the hardware of 'turtlebot2'"),
-        (
-            [*RUN, "--backend", "hardware", "--hardware", "zero_g_lab_valve_node", "--emulate"],
-            "there is no emulator for driver 'valve_topic'",
-        ),
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be three finite numbers"),
         ([*RUN, "--goal", "1,2"], "--goal = '1,2' must be three finite numbers"),
         ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_bringup.conductor import conduct
 from fulmar_bringup.planning import plan_run
 from fulmar_core.bundle_signature import make_keys, sign_bundle
-from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.errors import BundleError, ConfigError, DeviceError, UnknownNameError
 from fulmar_core.paths import config_directory
 from fulmar_core.recording import Recording
 from policy_server.shipped import shipped_policy
@@ -184,6 +185,22 @@ def test_a_real_robot_begins_where_it_stands(plan):
     assert request.plan.hardware.endswith("configs/hardware/zero_g_lab.yaml")
     assert Path(request.plan.hardware).is_absolute()
     assert not request.plan.emulated
+
+
+def test_a_run_without_its_device_starts_nothing_and_says_what_is_missing(plan, tmp_path, monkeypatch):
+    """Exit code 1, at once; with an emulator the port need not exist yet."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("title: t\nrobot: turtlebot2\ndriver: {kind: kobuki, port: /dev/ttyNONE}\n")
+    more = dict(
+        robot="turtlebot2",
+        controller="classical",
+        task="go_to_position",
+        backend="hardware",
+        hardware=str(path),
+    )
+    monkeypatch.setattr("fulmar_bringup.conductor.ProcessGroup", lambda: pytest.fail("a process is started"))
+    with pytest.raises(DeviceError, match="/dev/ttyNONE: there is no such serial port"):
+        conduct(plan(**more, goal=(1.0, 0.0, 0.0)))
 
 
 def test_an_emulated_one_begins_where_the_seed_says(plan):

@@ -62,7 +62,7 @@ def unused_udp_port() -> int:
 def driver(bench, kind):
     if kind == "mavlink":
         made: Any = MavlinkDriver(
-            bench.robot, MavlinkBoat("mavlink_boat", bench.device.address, THRUST), patience_s=5.0
+            bench.robot, MavlinkBoat("mavlink_boat", bench.device.address, THRUST, arm=True), patience_s=5.0
         )
     else:
         settings = KingfisherNmea("kingfisher_nmea", bench.device.address, THRUST)
@@ -130,6 +130,32 @@ def test_an_autopilot_without_its_host_holds_by_its_own_failsafe(bench, driver):
     assert time.monotonic() - silent < 3.2
 
 
+@pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
+def test_an_autopilot_that_may_not_arm_is_measured_and_sent_no_command(bench):
+    """Neither mode, nor arming, nor override, at any call; odometry comes, and the reason is a warning."""
+    received: list[str] = []
+    take = bench.device._take
+    bench.device._take = lambda message, now_s: received.append(describe(message)) or take(message, now_s)
+    settings = MavlinkBoat("mavlink_boat", bench.device.address, THRUST)
+    driver = MavlinkDriver(bench.robot, settings, patience_s=5.0)
+    driver.reset(episode_at(bench.robot, *START), seed=0)
+    sample = drive(driver, (1.0, 1.0), 0.3)
+    assert sample.odometry is not None
+    assert not sample.applied.any()
+    assert driver.health()["warning"] == "not armed: arm: true or --arm"
+    driver.make_safe()
+    driver.close()
+    time.sleep(0.1)
+    assert set(received) == {"HEARTBEAT", f"COMMAND_LONG {mavutil.mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}"}
+    assert not bench.command.any()
+
+
+def describe(message) -> str:
+    """Kind of a MAVLink message, with the number of a command."""
+    kind = message.get_type()
+    return f"{kind} {message.command}" if kind == "COMMAND_LONG" else kind
+
+
 def test_nobody_at_the_other_end_is_refused_with_a_hint(unused_udp_port):
     robot = load_robot("kingfisher")
     with pytest.raises(DeviceError, match="no heartbeat"):
@@ -173,7 +199,7 @@ def test_a_serial_autopilot_is_waited_for_and_a_cable_that_takes_no_more_is_an_e
     cable, tmp_path
 ):
     threading.Timer(0.5, cable).start()
-    boat = MavlinkBoat("mavlink_boat", str(tmp_path / "serial"), THRUST)
+    boat = MavlinkBoat("mavlink_boat", str(tmp_path / "serial"), THRUST, arm=True)
     driver = MavlinkDriver(load_robot("kingfisher"), boat, patience_s=5.0)
     began = time.monotonic()
     with pytest.raises(OSError, match=r"more bytes|unavailable"):

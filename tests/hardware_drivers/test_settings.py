@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
+from fulmar_core.robot import load_robot
 from hardware_drivers.settings import hardware_of, load_hardware
 
 TURTLEBOT = "title: t\nrobot: turtlebot2\ndriver:\n  kind: kobuki\n  port: /dev/ttyUSB0\n"
@@ -16,9 +18,42 @@ def test_every_shipped_file_fits_its_robot(name):
     assert name in hardware_of(load_hardware(name).robot)
 
 
+RANS = (  # force and yaw moment of each wire, in the axes of `floating_platform` [N, N, N·m]
+    (0.71, 0.71, -0.31), (0.71, -0.71, 0.31), (-0.71, 0.71, -0.31), (0.71, 0.71, 0.31),
+    (-0.71, -0.71, -0.31), (-0.71, 0.71, 0.31), (0.71, -0.71, -0.31), (-0.71, -0.71, 0.31),
+)  # fmt: skip
+ROBORAN = (  # counter-clockwise and clockwise by turns, in pairs at 0°, 90°, 180° and 270°
+    (0.0, 1.0, 0.31), (0.0, -1.0, -0.31), (-1.0, 0.0, 0.31), (1.0, 0.0, -0.31),
+    (0.0, -1.0, 0.31), (0.0, 1.0, -0.31), (1.0, 0.0, 0.31), (-1.0, 0.0, -0.31),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "robot", "wrenches"),
+    [
+        ("zero_g_lab", "floating_platform", RANS),
+        ("zero_g_lab_valve_node", "floating_platform", RANS),
+        ("zero_g_lab_roboran", "floating_platform_roboran", ROBORAN),
+        ("zero_g_lab_roboran_valve_node", "floating_platform_roboran", ROBORAN),
+    ],
+)
+def test_an_order_belongs_to_the_nozzles_of_its_robot(name, robot, wrenches):
+    """Both sources wire the platform regularly: neighbouring wires push and turn against each other."""
+    hardware = load_hardware(name)
+    assert hardware.robot == robot
+    found = load_robot(robot).actuators.wrench_per_newton[list(hardware.driver.order)][:, [0, 1, 5]]
+    assert found == pytest.approx(np.array(wrenches), abs=0.01)
+    assert (np.sign(found[:, 2]) == -np.sign(np.roll(found[:, 2], 1))).all()
+
+
 @pytest.mark.parametrize(
     ("robot", "first"),
-    [("floating_platform", "zero_g_lab"), ("turtlebot2", "turtlebot2"), ("kingfisher", "kingfisher")],
+    [
+        ("floating_platform", "zero_g_lab"),
+        ("floating_platform_roboran", "zero_g_lab_roboran"),
+        ("turtlebot2", "turtlebot2"),
+        ("kingfisher", "kingfisher"),
+    ],
 )
 def test_a_robot_s_own_file_comes_first(robot, first):
     assert hardware_of(robot)[0] == first

@@ -42,7 +42,7 @@ def test_our_commands_reach_the_lab_s_valve_node_and_silence_closes_its_valves(n
     with spin:
         first = [1.0] + [0.0] * 7
         until(lambda: neighbour.command(first) or (bool(messages) and any(messages[-1].data[1:])))
-        assert messages[-1].data.tolist() == [1, 0, 0, 0, 0, 1, 0, 0, 0]
+        assert messages[-1].data.tolist() == [1, 0, 0, 0, 0, 0, 0, 1, 0]
         until(lambda: not any(messages[-1].data[1:]))
         assert messages[-1].data[0] == 1
         node.stop()
@@ -81,7 +81,7 @@ def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> N
 @pytest.mark.parametrize(
     ("data", "commanded"),
     [
-        ([1, 1, 0, 0, 0, 1, 0, 0, 0], [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        ([1, 1, 0, 0, 0, 1, 0, 0, 0], [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         ([1, 2, 0, 0, 0, 0, 0, 0, 0], None),
         ([1] * 8, None),
     ],

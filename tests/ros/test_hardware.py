@@ -27,7 +27,7 @@ from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.system import default_hardware
 from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.settings import MavlinkBoat, load_hardware
 from sim_nodes.emulators.valves import ValveBank
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
@@ -51,6 +51,7 @@ class Rig:
         emulation = emulation_of(found, folder)
         plan = RunPlan(self.robot, "go_to_position", "policy", "hardware", 10.0)
         plan = replace(plan, hardware=default_hardware(self.robot, hardware), emulated=True)
+        plan = replace(plan, arm=isinstance(found.driver, MavlinkBoat))
         self.group = ProcessGroup()
         self.group.start(emulator_spec(plan, emulation))
         self.group.start(plant_spec(plan, port=emulation.port))
@@ -235,6 +236,7 @@ def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp
                 "--emulate",
             )
             more = ("--start", "0,0,0", "--goal", "0.5,0.1,10", "--duration", seconds, "--record", hardware)
+            more += ("--arm",) if hardware == "kingfisher_ardupilot" else ()
             try:
                 return fulmar(*asked, *more, "--json", env=env, cwd=tmp_path)
             finally:

@@ -13,6 +13,7 @@ import typer
 from fulmar_bringup.commands.bag import bag
 from fulmar_bringup.commands.benchmark import benchmark
 from fulmar_bringup.commands.bundle import bundle
+from fulmar_bringup.commands.commission import commission
 from fulmar_bringup.commands.demo import demo
 from fulmar_bringup.commands.doctor import doctor
 from fulmar_bringup.commands.estop import estop
@@ -50,6 +51,7 @@ app.command()(goals)
 app.command()(teleop)
 app.command()(estop)
 app.command()(swap)
+app.command()(commission)
 app.command()(faults)
 app.command()(train)
 app.command()(policies)

@@ -40,6 +40,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
+from hardware_drivers.presence import check_presence
 from hardware_drivers.settings import load_hardware
 
 # A ring that no fault has written tells nothing of the goal.
@@ -74,7 +75,10 @@ def conduct(request: RunRequest) -> RunOutcome:
 
     Raises:
         ConfigError: Another run goes on in this ROS domain.
+        DeviceError: The device is not there.
     """
+    if request.plan.hardware and not request.plan.emulated:
+        check_presence(load_hardware(request.plan.hardware).driver)
     with claimed_domain():
         failure, plant_steps = _run(request)
     ring = request.plan.recording.mode == "ring"

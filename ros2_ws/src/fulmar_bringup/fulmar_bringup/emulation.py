@@ -7,8 +7,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fulmar_core.errors import ConfigError
-from hardware_drivers.settings import GpioValves, Hardware, KingfisherNmea, Kobuki, MavlinkBoat
+from hardware_drivers.settings import (
+    GpioValves,
+    Hardware,
+    KingfisherNmea,
+    Kobuki,
+    MavlinkBoat,
+    ThrustTopic,
+    ValveTopic,
+    VelocityTopic,
+)
+
+Parameters = Mapping[str, bool | list[int] | list[str]]
 
 
 @dataclass(frozen=True)
@@ -18,20 +28,7 @@ class Emulation:
     device: str  # of `sim_nodes.emulator_node`
     link: str  # what the emulator makes
     port: str  # where the driver finds it
-    more: Mapping[str, bool | list[int]] = field(default_factory=dict)  # parameters of the emulator
-
-
-def check_emulation(hardware: Hardware) -> None:
-    """Refuse hardware that nothing stands in for.
-
-    Raises:
-        ConfigError: It is a node of another stack.
-    """
-    if not isinstance(hardware.driver, (GpioValves, Kobuki, KingfisherNmea, MavlinkBoat)):
-        raise ConfigError(
-            f"there is no emulator for driver '{hardware.driver.kind}', which speaks to a node of another stack. "
-            "Leave --emulate out, and start that node."
-        )
+    more: Parameters = field(default_factory=dict)  # parameters of the emulator
 
 
 def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
@@ -40,24 +37,28 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
     Args:
         hardware: The file.
         folder: Where wires that are files are made.
-
-    Raises:
-        ConfigError: Nothing does.
     """
-    check_emulation(hardware)
     driver = hardware.driver
+    if isinstance(driver, ValveTopic):
+        return Emulation(driver.kind, driver.topic, "", {"order": list(driver.order)})
+    if isinstance(driver, VelocityTopic):
+        sides: Parameters = {"stamped": driver.stamped, "sides": list(driver.wiring)}
+        return Emulation(driver.kind, driver.topic, "", sides)
+    if isinstance(driver, ThrustTopic):
+        return Emulation(driver.kind, driver.topic, "", {"sides": list(driver.wiring)})
     if isinstance(driver, GpioValves):
         pins = folder / "gpio"
-        more: dict[str, bool | list[int]] = {"order": list(driver.order), "active_low": driver.active_low}
+        more: Parameters = {"order": list(driver.order), "active_low": driver.active_low}
         return Emulation("valves", str(pins), f"file://{pins}", more)
+    more = {"sides": list(driver.wiring)}
     if isinstance(driver, MavlinkBoat):
         number = _free_port(socket.SOCK_DGRAM)
-        return Emulation("ardupilot", f"udp:{number}", f"udpin:127.0.0.1:{number}")
+        return Emulation("ardupilot", f"udp:{number}", f"udpin:127.0.0.1:{number}", more)
     device = "kobuki" if isinstance(driver, Kobuki) else "kingfisher"
     if isinstance(driver, KingfisherNmea) and driver.port.startswith("tcp://"):
         number = _free_port(socket.SOCK_STREAM)
-        return Emulation(device, f"tcp:{number}", f"tcp://127.0.0.1:{number}")
-    return Emulation(device, str(folder / "serial"), str(folder / "serial"))
+        return Emulation(device, f"tcp:{number}", f"tcp://127.0.0.1:{number}", more)
+    return Emulation(device, str(folder / "serial"), str(folder / "serial"), more)
 
 
 def _free_port(kind: socket.SocketKind) -> int:

@@ -28,7 +28,7 @@ from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
 from hardware_drivers.settings import load_hardware
 
-Parameter = bool | int | float | str | list[float] | list[int]
+Parameter = bool | int | float | str | list[float] | list[int] | list[str]
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ class RunPlan:
     supervised: bool = False  # somebody else activates the plant when all are ready
     hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
     emulated: bool = False  # an emulator stands in for the device
+    arm: bool = False  # an autopilot may be armed, whatever the hardware file says
     recording: Recording = Recording()
     copies: int = 1  # of each command on the wire
     controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
@@ -147,6 +148,8 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSp
         parameters["estimated"] = True
     if plan.backend == "hardware":
         parameters["hardware"] = plan.hardware
+        if plan.arm:
+            parameters["arm"] = True
         if port:
             parameters["port"] = port
         return NodeSpec(

@@ -12,7 +12,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from fulmar_bringup.emulation import check_emulation
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.system import (
@@ -39,7 +38,7 @@ from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.settings import UNARMED, MavlinkBoat, load_hardware
 from policy_server.shipped import shipped_policy
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
@@ -78,6 +77,7 @@ def plan_run(
     goals: str | None = None,
     hardware: str | None = None,
     emulate: bool = False,
+    arm: bool = False,
     guards: Mapping[str, Any] = MappingProxyType({}),
     recording: str | None = None,
     copies: int = 1,
@@ -105,6 +105,7 @@ def plan_run(
         goals: Goal file, a name or a path that ends in `.yaml`; its goals come one after another.
         hardware: Hardware file, a name or a path that ends in `.yaml`; the robot's own by default.
         emulate: Whether an emulator stands in for the device.
+        arm: Whether an autopilot may be armed that the hardware file does not arm.
         guards: What replaces the guards of the system file, by name.
         recording: `whole` or `ring`; the system file's by default.
         copies: How often each command is sent.
@@ -119,6 +120,7 @@ def plan_run(
     """
     check_names(robot, task, controller, backend)
     hardware = _checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)
+    check_arming(hardware, arm=arm)
     _check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
     the_robot, the_task = load_robot(robot), load_task(task)
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
@@ -166,6 +168,7 @@ def plan_run(
         goals=str(goal_path(goals)) if goals else "",
         hardware=hardware,
         emulated=emulate,
+        arm=arm,
         guards=watched,
         recording=chosen_recording(controller, backend, recording),
         copies=copies,
@@ -189,10 +192,29 @@ def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: b
         raise ConfigError(
             "a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate."
         )
-    path = default_hardware(robot, asked)
-    if emulate:
-        check_emulation(load_hardware(path))
-    return path
+    return default_hardware(robot, asked)
+
+
+def check_arming(hardware: str, *, arm: bool) -> None:
+    """Refuse to drive a boat that may not arm, and `--arm` where nothing is armed.
+
+    Args:
+        hardware: Hardware file; empty for simulators.
+        arm: Whether `--arm` was given.
+
+    Raises:
+        ConfigError: One of the two.
+    """
+    driver = load_hardware(hardware).driver if hardware else None
+    if not isinstance(driver, MavlinkBoat):
+        if arm:
+            raise ConfigError("--arm is for boats with an autopilot (driver 'mavlink_boat'); leave it out.")
+    elif not (arm or driver.arm):
+        raise ConfigError(
+            f"{hardware}: {UNARMED}. Driving sets MANUAL, arms the boat and overrides RC channels "
+            f"{driver.steering_channel} and {driver.throttle_channel}. Write arm: true into the file, or give --arm, "
+            "once the propellers are clear."
+        )
 
 
 def _checked_guards(

@@ -9,7 +9,7 @@ from typing import Any
 
 from fulmar_bringup.benchmark.closed_loops import Command
 from fulmar_core.errors import UnknownNameError
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.settings import MavlinkBoat, load_hardware
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class HardwareCase:
 
     def prepared(self, _seed: int) -> contextlib.AbstractContextManager[Command]:
         """An emulator stands in for the device."""
-        device = ("--backend", "hardware", "--hardware", self.name, "--emulate")
+        arm = ("--arm",) if isinstance(load_hardware(self.name).driver, MavlinkBoat) else ()
+        device = ("--backend", "hardware", "--hardware", self.name, "--emulate", *arm)
         return contextlib.nullcontext(Command((), device, {}))
 
     def about(self) -> dict[str, Any]:

@@ -37,6 +37,13 @@ CalibrationOption = Annotated[
 BagArgument = Annotated[
     Path, typer.Argument(metavar="BAG", help="A bag folder, or the .mcap or .db3 file in it.")
 ]
+ArmOption = Annotated[
+    bool,
+    typer.Option(
+        "--arm",
+        help="Let the driver set MANUAL, arm the boat's autopilot and override RC, as `arm: true` does.",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 

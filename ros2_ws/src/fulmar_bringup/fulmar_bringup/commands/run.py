@@ -12,6 +12,7 @@ import typer
 
 from fulmar_bringup.commands.arguments import (
     Area,
+    ArmOption,
     CalibrationOption,
     ControllerOption,
     JsonOption,
@@ -52,6 +53,7 @@ def run(
         bool,
         typer.Option("--emulate", help="With --backend hardware: an emulator speaks for the device."),
     ] = False,
+    arm: ArmOption = False,
     policy: PolicyOption = None,
     goal: Annotated[
         str | None,
@@ -202,6 +204,7 @@ def run(
         goals=goals,
         hardware=hardware,
         emulate=emulate,
+        arm=arm,
         guards=asked_guards(estimator, estop, fallback, trusted_keys)
         | asked_limits(read_area(area), max_run_time),
         recording=recording,

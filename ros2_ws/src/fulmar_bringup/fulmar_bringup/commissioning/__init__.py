@@ -1,0 +1,1 @@
+"""`fulmar commission`: pulses each wire of a real robot and identifies the actuator behind it."""

@@ -1,0 +1,260 @@
+"""One commissioning from start to finish: driver up, wires pulsed, driver down, findings."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import rclpy
+import yaml
+from rclpy.signals import SignalHandlerOptions
+
+from fulmar_bringup.commissioning.procedure import Outcome, click, measure
+from fulmar_bringup.commissioning.session import Session
+from fulmar_bringup.commissioning.wires import Wire, actuator_names, wires_of
+from fulmar_bringup.domains import claimed_domain
+from fulmar_bringup.emulation import Emulation, emulation_of
+from fulmar_bringup.node_table import RunPlan, emulator_spec, guard_specs, plant_spec
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.system import Guards
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.commissioning.match import indistinct, left_over
+from fulmar_core.robot import Robot, load_robot
+from fulmar_ros.middleware import set_up_middleware
+from fulmar_ros.runtime import spinning
+from hardware_drivers.settings import GpioValves, Hardware, ValveTopic, hardware_path, load_hardware
+from hardware_drivers.wiring import SIDES
+
+WIRINGS = ("as_written", "shuffled", "inverted", "dead")  # of an emulated device
+CONTROL_HZ = 10.0  # that the driver's watchdog follows from: 0.2 s
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to commission, and how."""
+
+    hardware: str  # a name of configs/hardware, or a path that ends in .yaml
+    pulses: bool  # move the robot; else only click its valves
+    emulate: bool = False
+    wiring: str = "as_written"  # of the emulated device, one of WIRINGS
+    seed: int = 0  # of the emulated device
+    arm: bool = False
+    port: str = ""
+
+
+def commission(request: Request, say: Say) -> dict[str, Any]:
+    """Click or pulse every wire of a robot.
+
+    Args:
+        request: What to do.
+        say: Prints progress.
+
+    Returns:
+        Findings, as `fulmar commission --json` prints them.
+
+    Raises:
+        ConfigError: The hardware file is wrong, or another run uses this ROS domain.
+        RunFailed: Something ended it; the actuators are in their safe state.
+    """
+    path = str(hardware_path(request.hardware).absolute())
+    hardware = load_hardware(path)
+    began_s = time.monotonic()
+    with claimed_domain(), tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        emulation = _emulation(hardware, folder, request) if request.emulate else None
+        outcome = _session(request, path, hardware, emulation, say)
+        flipped = False
+        if outcome is not None and _silent_valves(hardware, outcome):
+            say(f"no wire answers with active_low: {hardware.driver.active_low}: trying the other level")  # type: ignore[union-attr]
+            other = _other_level(Path(path), folder)
+            second = _session(request, str(other), load_hardware(str(other)), emulation, say)
+            flipped = second is not None and len(second.match.dead) < len(second.match.drives)
+            outcome = second if flipped else outcome
+    findings = {"hardware": request.hardware, "robot": hardware.robot, "driver": hardware.driver.kind}
+    if outcome is None:
+        return findings | {"clicked": [wire.name for wire in wires_of(hardware)], "success": True}
+    more = _findings(load_robot(hardware.robot), hardware, outcome, flipped=flipped)
+    if emulation is not None:
+        more |= {"emulated": dict(emulation.more), "right": is_right(hardware, emulation.more, more)}
+    return findings | more | {"seconds": round(time.monotonic() - began_s, 1)}
+
+
+def _session(
+    request: Request, path: str, hardware: Hardware, emulation: Emulation | None, say: Say
+) -> Outcome | None:
+    """Start driver, e-stop and perhaps emulator; click or measure; stop all. None after clicks."""
+    robot, wires = load_robot(hardware.robot), wires_of(hardware)
+    plan = RunPlan(
+        robot.name, "go_to_position", "lqr", "hardware", CONTROL_HZ, hardware=path, seed=request.seed,
+        emulated=request.emulate, arm=request.arm, guards=Guards(estop=True),
+    )  # fmt: skip
+    group = ProcessGroup()
+
+    def ended() -> str:
+        end = group.ended()
+        return f"{end.text}: {group.last_words(end.name)}" if end else ""
+
+    set_up_middleware()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    errors: list[Exception] = []
+    try:
+        node = rclpy.create_node("commission", namespace=f"/{robot.name}")
+        with spinning(node, errors.append):
+            session = Session(
+                node,
+                robot,
+                from_outside=hardware.seen_from_outside,
+                bearing=isinstance(hardware.driver, (GpioValves, ValveTopic)),
+                ended=ended,
+            )
+            session.needs_poses = request.pulses
+            try:
+                if emulation is not None:
+                    group.start(emulator_spec(plan, emulation))
+                group.start(plant_spec(plan, port=request.port or (emulation.port if emulation else "")))
+                for spec in guard_specs(plan):
+                    group.start(replace(spec, quiet=True))
+                session.until_ready()
+                if not request.pulses:
+                    click(session, robot, wires, say)
+                    return None
+                return measure(session, robot, wires, say)
+            finally:
+                with contextlib.suppress(Exception):  # the driver makes safe by itself at its end
+                    session.make_safe()
+                group.stop("plant")
+                group.stop_all()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _findings(robot: Robot, hardware: Hardware, outcome: Outcome, *, flipped: bool) -> dict[str, Any]:
+    match, wires = outcome.match, wires_of(hardware)
+    names, valves = actuator_names(robot), isinstance(robot.actuators, Thrusters)
+    drives = list(match.drives)
+    guessed = left_over(match, len(names))
+    if guessed is not None:
+        drives[match.dead[0]] = guessed
+    problems = list(match.problems)
+    if flipped:
+        level = not hardware.driver.active_low  # type: ignore[union-attr]
+        problems.append(
+            f"the wires answer with active_low: {str(level).lower()} only: write that into the file"
+        )
+    for wire in match.dead:
+        more = f"; by elimination it is {names[guessed]}'s" if guessed is not None else ""
+        problems.append(f"{wires[wire].name} does not answer{more}")
+    key = "order" if valves else "wiring"
+    value: list[Any] | None = None
+    if None not in drives and not [text for text in match.problems]:
+        value = [
+            drive if valves else f"{'-' if sign < 0 else ''}{SIDES[drive]}"  # type: ignore[index]
+            for drive, sign in zip(drives, match.signs, strict=True)
+        ]
+    written = [wire.actuator for wire in wires] if valves else list(hardware.driver.wiring)  # type: ignore[union-attr]
+    return {
+        "wires": [_wire(wire, drive, sign, one, names, number in match.dead)
+                  for number, (wire, drive, sign, one) in enumerate(
+                      zip(wires, match.drives, match.signs, outcome.found, strict=True))],
+        "key": key,
+        key: value,
+        "as_written": value == written and not flipped,
+        "dead": [wires[wire].name for wire in match.dead],
+        "inverted": flipped or any("inverted" in text for text in match.problems),
+        "active_low": (not hardware.driver.active_low) if flipped else None,  # type: ignore[union-attr]
+        "indistinguishable": [list(group) for group in indistinct(robot)],
+        "problems": problems,
+        "success": not problems,
+    }  # fmt: skip
+
+
+def is_right(hardware: Hardware, emulated: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
+    """Whether the findings are what the emulated wiring is.
+
+    Args:
+        hardware: The file that the driver believed.
+        emulated: Parameters of the emulator.
+        found: Findings.
+    """
+    driver = hardware.driver
+    names = actuator_names(load_robot(hardware.robot))
+    dead = [int(wire) for wire in emulated.get("dead", [])]
+    if isinstance(driver, GpioValves) or "inverted" in emulated:
+        inverted = emulated.get("active_low", getattr(driver, "active_low", None)) != getattr(
+            driver, "active_low", None
+        ) or bool(emulated.get("inverted"))
+        if inverted != found["inverted"]:
+            return False
+        if emulated.get("inverted"):
+            return not found["success"]
+    truth = (
+        [names[thruster] for thruster in emulated["order"]]
+        if "order" in emulated
+        else [
+            ("-" if "-" in side else "") + names[SIDES.index(side.removeprefix("-"))]
+            for side in emulated["sides"]
+        ]
+    )
+    return all(
+        wire["drives"] == (None if number in dead else truth[number])
+        for number, wire in enumerate(found["wires"])
+    ) and found["dead"] == [found["wires"][number]["name"] for number in dead]
+
+
+def _wire(wire: Wire, drive: int | None, sign: float, one: Any, names: Any, dead: bool) -> dict[str, Any]:
+    return {
+        "name": wire.name,
+        "file_says": ("-" if wire.sign < 0 else "") + names[wire.actuator],
+        "drives": None if dead or drive is None else ("-" if sign < 0 else "") + names[drive],
+        "change": [round(float(value), 5) for value in one.change],
+        "sigma": [round(float(value), 5) for value in one.sigma],
+    }
+
+
+def _silent_valves(hardware: Hardware, outcome: Outcome) -> bool:
+    return isinstance(hardware.driver, GpioValves) and len(outcome.match.dead) == len(outcome.found)
+
+
+def _other_level(path: Path, folder: Path) -> Path:
+    """A copy of a hardware file whose lines are active at the other level."""
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["driver"]["active_low"] = not document["driver"].get("active_low", True)
+    copy = folder / "other_level.yaml"
+    copy.write_text(yaml.safe_dump(document), encoding="utf-8")
+    return copy
+
+
+def _emulation(hardware: Hardware, folder: Path, request: Request) -> Emulation:
+    """The emulated device, wired as the request says."""
+    emulation = emulation_of(hardware, folder)
+    return replace(emulation, more={**emulation.more, **rewired(hardware, request.wiring, request.seed)})
+
+
+def rewired(hardware: Hardware, wiring: str, seed: int) -> Mapping[str, Any]:
+    """Parameters of an emulator whose wiring is not that of the file.
+
+    Args:
+        hardware: The file.
+        wiring: One of WIRINGS.
+        seed: Which shuffle, which dead wire.
+    """
+    rng, count = random.Random(seed), len(wires_of(hardware))
+    valves = isinstance(hardware.driver, (GpioValves, ValveTopic))
+    if wiring == "dead":
+        return {"dead": [rng.randrange(count)]}
+    if wiring == "shuffled" and valves:
+        return {"order": rng.sample(range(count), count)}
+    if wiring == "shuffled":
+        return {"sides": [rng.choice(("", "-")) + side for side in rng.sample(SIDES, 2)]}
+    if wiring == "inverted":
+        if isinstance(hardware.driver, GpioValves):
+            return {"active_low": not hardware.driver.active_low}
+        return {"inverted": True} if valves else {"sides": ["-left", "-right"]}
+    return {}

@@ -1,0 +1,116 @@
+"""The pulses of one commissioning, and what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_bringup.commissioning.session import Session
+from fulmar_bringup.commissioning.wires import Wire, command_of
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.commissioning.match import CLEARLY, Match, match_nozzles, match_sides
+from fulmar_core.commissioning.response import Motion, Pulse, Response, Track, responses
+from fulmar_core.errors import RunFailed
+from fulmar_core.robot import Robot
+
+CLICK_S, BETWEEN_CLICKS_S = 0.1, 0.9
+# At most 0.3 s at its level. Of valves our value: 1 N on 5.32 kg gives 23 mm/s, twenty times the error by poses of 1 mm.
+VALVE_PULSE_S, HOLD_S = 0.12, 0.3
+STILL_S = 1.5  # before the first pulse: what moves by itself
+BETWEEN_S = {"floating": 0.6, "coasting": 1.5, "rolling": 0.6}
+# Shares of full thrust, from the first that may turn a propeller; the next one comes where the last shows nothing.
+LEVELS = (0.4, 0.5, 0.65, 0.8, 1.0)
+MOVES_BY_ITSELF = 0.3  # of one nozzle's thrust, with every wire closed
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Response of every wire, and the actuator behind it."""
+
+    match: Match
+    found: tuple[Response, ...]
+
+
+def click(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> None:
+    """Open one valve after another for a moment, with the air closed, for a person who listens.
+
+    Args:
+        session: Where to command.
+        robot: With thrusters.
+        wires: Which.
+        say: Prints the wire that clicks.
+    """
+    for wire in wires:
+        say(wire.name)
+        session.pulse(command_of(robot, wire), CLICK_S)
+        session.rest(BETWEEN_CLICKS_S)
+
+
+def measure(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> Outcome:
+    """Pulse one wire after another and identify the actuator behind each.
+
+    Args:
+        session: Where to command, ready.
+        robot: The robot.
+        wires: Which.
+        say: Prints the wire that is pulsed.
+
+    Returns:
+        What each wire drives.
+
+    Raises:
+        RunFailed: Something ended it; see `Session.pulse`.
+    """
+    session.rest(STILL_S)
+    if isinstance(robot.actuators, Thrusters):
+        return _valves(session, robot, wires, say)
+    motion: Motion = "rolling" if isinstance(robot.actuators, DifferentialDrive) else "coasting"
+    found = []
+    for wire in wires:
+        say(wire.name)
+        found.append(_side(session, robot, wire, motion))
+    return Outcome(match_sides(found), tuple(found))
+
+
+def _valves(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> Outcome:
+    pulses = []
+    for wire in wires:
+        say(wire.name)
+        pulses.append(session.pulse(command_of(robot, wire), VALVE_PULSE_S))
+        session.rest(BETWEEN_S["floating"] - 0.1)
+    track = session.track(pulses[0].begin_s - STILL_S)
+    found = _responses(track, pulses, "floating")
+    lasts_s = [pulse.end_s - pulse.begin_s for pulse in pulses]
+    match = match_nozzles(robot, found, lasts_s, [wire.actuator for wire in wires])
+    return Outcome(match, tuple(found))
+
+
+def _side(session: Session, robot: Robot, wire: Wire, motion: Motion) -> Response:
+    """Response of a wheel, or of a propeller at the lowest level that shows one."""
+    one = None
+    for level in LEVELS if motion == "coasting" else (1.0,):
+        command = command_of(robot, wire, level)
+        pulse = session.pulse(command, _ramp_s(robot, command) + HOLD_S)
+        session.rest(BETWEEN_S[motion])
+        (one,) = _responses(session.track(pulse.begin_s - 0.8), [pulse], motion)
+        if min(one.clearly[0], one.clearly[2]) > CLEARLY:
+            break
+    assert one is not None
+    return one
+
+
+def _ramp_s(robot: Robot, command: np.ndarray) -> float:
+    """How long the driver's slew needs to reach a command [s]."""
+    slew = robot.actuators.response.slew
+    return float(np.max(np.abs(command) / np.asarray(slew))) if slew else 0.0
+
+
+def _responses(track: Track, pulses: Sequence[Pulse], motion: Motion) -> list[Response]:
+    try:
+        return responses(track, pulses, motion)
+    except ValueError as error:
+        raise RunFailed(f"too few poses came: {error}") from error

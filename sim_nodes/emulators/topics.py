@@ -1,0 +1,71 @@
+"""A node of another stack that drives a robot by messages; without ROS, which hands it the values."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+
+from fulmar_core.backend import Sample
+
+BASE_TIMEOUT_S = 0.6  # kobuki_node: cmd_vel_timeout_sec
+FOR_EVER_S = math.inf  # neither the lab's valve node nor the public part of RoboRAN's bridge has a timeout
+
+
+class TopicDevice:
+    """Does what the newest message says, for as long as its own timeout lets it."""
+
+    def __init__(self, address: str, count: int, *, timeout_s: float) -> None:
+        """Begin at rest.
+
+        Args:
+            address: Topic that it takes commands from.
+            count: Values of a command.
+            timeout_s: It stops after so long without a message [s].
+        """
+        self.address, self._count, self._timeout_s = address, count, timeout_s
+        self._lock = threading.Lock()
+        self._values, self._came_s = np.zeros(count), -math.inf
+
+    def receive(self, values: Sequence[float], now_s: float) -> None:
+        """Take a message at this time of the monotonic clock [s]; one of another length is dropped."""
+        if len(values) == self._count:
+            with self._lock:
+                self._values, self._came_s = np.array(values, dtype=float), now_s
+
+    def command(self, now_s: float) -> np.ndarray:
+        """See `EmulatedDevice`."""
+        with self._lock:
+            fresh = now_s - self._came_s <= self._timeout_s
+            return self._values.copy() if fresh else np.zeros(self._count)
+
+    def report(self, sample: Sample, now_s: float) -> None:
+        """Topics of commands report nothing."""
+
+    def close(self) -> None:
+        """See `EmulatedDevice`."""
+
+
+class ValveNode(TopicDevice):
+    """The SnT valve node: the bearing first, then one value for each valve in the order of the wiring."""
+
+    def __init__(self, address: str, order: Sequence[int], *, inverted: bool) -> None:
+        """Begin with closed valves and without air.
+
+        Args:
+            address: Topic that it takes commands from.
+            order: Which thruster each value opens, counted from 0.
+            inverted: Whether a valve opens at 0; the bearing does not.
+        """
+        super().__init__(address, len(order) + 1, timeout_s=FOR_EVER_S)
+        self._order, self._open = list(order), float(not inverted)
+
+    def command(self, now_s: float) -> np.ndarray:
+        """See `EmulatedDevice`; a platform without air stands on the floor, whatever its valves do."""
+        values = super().command(now_s)
+        valves = np.zeros(len(self._order))
+        if values[0] > 0.5:
+            valves[self._order] = (values[1:] > 0.5) == (self._open > 0.5)
+        return valves
