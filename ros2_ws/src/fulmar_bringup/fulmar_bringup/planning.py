@@ -34,13 +34,13 @@ from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
-from fulmar_core.policy_bundle import check_fit, read_bundle, read_passport
+from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from hardware_drivers.settings import load_hardware
-from policy_server.shipped import shipped_policy
+from policy_server.shipped import shipped_policies, shipped_policy
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
 PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
@@ -377,6 +377,7 @@ def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: fl
             f"no policy is shipped for '{robot.name}' and '{task.name}'. Give one with --policy, "
             f"train one with `fulmar train {robot.name} {task.name}`{otherwise}."
         )
+    check_folder(folder, known=sorted(shipped_policies(), key=lambda each: robot.name not in each.name))
     check_fit(read_passport(folder), robot, task, control_hz, where=str(folder))
     return folder
 
