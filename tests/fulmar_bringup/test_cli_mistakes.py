@@ -105,6 +105,16 @@ def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, 
     assert list(tmp_path.iterdir()) == []
 
 
+def test_export_overwrites_no_bundle_without_force(fulmar, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    folder = shutil.copytree(SHIPPED, tmp_path / "bundle")
+    words = ("export", "/nowhere", "--out", folder)
+    assert f"{folder} exists already and is not empty" in complaint(fulmar(*words))
+    assert "/nowhere: no finished training run" in complaint(fulmar(*words, "--force"))
+    (tmp_path / "empty").mkdir()
+    assert "/nowhere: no finished" in complaint(fulmar("export", "/nowhere", "--out", tmp_path / "empty"))
+
+
 @pytest.mark.parametrize(
     ("file", "text", "told"),
     [
