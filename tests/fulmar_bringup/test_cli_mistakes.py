@@ -143,6 +143,41 @@ def test_a_broken_file_is_told_with_its_line(fulmar, broken_configs, file, text,
     assert told in complaint(fulmar(*EVALUATE, "--episodes", "1"))
 
 
+def test_the_list_shows_the_good_files_and_a_line_for_each_broken_one(fulmar, broken_configs):
+    (broken_configs / "robots" / "jetbot.yaml").write_text("name: [")
+    text = (broken_configs / "robots" / "turtlebot2.yaml").read_text()
+    (broken_configs / "robots" / "turtlebot2.yaml").write_text(text.replace("radius: 0.177", "radius: 177"))
+    code, out, err = fulmar("list", "robots")
+    assert code == 1
+    assert "floating_platform  air-bearing platform" in out
+    broken, wrong = err.splitlines()
+    assert "robots/jetbot.yaml:1: not valid YAML" in broken
+    assert "'body.radius' = 177 m is not plausible" in wrong
+    code, out, _ = fulmar("list", "robots", "--json")
+    found = json.loads(out)
+    assert code == 1
+    assert "leatherback" in found["robots"]
+    assert {error["name"] for error in found["errors"]} == {"jetbot", "turtlebot2"} - set(found["robots"])
+
+
+def test_an_unusual_value_is_one_warning_and_no_error(fulmar, broken_configs):
+    file = broken_configs / "robots" / "floating_platform.yaml"
+    file.write_text(file.read_text().replace("thrust: 1.0", "thrust: 40.0"))
+    code, out, err = fulmar("list", "--json")
+    assert code == 0
+    assert "floating_platform" in json.loads(out)["robots"]
+    (line,) = err.splitlines()
+    assert line.startswith("warning: ")
+    assert "'actuators.thrust' = 40 N is unusual" in line
+
+
+def test_a_geofence_smaller_than_the_starts_is_refused_before_anything_runs(fulmar, broken_configs):
+    file = broken_configs / "robots" / "floating_platform.yaml"
+    file.write_text(file.read_text().replace("geofence: 8.0", "geofence: 2.0"))
+    for words in (EVALUATE, [*RUN, "--controller", "lqr"], [*RUN, "--controller", "lqr", "--goal", "1,0,0"]):
+        assert "'limits.geofence' = 2 m of robot 'floating_platform' is smaller" in complaint(fulmar(*words))
+
+
 def test_a_robot_of_one_s_own_is_one_file_beside_those_that_come_with_fulmar(fulmar, tmp_path, monkeypatch):
     """It runs at once with a law whose gains are another; what is missing is told with an example."""
     monkeypatch.chdir(tmp_path)

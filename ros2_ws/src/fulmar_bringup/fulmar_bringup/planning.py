@@ -31,6 +31,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.geofence import check_starts
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
@@ -147,6 +148,8 @@ def plan_run(
         duration_s = duration_s or duration_of(file, the_robot, start or drawn_start)
     elif goal is not None:
         mission, drawn_start = _moved(the_task, mission, drawn_start, goal)
+    if start is None and goals is None:
+        check_starts(the_robot, the_task)
     start = start or drawn_start
     _check_distance(the_robot, the_task, mission, start)
     plan = RunPlan(
