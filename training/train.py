@@ -17,6 +17,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import JUDGING_SEEDS
 from fulmar_core.errors import ConfigError
+from fulmar_core.geofence import check_starts
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint
@@ -110,10 +111,13 @@ def train(
         What `run.json` says.
 
     Raises:
-        ConfigError: If the seed is one of those kept for judging, or there is nothing to resume.
+        ConfigError: If the seed is one of those kept for judging, the task starts beyond the robot's geofence, or there
+            is nothing to resume.
         KeyboardInterrupt: A person ended it; the run folder is finished with the best network so far.
     """
     check_seed(seed)
+    check_starts(robot, task)
+    check_starts(robot, task, training=True)
     if time_limit_s is None and updates is None:
         time_limit_s = settings.time_limit_s
     torch.set_num_threads(settings.threads)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 
 import pytest
 
@@ -103,3 +104,22 @@ def test_info_tells_when_and_why_a_ring_was_written(tmp_path, closed):
         r"written for a fault at 2023-11-1\d .*: plant: the watchdog tripped",
         ask("info", tmp_path / "bag").stdout,
     )
+
+
+def test_a_stamp_of_0_is_counted_and_makes_no_gap(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"})
+    bag.add_topic("/floating_platform/odom", ODOMETRY.type, "stream")
+    source = open_bag(POLICY).of(ODOMETRY)
+    stamps = stamps_ns(source) + 1_700_000_000_000_000_000
+    for index, data in enumerate(source.data[:50]):
+        seconds, rest = divmod(int(stamps[index]), 1_000_000_000)
+        stamp = bytes(8) if index == 0 else struct.pack("<iI", seconds, rest)
+        bag.write("/floating_platform/odom", data[:4] + stamp + data[12:], log_ns=int(stamps[index]))
+    bag.close()
+    (topic,) = describe(open_bag(tmp_path / "bag"))["topics"]
+    assert topic["unstamped"] == 1
+    assert topic["gaps"] == 0
+    assert topic["longest_gap_s"] == pytest.approx(0.2)
+    assert topic["out_of_order"] == 0
+    assert topic["delay_ms"]["max"] == 0.0
+    assert "1 of 50 messages have a stamp of 0 (not set)" in ask("info", tmp_path / "bag").stdout

@@ -73,7 +73,9 @@ def broken_configs(tmp_path, monkeypatch):
         ([*RUN, "--seed", "-1"], "--seed"),
         ([*RUN, "--lockstep", "--rate", "2"], "--lockstep runs as fast as it goes; it takes no --rate"),
         ([*RUN, "--goal", "0,0,0", "--start", "99,0,0"], "99.0 m apart, the geofence"),
-        ([*RUN, "--policy", "/nowhere"], "policy '/nowhere' has no passport.json"),
+        ([*RUN, "--policy", "/nowhere"], "policy '/nowhere': the folder does not exist"),
+        ([*RUN, "--policy", "floating_platform_go_to_pos"], f"does not exist. Nearest bundles: {SHIPPED}"),
+        ([*RUN, "--policy", f"{SHIPPED}/policy.onnx"], "is a file; a policy is the folder around it"),
         ([*RUN, "--control-hz", "7"], "control_hz = 7 must divide"),
         ([*RUN, "--controller", "lqr", "--control-hz", "1"], "the watchdog closes the actuators after 500 ms"),
         ([*RUN, "--controller", "lqr", "--policy", SHIPPED], "controller 'lqr' runs no policy bundle"),
@@ -86,8 +88,8 @@ def broken_configs(tmp_path, monkeypatch):
         ([*EVALUATE, "--seed", "99999999999999999999999"], "--seed"),
         ([*EVALUATE, "--control-hz", "nan"], "control"),
         (["evaluate", "floating_platform", "go_to_pose", "--control-hz", "50"], "would run at 50 Hz"),
-        (["bundle", "show", "/nowhere"], "policy '/nowhere' has no passport.json"),
-        (["bundle", "check", "/nowhere"], "policy '/nowhere' has no passport.json"),
+        (["bundle", "show", "/nowhere"], "policy '/nowhere': the folder does not exist"),
+        (["bundle", "check", "/nowhere"], "policy '/nowhere': the folder does not exist"),
         (["report", "/nowhere"], "/nowhere"),
         (["report", __file__], Path(__file__).name),
         (["export", "/nowhere", "--out", "x"], "/nowhere: no finished training run"),
@@ -102,6 +104,16 @@ def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, 
         pytest.importorskip("stable_baselines3")
     assert told in complaint(fulmar(*words))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_export_overwrites_no_bundle_without_force(fulmar, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    folder = shutil.copytree(SHIPPED, tmp_path / "bundle")
+    words = ("export", "/nowhere", "--out", folder)
+    assert f"{folder} exists already and is not empty" in complaint(fulmar(*words))
+    assert "/nowhere: no finished training run" in complaint(fulmar(*words, "--force"))
+    (tmp_path / "empty").mkdir()
+    assert "/nowhere: no finished" in complaint(fulmar("export", "/nowhere", "--out", tmp_path / "empty"))
 
 
 @pytest.mark.parametrize(
@@ -130,6 +142,41 @@ def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, 
 def test_a_broken_file_is_told_with_its_line(fulmar, broken_configs, file, text, told):
     (broken_configs / file).write_text(text)
     assert told in complaint(fulmar(*EVALUATE, "--episodes", "1"))
+
+
+def test_the_list_shows_the_good_files_and_a_line_for_each_broken_one(fulmar, broken_configs):
+    (broken_configs / "robots" / "jetbot.yaml").write_text("name: [")
+    text = (broken_configs / "robots" / "turtlebot2.yaml").read_text()
+    (broken_configs / "robots" / "turtlebot2.yaml").write_text(text.replace("radius: 0.177", "radius: 177"))
+    code, out, err = fulmar("list", "robots")
+    assert code == 1
+    assert "floating_platform  air-bearing platform" in out
+    broken, wrong = err.splitlines()
+    assert "robots/jetbot.yaml:1: not valid YAML" in broken
+    assert "'body.radius' = 177 m is not plausible" in wrong
+    code, out, _ = fulmar("list", "robots", "--json")
+    found = json.loads(out)
+    assert code == 1
+    assert "leatherback" in found["robots"]
+    assert {error["name"] for error in found["errors"]} == {"jetbot", "turtlebot2"} - set(found["robots"])
+
+
+def test_an_unusual_value_is_one_warning_and_no_error(fulmar, broken_configs):
+    file = broken_configs / "robots" / "floating_platform.yaml"
+    file.write_text(file.read_text().replace("thrust: 1.0", "thrust: 40.0"))
+    code, out, err = fulmar("list", "--json")
+    assert code == 0
+    assert "floating_platform" in json.loads(out)["robots"]
+    (line,) = err.splitlines()
+    assert line.startswith("warning: ")
+    assert "'actuators.thrust' = 40 N is unusual" in line
+
+
+def test_a_geofence_smaller_than_the_starts_is_refused_before_anything_runs(fulmar, broken_configs):
+    file = broken_configs / "robots" / "floating_platform.yaml"
+    file.write_text(file.read_text().replace("geofence: 8.0", "geofence: 2.0"))
+    for words in (EVALUATE, [*RUN, "--controller", "lqr"], [*RUN, "--controller", "lqr", "--goal", "1,0,0"]):
+        assert "'limits.geofence' = 2 m of robot 'floating_platform' is smaller" in complaint(fulmar(*words))
 
 
 def test_a_robot_of_one_s_own_is_one_file_beside_those_that_come_with_fulmar(fulmar, tmp_path, monkeypatch):

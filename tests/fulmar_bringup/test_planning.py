@@ -136,7 +136,7 @@ def test_a_folder_that_exists_is_never_recorded_into(plan, tmp_path):
             "was trained for task",
         ),
         ({"control_hz": 50.0}, "was trained at 5 Hz, but would run at 50 Hz"),
-        ({"policy": Path("/nowhere")}, "policy '/nowhere' has no passport.json"),
+        ({"policy": Path("/nowhere")}, "policy '/nowhere': the folder does not exist"),
     ],
 )
 def test_a_policy_that_does_not_fit_is_refused_before_anything_starts(plan, change, words):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fulmar_bringup.bag_reader import read_run
+from fulmar_bringup.commands.run import verdict
 from fulmar_bringup.run_judgement import judge
 from fulmar_bringup.run_record import Motion
 from fulmar_bringup.run_summary import summarise
@@ -35,6 +36,16 @@ def test_a_run_that_reached_its_goal_says_so(reached):
     assert summary["steps"] == 201
     assert 4.0 < summary["time_to_target_s"] < 15.0
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+
+
+def test_time_to_goal_and_length_of_the_run_are_told_apart(reached, silenced):
+    summary = summarise(read_run(reached))
+    line = verdict(summary).splitlines()[0]
+    assert line.startswith(f"lqr: goal met after {summary['time_to_target_s']:.1f} s, ")
+    assert line.endswith("; length of the run 40 s")
+    missed = verdict(summarise(read_run(silenced))).splitlines()[0]
+    assert missed.startswith("lqr: goal missed, ")
+    assert missed.endswith("; length of the run 15 s")
 
 
 def test_times_count_from_the_first_state_as_they_do_for_steps_in_metrics(reached):

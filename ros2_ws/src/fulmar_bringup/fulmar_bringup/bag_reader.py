@@ -18,8 +18,10 @@ from fulmar_bringup.bags.decode import (
     stamp_of,
     twist_vectors,
 )
+from fulmar_bringup.bags.figures import controller_of
 from fulmar_bringup.run_record import Actuation, GivenGoal, HealthSample, Motion, Places, RunRecord
 from fulmar_core.errors import BagError, ConfigError
+from fulmar_core.paths import config_names
 from fulmar_core.rotation import rotate
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
@@ -64,6 +66,37 @@ def read_run(path: Path) -> RunRecord:
     return _Reader(bag).record(bag.info)
 
 
+def read_any_run(path: Path, *, task: str | None = None, robot: str | None = None) -> RunRecord:
+    """Read a run that Fulmar need not have recorded, from whatever its bag holds.
+
+    Args:
+        path: Bag folder, or a file in it.
+        task: Task of the run; by default what the bag or its controller names, if they do.
+        robot: Robot of the run; by default what they name, or the namespace of the odometry.
+
+    Returns:
+        The run; its `info` lacks `task` or `robot` where nothing names them.
+
+    Raises:
+        BagError: There is no bag, or nothing of it can be read.
+    """
+    bag = open_bag(Path(path))
+    asked = {"task": task, "robot": robot}
+    return _Reader(bag).record({**_named(bag), **{key: name for key, name in asked.items() if name}})
+
+
+def _named(bag: Bag) -> dict[str, Any]:
+    """What a bag says of its run, with what its controller and its topics name where it says nothing."""
+    own = {key: value for key, value in (bag.info or {}).items() if value not in (None, "")}
+    controller = controller_of(bag)
+    named = {key: controller[key] for key in ("robot", "task", "controller") if controller.get(key)}
+    if "robot" not in named | own:
+        spaces = {topic.name.split("/")[1] for topic in bag.topics.values() if topic.type == ODOMETRY.type}
+        known = sorted(spaces & set(config_names("robots")))
+        named |= {"robot": known[0]} if len(known) == 1 else {}
+    return named | own
+
+
 class _Reader:
     """Reads wire after wire, and gathers what cannot be read."""
 
@@ -78,7 +111,7 @@ class _Reader:
             path=self._bag.path,
             info=info,
             truth=_motion(self._odometries(TRUTH)),
-            odom=_motion(self._odometries(ODOMETRY)),
+            odom=_motion(self._measured()),
             applied=_actuation(self._vectors(ACTUATORS_STATE)),
             commanded=_actuation(self._commands()),
             goals=tuple(sorted(self._goals(info.get("task")), key=lambda goal: goal.log_s)),
@@ -103,6 +136,16 @@ class _Reader:
     def _odometries(self, wire: Wire) -> Odometries:
         self._lost(wire)
         return odometries(self._bag.of(wire))
+
+    def _measured(self) -> Odometries:
+        """Odometry under the name of the wire; under any other where a bag has one odometry alone."""
+        found = self._odometries(ODOMETRY)
+        if len(found) or len(self._bag.of(TRUTH)):
+            return found
+        try:
+            return odometries(self._bag.odometry())
+        except BagError:
+            return found
 
     def _vectors(self, wire: Wire) -> Vectors:
         found = joint_vectors(self._bag.of(wire), "effort")

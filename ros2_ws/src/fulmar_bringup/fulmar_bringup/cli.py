@@ -30,7 +30,7 @@ from fulmar_bringup.commands.run import run
 from fulmar_bringup.commands.swap import swap
 from fulmar_bringup.commands.teleop import teleop
 from fulmar_bringup.commands.train import train
-from fulmar_bringup.console import console
+from fulmar_bringup.console import console, showing_warnings
 from fulmar_bringup.extras import advice_for
 from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
 from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
@@ -83,7 +83,8 @@ def main() -> None:
     # A shell starts its background jobs with Ctrl-C ignored, and so would everything that we start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        _run_and_exit(told)
+        with showing_warnings():
+            _run_and_exit(told)
     finally:
         # Python ends by SIGINT, whatever the exit code, once Ctrl-C has come while text was run as code, as it is for
         # each named tuple or dataclass that is imported, even if it was caught; running text again takes that back

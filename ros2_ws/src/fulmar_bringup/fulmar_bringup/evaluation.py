@@ -14,6 +14,7 @@ from fulmar_bringup.node_table import RunPlan
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episodes
+from fulmar_core.geofence import check_starts
 from fulmar_core.metrics import Trajectories, episode_metrics, successes, summarise
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import WORLDS, batches, roll_out_in_backends
@@ -82,11 +83,12 @@ def runs_of(
         What happened, for the next so many episodes.
 
     Raises:
-        ConfigError: An episode is shorter than one control step.
+        ConfigError: An episode is shorter than one control step, or may start beyond the robot's geofence.
         RunFailed: Through ros, the controller ended or refused to start.
         LockstepError: Through ros, it did not answer in time.
     """
     plan = trial.plan
+    check_starts(trial.robot, trial.task)
     if trial.through == "ros":
         from fulmar_bringup.ros_evaluation import roll_out_through_ros
 

@@ -30,16 +30,17 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.geofence import check_starts
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
-from fulmar_core.policy_bundle import check_fit, read_bundle, read_passport
+from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from hardware_drivers.settings import UNARMED, MavlinkBoat, load_hardware
-from policy_server.shipped import shipped_policy
+from policy_server.shipped import shipped_policies, shipped_policy
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
 PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
@@ -150,6 +151,8 @@ def plan_run(
         duration_s = duration_s or duration_of(file, the_robot, start or drawn_start)
     elif goal is not None:
         mission, drawn_start = _moved(the_task, mission, drawn_start, goal)
+    if start is None and goals is None:
+        check_starts(the_robot, the_task)
     start = start or drawn_start
     _check_distance(the_robot, the_task, mission, start)
     plan = RunPlan(
@@ -400,6 +403,7 @@ def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: fl
             f"no policy is shipped for '{robot.name}' and '{task.name}'. Give one with --policy, "
             f"train one with `fulmar train {robot.name} {task.name}`{otherwise}."
         )
+    check_folder(folder, known=sorted(shipped_policies(), key=lambda each: robot.name not in each.name))
     check_fit(read_passport(folder), robot, task, control_hz, where=str(folder))
     return folder
 

@@ -106,7 +106,7 @@ def judge(record: RunRecord) -> Judgement | None:
     if len(motion) < 2 or motion.stamp_s[-1] <= motion.stamp_s[0]:
         return None
     task = load_task(_text(record, "task"))
-    goals = _goals(record)
+    goals = _goals(record, task)
     robot = load_robot(_text(record, "robot"))
     time_s, samples = _even(motion)
     states = planar_of(motion.states)
@@ -150,11 +150,11 @@ def _of_goal_file(record: RunRecord) -> dict[str, Any]:
 def _text(record: RunRecord, key: str) -> str:
     value = record.info.get(key)
     if not isinstance(value, str):
-        raise BagError(f"{record.path}: the run information names no {key}, found {value!r}.")
+        raise BagError(f"{record.path}: names no {key}, found {value!r}. `fulmar report` takes --{key}.")
     return value
 
 
-def _goals(record: RunRecord) -> list[GivenGoal]:
+def _goals(record: RunRecord, task: Task) -> list[GivenGoal]:
     """Goals as they came; what was asked for if the bag has none."""
     given: list[GivenGoal] = []
     for goal in record.goals:
@@ -170,7 +170,7 @@ def _goals(record: RunRecord) -> list[GivenGoal]:
         x, y, heading_deg = (float(value) for value in asked)
     except (TypeError, ValueError):
         raise BagError(
-            f"{record.path}: holds no goal, and its run information has {asked!r} for one."
+            f"{record.path}: holds no goal on {task.goal_topic}, and its run information has {asked!r} for one."
         ) from None
     return [GivenGoal(-np.inf, -np.inf, np.array([[x, y, np.deg2rad(heading_deg)]]))]
 

@@ -12,6 +12,7 @@ import math
 import re
 import types
 import typing
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -41,6 +42,27 @@ def load_config(cls: type[T], path: Path) -> T:
     """
     root = _compose(path)
     return typing.cast(T, _Builder(path).build(cls, root, "the file"))
+
+
+def line_of(path: Path, keys: Sequence[str]) -> int:
+    """Line in which a key of a file stands, counted from 1; that of the nearest key above, where it does not.
+
+    Args:
+        path: YAML file that `load_config` has read.
+        keys: From the outermost mapping inwards; digits for the entries of lists.
+    """
+    node, line = _compose(path), 1
+    for key in keys:
+        if isinstance(node, MappingNode):
+            pairs = {name.value: (name, value) for name, value in node.value}
+            if key not in pairs:
+                break
+            name, node = pairs[key]
+            line = name.start_mark.line + 1
+        elif isinstance(node, SequenceNode) and key.isdecimal() and int(key) < len(node.value):
+            node = node.value[int(key)]
+            line = node.start_mark.line + 1
+    return line
 
 
 def _compose(path: Path) -> Node:

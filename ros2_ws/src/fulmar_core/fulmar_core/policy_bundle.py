@@ -11,11 +11,13 @@ Knows files and hashes, not how to run a network.
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import io
 import json
 import os
 import zipfile
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -34,6 +36,8 @@ NETWORK = "policy.onnx"
 GOLDEN = "golden.npz"
 PASSPORT = "passport.json"
 SIGNATURE = "signature.json"
+EXPORT = "Export one with `fulmar export RUN --out DIR`"
+MOST_OFFERED = 3  # bundles, in place of one that does not exist
 MAX_BYTES = 50_000_000  # a file beyond this is no policy of ours, and is not read
 
 Action = Literal["on_off", "continuous"]
@@ -179,6 +183,26 @@ def read_passport(folder: Path) -> Passport:
     return read_bundle(folder).passport
 
 
+def check_folder(folder: Path, known: Iterable[Path] = ()) -> None:
+    """Refuse a path that is no folder, and name the nearest bundles.
+
+    Args:
+        folder: What was given for a bundle.
+        known: Bundles to offer beside those in the same parent folder.
+
+    Raises:
+        BundleError: There is no such folder.
+    """
+    if folder.is_dir():
+        return
+    beside = (path.parent for path in folder.parent.glob(f"*/{PASSPORT}"))
+    bundles = {bundle.name: bundle for bundle in (*known, *beside)}
+    near = difflib.get_close_matches(folder.name, bundles, n=MOST_OFFERED) or list(bundles)[:MOST_OFFERED]
+    found = "is a file; a policy is the folder around it" if folder.exists() else "the folder does not exist"
+    offer = f"Nearest bundles: {', '.join(str(bundles[name]) for name in near)}" if near else EXPORT
+    raise BundleError(f"policy '{folder}': {found}. {offer}.")
+
+
 def read_golden(folder: Path) -> Golden:
     """Read the golden vectors alone; their hash is not checked.
 
@@ -291,8 +315,9 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
 
 def _content(folder: Path, name: str) -> bytes:
     path = folder / name
+    check_folder(folder)
     if not path.is_file():
-        raise BundleError(f"policy '{folder}' has no {name}. Export one with `fulmar export RUN --out DIR`.")
+        raise BundleError(f"policy '{folder}' has no {name}. {EXPORT}.")
     try:
         with path.open("rb") as file:
             size = os.fstat(file.fileno()).st_size

@@ -14,6 +14,8 @@ from fulmar_core.config import load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
+from fulmar_core.plausibility import check_plausible
+from fulmar_core.plausible_ranges import ROBOT
 from fulmar_core.sensors.imu import ImuSpec
 from fulmar_core.sensors.odometer import OdometrySpec
 
@@ -229,6 +231,7 @@ def load_robot(name: str) -> Robot:
         raise ConfigError(
             f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
         )
+    check_plausible(robot, ROBOT, path)
     _check_spans(robot, path)
     calibration = calibration_in_use()
     if calibration is None or calibration.robot != name:

@@ -17,7 +17,7 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from fulmar_bringup.bags.folder import files_of, missing_files, storage_of, told_beside
 from fulmar_bringup.bags.layout import unreadable
 from fulmar_core.errors import BagError, UnknownNameError
-from fulmar_core.topics import Wire
+from fulmar_core.topics import ODOMETRY, TRUTH, WIRES, Wire
 from fulmar_ros.bag_records import PACKED, ZSTD_MAGIC, file_bytes, read_records, unpack
 from fulmar_ros.bag_ring import FAULTS
 from fulmar_ros.bag_thread import RECORDING
@@ -111,12 +111,12 @@ class Bag:
         names = {
             topic.name
             for topic in self.topics.values()
-            if topic.name.endswith(f"/{wire.name}") and topic.type == wire.type
+            if is_of_wire(topic.name, wire) and topic.type == wire.type
         }
         return names.pop() if len(names) == 1 else wire.name
 
     def odometry(self, chosen: str | None = None) -> Topic:
-        """The odometry: that of the robot, the one that was chosen, or the only one there is.
+        """The odometry: the one that was chosen, else what the robot measures, else its truth, else the only one.
 
         Args:
             chosen: Name of a topic.
@@ -135,17 +135,25 @@ class Bag:
             if chosen not in known:
                 raise UnknownNameError(f"odometry topic in {self.path}:", chosen, known)
             return known[chosen]
-        own = known.get(f"/{self.robot}/odom") if self.robot else None
-        if own is not None:
-            return own
-        if len(known) == 1:
-            return next(iter(known.values()))
+        own = {name: topic for name, topic in known.items() if name.startswith(f"/{self.robot}/")}
+        for some in (own, known) if self.robot else (known,):
+            measured = {name: topic for name, topic in some.items() if is_of_wire(name, ODOMETRY)}
+            truths = {name: topic for name, topic in some.items() if is_of_wire(name, TRUTH)}
+            only = measured or truths or some
+            if len(only) == 1:
+                return next(iter(only.values()))
         if not known:
             has = f"It has: {', '.join(self.topics) or 'nothing'}."
             raise BagError(" ".join([f"{self.path}: holds no {kind}. {has}", *self.warnings]))
         raise BagError(
             f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC."
         )
+
+
+def is_of_wire(topic: str, wire: Wire) -> bool:
+    """Whether the name of a topic, under any robot, is that of a wire, and of no other with a longer name."""
+    ends = [other.name for other in WIRES if f"/{topic}".endswith(f"/{other.name.lstrip('/')}")]
+    return bool(ends) and max(ends, key=len) == wire.name
 
 
 def open_bag(path: Path) -> Bag:

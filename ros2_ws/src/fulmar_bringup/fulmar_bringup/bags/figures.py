@@ -97,10 +97,14 @@ def changed_config(bag: Bag) -> list[str]:
 def _of_topic(topic: Topic, bag: Bag) -> dict[str, Any]:
     read = topic.readable()
     log_ns = np.array(read.log_ns, dtype=np.int64)
-    stamps = stamps_ns(read)
+    stamps, unstamped = stamps_ns(read), 0
+    if stamps is not None:
+        unstamped = int(np.sum(stamps == 0))
+        # 0 means "not set": it tells no time, and would lie decades before the other stamps.
+        stamps, log_ns = stamps[stamps != 0], log_ns[stamps != 0]
     # In lock step messages come as fast as the machine goes: only stamps tell a rate.
     by_stamp = stamps is not None and len(np.unique(stamps)) > 1
-    times = np.sort(stamps) if by_stamp and stamps is not None else log_ns
+    times = np.sort(stamps) if by_stamp and stamps is not None else np.array(read.log_ns, dtype=np.int64)
     steps = np.diff(times)
     steps = steps[steps > 0]
     period_ns = float(np.median(steps)) if len(steps) else None
@@ -112,6 +116,7 @@ def _of_topic(topic: Topic, bag: Bag) -> dict[str, Any]:
         "bytes": sum(map(len, topic.data)),
         "rate_hz": NS / period_ns if period_ns else None,
         "by": "stamp" if by_stamp else "record",
+        "unstamped": unstamped,
         "gaps": int(np.sum(steps > GAP * period_ns)) if period_ns else 0,
         "longest_gap_s": float(np.max(steps)) / NS if len(steps) else None,
         "out_of_order": int(np.sum(np.diff(stamps) < 0)) if stamps is not None else 0,

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,8 +17,10 @@ from matplotlib.figure import Figure
 
 from fulmar_bringup.bags.contents import Bag
 from fulmar_bringup.bags.decode import Odometries, Vectors, joint_vectors, odometries, twist_vectors
+from fulmar_bringup.bags.figures import describe
 from fulmar_bringup.bags.plain_twist import TYPE, plain_vectors
 from fulmar_bringup.report.page import STYLE
+from fulmar_bringup.report.sources import check_overwrite, source_mark
 from fulmar_bringup.report.style import CONTROLLER_COLOURS, as_png, as_svg, house_style, legend, quiet_grid
 from fulmar_core.errors import ConfigError
 
@@ -41,26 +44,37 @@ class Drawing:
     draw: Callable[[Axes], None]
 
 
-def write_pictures(bag: Bag, out: Path, odometry: str | None = None) -> Path:
+def write_pictures(
+    bag: Bag, out: Path, odometry: str | None = None, *, note: str = "", force: bool = True
+) -> Path:
     """Draw a bag.
 
     Args:
         bag: Any bag with odometry.
         out: A `.html` page that works offline, or a `.png` picture. Its folder is made.
         odometry: Topic, where there are several.
+        note: A sentence for the page.
+        force: Replace whatever file is there; False: only a report of the same bag.
 
     Raises:
         BagError: The bag holds no odometry.
-        ConfigError: Another kind of file was asked for.
+        ConfigError: Another kind of file was asked for, or a file of something else is there.
         OSError: It cannot be written.
     """
     if out.suffix not in (".html", ".png"):
         raise ConfigError(f"{out}: a plot is a .html page or a .png picture. Give such a name.")
+    mark = source_mark([bag.path])
+    if not force:
+        check_overwrite(out, mark)
     topic = bag.odometry(odometry)
     drawings = _drawings(bag, odometries(topic))
     title = f"{bag.path.name}: {topic.name}"
     with house_style():
-        data = as_png(_sheet(drawings, title)) if out.suffix == ".png" else _page(drawings, title).encode()
+        data = (
+            as_png(_sheet(drawings, title), mark)
+            if out.suffix == ".png"
+            else _page(drawings, title, mark, [note] if note else [], describe(bag)["topics"]).encode()
+        )
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(data)
     return out
@@ -149,8 +163,26 @@ def _sheet(drawings: Sequence[Drawing], title: str) -> Figure:
     return figure
 
 
-def _page(drawings: Sequence[Drawing], title: str) -> str:
-    parts = []
+def _rates(topics: Sequence[dict[str, Any]]) -> str:
+    """Counts, rates and gaps of the topics as a table."""
+    rows = "".join(
+        f"<tr><td>{escape(topic['name'])}</td><td>{topic['count']}</td>"
+        f"<td>{'–' if topic['rate_hz'] is None else format(topic['rate_hz'], '.2f')}</td>"
+        f"<td>{'–' if topic['longest_gap_s'] is None else format(topic['longest_gap_s'], '.3f')}</td></tr>"
+        for topic in topics
+    )
+    heads = "".join(f"<th>{head}</th>" for head in ("topic", "messages", "rate [Hz]", "longest gap [s]"))
+    return f'<h2>Rates</h2><div class="scroll"><table><tr>{heads}</tr>{rows}</table></div>'
+
+
+def _page(
+    drawings: Sequence[Drawing],
+    title: str,
+    mark: str,
+    notes: Sequence[str],
+    topics: Sequence[dict[str, Any]],
+) -> str:
+    parts = [f"<p>{escape(note)}</p>" for note in notes]
     for drawing in drawings:
         figure = Figure(figsize=(WIDTH, drawing.height), layout="constrained")
         axes = figure.subplots()
@@ -163,7 +195,8 @@ def _page(drawings: Sequence[Drawing], title: str) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<meta name="fulmar-source" content="{escape(mark)}">'
         f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
-        + "\n".join(parts)
+        + "\n".join([*parts, _rates(topics)])
         + "\n</body></html>\n"
     )

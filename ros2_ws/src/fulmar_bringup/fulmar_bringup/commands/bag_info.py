@@ -20,8 +20,9 @@ def info(bag: BagArgument, as_json: JsonOption = False) -> None:
     """Tell what is in a bag: topics, types, counts, rates, gaps, late and dropped messages, provenance.
 
     Rates and gaps go by the stamps in the messages where they have any, else by when they were recorded. A gap is 2.5
-    periods without a message. Late is a message that came more than a period later than usual. Dropped is what must
-    have been there: numbers that the recorder counted and the file lacks, odometry that was answered but is not there.
+    periods without a message; a stamp of 0, which means "not set", counts for none. Late is a message that came more
+    than a period later than usual. Dropped is what must have been there: numbers that the recorder counted and the
+    file lacks, odometry that was answered but is not there.
 
     Exit code: 0 the whole bag was read, 1 part of it could not be, 2 nothing could.
     """
@@ -44,6 +45,11 @@ def _show(found: dict[str, Any]) -> None:
     )
     for row in _aligned([HEAD, *map(_row, found["topics"])]):
         _say(row)
+    for topic in found["topics"]:
+        if topic["unstamped"]:
+            _say(
+                f"{topic['name']}: {topic['unstamped']} of {topic['count']} messages have a stamp of 0 (not set)"
+            )
     if found["silent_topics"]:
         _say(f"announced, without a message: {', '.join(found['silent_topics'])}")
     for fault in found["faults"]:

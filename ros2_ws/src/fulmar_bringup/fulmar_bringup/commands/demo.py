@@ -71,6 +71,7 @@ def _table(summaries: list[dict[str, Any]]) -> Table:
     columns = (
         "controller",
         "goal",
+        "time to goal",
         "position",
         "heading",
         "valves",
@@ -85,6 +86,7 @@ def _table(summaries: list[dict[str, Any]]) -> Table:
         table.add_row(
             str(s["controller"]),
             "met" if s["success"] else "missed",
+            _number(s["time_to_target_s"] if s["success"] else None, 1.0, "s", 1),
             _number(s["final_position_error_m"], 100.0, "cm", 1),
             _number(s["final_heading_error_deg"], 1.0, "°", 1),
             _number(s["actuator_use"], 100.0, "%", 0),

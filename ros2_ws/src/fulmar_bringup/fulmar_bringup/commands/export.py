@@ -8,13 +8,19 @@ from typing import Annotated
 import typer
 
 from fulmar_bringup.console import output
+from fulmar_core.errors import ConfigError
 
 
 def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder that `fulmar train` left.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the bundle.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the bundle; new or empty.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace the bundle that DIR holds.")] = False,
 ) -> None:
     """Write a policy bundle: network, golden vectors and passport; then load it as the robot will."""
+    if out.exists() and not force and (not out.is_dir() or any(out.iterdir())):
+        raise ConfigError(
+            f"{out} exists already and is not empty; no bundle is overwritten. Give --out another folder, or --force."
+        )
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy

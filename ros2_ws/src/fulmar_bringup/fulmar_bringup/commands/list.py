@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
 from fulmar_bringup.commands.arguments import JsonOption
-from fulmar_bringup.console import output, print_json
-from fulmar_core.errors import UnknownNameError
+from fulmar_bringup.console import console, output, print_json
+from fulmar_core.errors import FulmarError, UnknownNameError
+from fulmar_core.exit_codes import DONE, FAILED
 from fulmar_core.paths import config_names
 
 FAMILIES = (
@@ -29,14 +31,32 @@ def list_names(
     """Show the robots, tasks, controllers, policies, scenarios and files of other kinds there are.
 
     Your own come with them: FULMAR_CONFIGS names folders that have `robots/`, `tasks/` and so on.
+
+    Exit code: 0 every file can be used, 1 some cannot; each of these has a line that says why.
     """
     if family is not None and family not in FAMILIES:
         raise UnknownNameError("family", family, FAMILIES)
     chosen = FAMILIES if family is None else (family,)
-    found = {name: _entries(name) for name in chosen}
+    found: dict[str, dict[str, str]] = {name: {} for name in chosen}
+    errors = []
+    for kind, entries in found.items():
+        names, title_of = _family(kind)
+        for name in names:
+            try:
+                entries[name] = title_of(name)
+            except FulmarError as problem:
+                errors.append({"family": kind, "name": name, "error": str(problem)})
     if as_json:
-        print_json({name: list(entries) for name, entries in found.items()})
-        return
+        names_of: dict[str, Any] = {name: list(entries) for name, entries in found.items()}
+        print_json(names_of | ({"errors": errors} if errors else {}))
+    else:
+        _show(found)
+    for error in errors:
+        console.print(f"{error['family']}: {error['error']}", markup=False, soft_wrap=True)
+    raise typer.Exit(FAILED if errors else DONE)
+
+
+def _show(found: dict[str, dict[str, str]]) -> None:
     for name, entries in found.items():
         output.print(f"{name}", style="bold")
         width = max((len(entry) for entry in entries), default=0)
@@ -44,8 +64,8 @@ def list_names(
             output.print(f"  {entry:<{width}}  {title}".rstrip(), markup=False, soft_wrap=True)
 
 
-def _entries(family: str) -> dict[str, str]:
-    """Names and titles of one family."""
+def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
+    """Names of one family, and what loads one of them and gives its title."""
     from fulmar_bringup.system import CONTROLLERS, load_system
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.estimation.settings import load_estimator
@@ -54,22 +74,24 @@ def _entries(family: str) -> dict[str, str]:
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from hardware_drivers.settings import load_hardware
-    from policy_server.shipped import shipped_policies
+    from policy_server.shipped import policies_directory, shipped_policies
 
-    if family == "robots":
-        return {name: load_robot(name).title for name in config_names("robots")}
-    if family == "tasks":
-        return {name: load_task(name).title for name in config_names("tasks")}
-    if family == "goals":
-        return {name: load_goals(name).title for name in config_names("goals")}
-    if family == "hardware":
-        return {name: load_hardware(name).title for name in config_names("hardware")}
-    if family == "scenarios":
-        return {name: load_scenario(name).title for name in config_names("scenarios")}
-    if family == "estimators":
-        return {name: load_estimator(name).title for name in config_names("estimators")}
-    if family == "systems":
-        return {name: load_system(name).title for name in config_names("systems")}
     if family == "policies":
-        return {path.name: f"{read_passport(path).control_hz:g} Hz" for path in shipped_policies()}
-    return {name: entry.title for name, entry in CONTROLLERS.items()}
+        folder = policies_directory()
+        return (
+            [path.name for path in shipped_policies()],
+            lambda name: f"{read_passport(folder / name).control_hz:g} Hz",
+        )
+    if family == "controllers":
+        return list(CONTROLLERS), lambda name: CONTROLLERS[name].title
+    loaders: dict[str, Callable[[str], Any]] = {
+        "robots": load_robot,
+        "tasks": load_task,
+        "goals": load_goals,
+        "hardware": load_hardware,
+        "scenarios": load_scenario,
+        "estimators": load_estimator,
+        "systems": load_system,
+    }
+    load = loaders[family]
+    return config_names(family), lambda name: str(load(name).title)

@@ -274,13 +274,15 @@ def verdict(summary: dict[str, Any]) -> str:
         return f"{summary['controller']}: no fault, so the ring of the recorder was not written; no verdict on the goal"
     if CONTROLLERS[summary["controller"]].strives:
         reached = "goal met" if summary["success"] else "goal missed"
+        if summary["success"] and summary["time_to_target_s"] is not None:
+            reached += f" after {summary['time_to_target_s']:.1f} s"
     else:
         reached = "drove about"
     latency = summary["latency_ms"]
     told = [words for words in (told_figure(summary, name) for name in TOLD) if words]
     told += ["touched an obstacle"] if summary["collided"] else []
-    after = [f"after {summary['duration_s']:.0f} s"] if told else []
-    lines = [f"{summary['controller']}: {', '.join([reached, *told, *after])}"]
+    length = f"; length of the run {summary['duration_s']:.0f} s"
+    lines = [f"{summary['controller']}: {', '.join([reached, *told])}{length}"]
     if latency["p50"] is not None:
         lines.append(
             f"  {summary['steps']} commands, latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms; "

@@ -45,13 +45,14 @@ dt {{ margin-top: .7rem }} dd {{ margin: 0 }}
 """
 
 
-def page(runs: Sequence[View], drawn: Sequence[Picture], title: str) -> str:
+def page(runs: Sequence[View], drawn: Sequence[Picture], title: str, mark: str) -> str:
     """Lay out the page.
 
     Args:
         runs: The runs, in the order of the columns.
         drawn: Pictures from `pictures`.
         title: Heading of the page.
+        mark: Of the runs, from `sources.source_mark`.
 
     Returns:
         HTML that needs nothing from anywhere else.
@@ -71,6 +72,7 @@ def page(runs: Sequence[View], drawn: Sequence[Picture], title: str) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<meta name="fulmar-source" content="{escape(mark)}">'
         f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>\n"
         + "\n".join(body)
         + "\n</body></html>\n"

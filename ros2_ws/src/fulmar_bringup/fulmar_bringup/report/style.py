@@ -106,8 +106,9 @@ def as_svg(figure: Figure) -> str:
     return text
 
 
-def as_png(figure: Figure, *, dpi: int = 130) -> bytes:
-    """A figure as a picture file on white."""
+def as_png(figure: Figure, mark: str = "", *, dpi: int = 130) -> bytes:
+    """A figure as a picture file on white, with the mark of `report.sources` where one is given."""
     stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=dpi, facecolor="white")
+    metadata = {"Source": mark} if mark else {}
+    figure.savefig(stream, format="png", dpi=dpi, facecolor="white", metadata=metadata)
     return stream.getvalue()

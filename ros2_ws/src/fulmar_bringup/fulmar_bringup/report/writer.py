@@ -7,25 +7,30 @@ from pathlib import Path
 
 from fulmar_bringup.report.page import page
 from fulmar_bringup.report.pictures import overview, pictures
+from fulmar_bringup.report.sources import check_overwrite, source_mark
 from fulmar_bringup.report.style import as_png, house_style
 from fulmar_bringup.report.view import View, views
 from fulmar_bringup.run_record import RunRecord
 from fulmar_core.errors import ConfigError
 
 
-def write_report(records: Sequence[RunRecord], out: Path, title: str | None = None) -> Path:
+def write_report(
+    records: Sequence[RunRecord], out: Path, title: str | None = None, *, force: bool = True
+) -> Path:
     """Write a report.
 
     Args:
         records: At least one run; several are compared.
         out: A `.html` page that works offline, or a `.png` picture. Its folder is made.
         title: Heading; made from the runs by default.
+        force: Replace whatever file is there; False: only a report of the same runs.
 
     Returns:
         The file.
 
     Raises:
-        ConfigError: Another kind of file was asked for, there is no run, or the runs are of several tasks.
+        ConfigError: Another kind of file was asked for, there is no run, the runs are of several tasks, or a file of
+            something else is there.
         BagError: A run names no task or no goal.
     """
     out = Path(out)
@@ -34,13 +39,16 @@ def write_report(records: Sequence[RunRecord], out: Path, title: str | None = No
     if not records:
         raise ConfigError("there is no run to report on. Give at least one bag.")
     _check_alike(records)
+    mark = source_mark(record.path for record in records)
+    if not force:
+        check_overwrite(out, mark)
     runs = views(records)
     title = title or _title(runs)
     with house_style():
         data = (
-            as_png(overview(runs, title))
+            as_png(overview(runs, title), mark)
             if out.suffix == ".png"
-            else page(runs, pictures(runs), title).encode()
+            else page(runs, pictures(runs), title, mark).encode()
         )
     try:
         out.parent.mkdir(parents=True, exist_ok=True)

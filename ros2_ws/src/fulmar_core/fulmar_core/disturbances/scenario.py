@@ -17,6 +17,8 @@ from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import ConfigError
 from fulmar_core.holding import stranding_losses
 from fulmar_core.paths import config_path
+from fulmar_core.plausibility import check_plausible
+from fulmar_core.plausible_ranges import SCENARIO
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
@@ -239,7 +241,10 @@ def load_scenario(name: str) -> Scenario:
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
     """
-    return load_config(Scenario, config_path("scenarios", name))
+    path = config_path("scenarios", name)
+    scenario = load_config(Scenario, path)
+    check_plausible(scenario, SCENARIO, path)
+    return scenario
 
 
 def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: float = 1.0) -> World:

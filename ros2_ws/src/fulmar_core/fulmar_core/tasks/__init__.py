@@ -10,6 +10,8 @@ from typing import cast
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
+from fulmar_core.plausibility import check_plausible
+from fulmar_core.plausible_ranges import TASK
 from fulmar_core.robot import Robot
 from fulmar_core.tasks.go_through_poses import GoThroughPoses
 from fulmar_core.tasks.go_through_positions import GoThroughPositions
@@ -55,6 +57,7 @@ def load_task(name: str) -> Task:
         raise ConfigError(
             f"{path}: 'name' is '{task.name}', the file's own name is '{name}'. Make them equal."
         )
+    check_plausible(task, TASK, path)
     return task
 
 

@@ -1,0 +1,217 @@
+"""Plausible ranges of the numbers in configuration files, with the reason for each.
+
+Ranges are wide: a mistake of unit is a factor of 57 (degrees), 100 or 1000, and a new kind of robot must still load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """Which values one key may have; 0 is not looked at where it switches something off."""
+
+    key: str  # dotted path in the file; `*` stands for each entry of a list, a digit for one of them
+    unit: str  # one of `UNITS`, or any other that has no likely mistake
+    possible: Range  # a value outside is refused
+    usual: Range  # a value outside is a warning
+    why: str  # what the range comes from
+    # The ranges are multiples of this number of the same file, which is in the key's unit.
+    scale: Callable[[Any], float] | None = None
+    distance: bool = False  # the value is a place, and its distance from the origin in the plane counts
+    zero: bool = False  # whether 0 is looked at too
+
+
+# Units that a value may have been written in by mistake, and what one of them is in the unit of the key.
+UNITS: dict[str, tuple[tuple[str, float], ...]] = {
+    "m": (("mm", 1e-3), ("cm", 1e-2)),
+    "kg": (("g", 1e-3),),
+    "kg·m²": (("g·m²", 1e-3), ("kg·cm²", 1e-4), ("kg·mm²", 1e-6)),
+    "N": (("mN", 1e-3), ("kN", 1e3)),
+    "N·m": (("mN·m", 1e-3),),
+    "rad": (("°", pi / 180.0),),
+    "°": (("rad", 180.0 / pi),),
+    "rad/s": (("°/s", pi / 180.0), ("rpm", pi / 30.0)),
+    "°/s": (("rad/s", 180.0 / pi),),
+    "m/s": (("mm/s", 1e-3), ("cm/s", 1e-2), ("km/h", 1.0 / 3.6)),
+    "m/s²": (("mg", 9.81e-3),),
+    "s": (("ms", 1e-3), ("µs", 1e-6)),
+    "of 1": (("%", 1e-2),),
+    "kg/m³": (("g/cm³", 1e3),),
+}
+
+MOST_ACCELERATION = 20.0  # of a robot by its own actuators: twice its weight [m/s²]
+BODY = "of the body's mass and radius"
+
+
+def _inertia(body: Any, *, upright: bool) -> float:
+    """Moment of all mass at the edge of the body's circle or, about level axes, of its side view [kg·m²]."""
+    return float(body.mass * (body.radius**2 + (0.0 if upright else 0.25 * body.height**2)))
+
+
+def _floating_draught(robot: Any) -> float:
+    water = robot.hydrodynamics.hydrostatics
+    return float(robot.body.mass / (water.water_density * water.waterplane_area))
+
+
+def _noise(sensor: str, part: str, unit: str, most: float, usual: float, why: str) -> tuple[Plausible, ...]:
+    """Ranges of a channel's noise, bias and scale error."""
+    key = f"sensors.{sensor}.{part}"
+    return (
+        Plausible(f"{key}.std", unit, (0.0, most), (0.0, usual), why),
+        Plausible(f"{key}.bias_std", unit, (0.0, most), (0.0, usual), why),
+        Plausible(f"{key}.scale_std", "of 1", (0.0, 1.0), (0.0, 0.2), "an error of scale is a few percent"),
+    )
+
+
+ROBOT: tuple[Plausible, ...] = (
+    Plausible("body.mass", "kg", (0.02, 2e4), (0.2, 2000.0), "palm-sized robots to satellites and cars"),
+    Plausible("body.radius", "m", (0.01, 30.0), (0.03, 6.0), "palm-sized robots to small aircraft"),
+    Plausible("body.height", "m", (0.005, 30.0), (0.02, 6.0), "same as the radius"),
+    Plausible(
+        "body.inertia.2", "kg·m²", (0.01, 3.0), (0.05, 1.05), f"{BODY}: solid cylinder 0.5 m r², thin ring 1 m r²",
+        scale=lambda robot: _inertia(robot.body, upright=True),
+    ),
+    *(
+        Plausible(
+            f"body.inertia.{axis}", "kg·m²", (0.001, 3.0), (0.01, 1.05), f"{BODY} and height",
+            scale=lambda robot: _inertia(robot.body, upright=False),
+        )
+        for axis in (0, 1)
+    ),
+    Plausible(
+        "uncertainty.center_of_mass", "m", (0.0, 1.0), (0.0, 0.5), "within the radius",
+        scale=lambda robot: robot.body.radius,
+    ),
+    Plausible("timing.physics_dt", "s", (1e-6, 0.5), (1e-4, 0.05), "integrators of rigid bodies"),
+    Plausible("timing.control_hz", "Hz", (0.01, 1e4), (0.5, 1000.0), "controllers of mobile robots"),
+    Plausible(
+        "actuators.thrust", "N", (1e-6, MOST_ACCELERATION), (1e-4, 5.0),
+        "of the mass: one nozzle accelerates by 0.0001 to 5 m/s²", scale=lambda robot: robot.body.mass,
+    ),
+    Plausible(
+        "actuators.nozzles.*.position", "m", (0.0, 1.3), (0.0, 1.1), "nozzles sit on the body, within its radius",
+        scale=lambda robot: robot.body.radius, distance=True,
+    ),
+    Plausible(
+        "actuators.propellers.*.position", "m", (0.0, 1.5), (0.0, 1.2), "propellers sit on the body, within its radius",
+        scale=lambda robot: robot.body.radius, distance=True,
+    ),
+    Plausible(
+        "actuators.curve.*", "N", (-MOST_ACCELERATION, MOST_ACCELERATION), (-5.0, 5.0),
+        "of the mass: one propeller accelerates by up to 5 m/s²", scale=lambda robot: robot.body.mass,
+    ),
+    Plausible("actuators.wheel_radius", "m", (0.003, 2.0), (0.01, 0.5), "toy cars to off-road robots"),
+    Plausible(
+        "actuators.track", "m", (0.05, 2.0), (0.4, 2.0), "of the radius: wheels stand within the outline",
+        scale=lambda robot: robot.body.radius,
+    ),
+    Plausible(
+        "actuators.wheelbase", "m", (0.05, 4.0), (0.4, 2.0), "of the radius: wheels stand within the outline",
+        scale=lambda robot: robot.body.radius,
+    ),
+    Plausible("actuators.max_speed", "m/s", (0.005, 100.0), (0.05, 15.0), "wheeled robots"),
+    Plausible("actuators.max_yaw_rate", "rad/s", (0.005, 60.0), (0.1, 15.0), "one to two turns a second at most"),
+    Plausible("actuators.max_wheel_speed", "rad/s", (0.1, 2000.0), (1.0, 300.0), "geared motors"),
+    Plausible("actuators.max_steering", "rad", (0.02, pi / 2), (0.1, 1.2), "below a quarter turn"),
+    Plausible(
+        "actuators.wheel_force", "N", (0.005, 50.0), (0.1, 15.0), "of the mass: acceleration by the motors",
+        scale=lambda robot: robot.body.mass,
+    ),
+    Plausible("actuators.friction", "of 1", (0.005, 5.0), (0.1, 1.5), "tyres on ice to rubber on concrete"),
+    Plausible("actuators.response.lag_s", "s", (0.0, 10.0), (0.0, 2.0), "servos, valves, propellers"),
+    Plausible("actuators.response.gain.*", "of 1", (0.05, 5.0), (0.5, 1.5), "share of a command that is done"),
+    Plausible(
+        "hydrodynamics.hydrostatics.water_density", "kg/m³", (500.0, 2000.0), (950.0, 1100.0), "fresh to salt water",
+    ),
+    Plausible(
+        "hydrodynamics.hydrostatics.draught", "m", (0.2, 5.0), (0.8, 1.25),
+        "of mass / (water_density · waterplane_area), where a hull with vertical walls floats", scale=_floating_draught,
+    ),
+    Plausible(
+        "performance.force", "N", (1e-6, 50.0), (1e-4, 15.0), "of the mass: acceleration of up to 15 m/s²",
+        scale=lambda robot: robot.body.mass,
+    ),
+    Plausible(
+        "performance.torque", "N·m", (1e-6, 2000.0), (1e-4, 200.0),
+        "of the yaw inertia: angular acceleration of up to 200 rad/s²", scale=lambda robot: robot.body.inertia[2],
+    ),
+    Plausible("performance.top_speed", "m/s", (0.001, 500.0), (0.02, 100.0), "crawling robots to aircraft"),
+    Plausible(
+        "performance.speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
+        scale=lambda robot: robot.performance.top_speed,
+    ),
+    Plausible(
+        "performance.reverse_speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
+        scale=lambda robot: robot.performance.top_speed,
+    ),
+    Plausible(
+        "performance.lateral_speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
+        scale=lambda robot: robot.performance.top_speed,
+    ),
+    Plausible("performance.yaw_rate", "rad/s", (1e-4, 40.0), (0.005, 10.0), "satellites to drift cars"),
+    *_noise("odometry", "position", "m", 30.0, 3.0, "motion capture 0.001 m, satellite positioning 3 m"),
+    *_noise("odometry", "heading", "rad", 1.0, 0.2, "star tracker 0.0001 rad, poor compass 0.2 rad (11°)"),
+    *_noise("odometry", "velocity", "m/s", 5.0, 0.5, "Doppler 0.005 m/s, differences of poor positions 0.5 m/s"),
+    *_noise("odometry", "yaw_rate", "rad/s", 2.0, 0.3, "gyroscope 0.001 rad/s, differences of headings 0.3 rad/s"),
+    *_noise("imu", "accelerometer", "m/s²", 20.0, 2.0, "MEMS data sheets: 0.001 to 0.1 m/s²"),
+    *_noise("imu", "gyroscope", "rad/s", 2.0, 0.2, "MEMS data sheets: 0.0005 to 0.02 rad/s"),
+    Plausible("sensors.odometry.rate_hz", "Hz", (0.05, 1e5), (0.5, 2000.0), "satellite positioning to motion capture"),
+    Plausible("sensors.odometry.delay_s", "s", (0.0, 5.0), (0.0, 0.5), "a control loop with more lag is unstable"),
+    Plausible("sensors.imu.rate_hz", "Hz", (0.5, 1e5), (5.0, 10_000.0), "data sheets"),
+    Plausible("sensors.imu.delay_s", "s", (0.0, 2.0), (0.0, 0.1), "data sheets"),
+    Plausible("limits.geofence", "m", (0.1, 1e6), (0.5, 1e4), "a laboratory to an airfield"),
+    Plausible("limits.speed", "m/s", (0.005, 1000.0), (0.05, 200.0), "crawling robots to aircraft"),
+    Plausible("limits.yaw_rate", "rad/s", (1e-3, 100.0), (0.01, 30.0), "satellites to model cars"),
+)  # fmt: skip
+
+SHARE = "share of what the robot itself can bring up: beyond 1 it cannot hold its place"
+
+SCENARIO: tuple[Plausible, ...] = (
+    Plausible("push.force", "of 1", (0.0, 10.0), (0.0, 1.0), SHARE),
+    Plausible("push.torque", "of 1", (0.0, 10.0), (0.0, 1.0), SHARE),
+    Plausible("wave.force", "of 1", (0.0, 10.0), (0.0, 1.0), SHARE),
+    Plausible("wave.torque", "of 1", (0.0, 10.0), (0.0, 1.0), SHARE),
+    Plausible("wave.wave_number.*", "rad/m", (0.0, 1000.0), (0.0, 60.0), "waves of 0.1 m and longer"),
+    Plausible("kick.force", "of 1", (0.0, 100.0), (0.0, 5.0), "share of the robot's own, for one control step"),
+    Plausible("tether.stiffness.*", "N/m", (0.0, 1000.0), (0.0, 10.0), "tension over height of an air line"),
+    Plausible("tether.reach", "m", (0.0, 100.0), (0.0, 10.0), "the ceiling of a laboratory"),
+    Plausible("tether.lever", "m", (0.0, 10.0), (0.0, 1.0), "an air line is fastened to the body"),
+    Plausible("actuation.noise", "of 1", (0.0, 1.0), (0.0, 0.3), "share of full command"),
+    Plausible("actuation.gain.*", "of 1", (0.0, 3.0), (0.3, 1.5), "share of a command that is done"),
+    Plausible("actuation.delay_s", "s", (0.0, 2.0), (0.0, 0.5), "at most one control step"),
+    Plausible("actuation.opening_delay_s.*", "s", (0.0, 2.0), (0.0, 0.3), "solenoid valves: 0.005 to 0.06 s"),
+    Plausible("sensing.noise", "times", (0.0, 100.0), (0.0, 10.0), "factor on the robot's own noise"),
+    Plausible("sensing.bias", "times", (0.0, 100.0), (0.0, 10.0), "factor on the robot's own bias"),
+    Plausible("sensing.delay_s", "s", (0.0, 5.0), (0.0, 0.5), "a control loop with more lag is unstable"),
+    Plausible("sensing.velocity_noise.*", "m/s", (0.0, 5.0), (0.0, 0.5), "differences of poor positions: 0.5 m/s"),
+    Plausible("sensing.yaw_rate_noise.*", "rad/s", (0.0, 2.0), (0.0, 0.3), "differences of headings: 0.3 rad/s"),
+)  # fmt: skip
+
+TASK: tuple[Plausible, ...] = (
+    Plausible("episode_s", "s", (0.05, 1e5), (1.0, 3600.0), "seconds to an hour"),
+    Plausible("hold_s", "s", (0.01, 1e5), (0.2, 600.0), "time of one target"),
+    Plausible("tolerance.position", "m", (1e-5, 20.0), (0.002, 3.0), "motion capture to satellite positioning"),
+    Plausible("tolerance.heading_deg", "°", (0.01, 180.0), (0.5, 60.0), "what a robot can hold, to a rough direction"),
+    Plausible("tolerance.velocity", "m/s", (1e-5, 20.0), (0.001, 2.0), "a share of what robots drive"),
+    Plausible("tolerance.yaw_rate_deg", "°/s", (0.005, 360.0), (0.2, 60.0), "a share of what robots turn"),
+    Plausible("tolerance.hold_s", "s", (0.0, 1.0), (0.0, 0.8), "of episode_s", scale=lambda task: task.episode_s),
+    Plausible("start.distance.1", "m", (1e-3, 1e5), (0.05, 1000.0), "a laboratory to an airfield"),
+    Plausible("start_distance.1", "m", (1e-3, 1e5), (0.05, 1000.0), "a laboratory to an airfield"),
+    Plausible("start.goal_area", "m", (1e-3, 1e5), (0.1, 1000.0), "a laboratory to an airfield"),
+    Plausible("fine_distance", "m", (1e-4, 50.0), (0.005, 5.0), "a few times the tolerance"),
+    Plausible("reach", "m", (1e-4, 50.0), (0.005, 5.0), "at most the tolerance"),
+    Plausible("course.area", "m", (0.1, 1e5), (0.5, 1000.0), "a laboratory to an airfield"),
+    Plausible("track.size", "m", (0.1, 1e5), (0.5, 1000.0), "a laboratory to an airfield"),
+    Plausible("obstacles.radius", "m", (1e-3, 50.0), (0.02, 5.0), "posts to buoys"),
+    Plausible("block.radius", "m", (1e-3, 20.0), (0.01, 2.0), "what a robot can push"),
+    Plausible("block.mass", "kg", (1e-4, 1e4), (0.005, 100.0), "what a robot can push"),
+    Plausible("block.floor_friction", "of 1", (0.0, 5.0), (0.02, 1.5), "steel on ice to rubber on concrete"),
+    Plausible("block.grip", "of 1", (0.0, 5.0), (0.0, 1.5), "steel on ice to rubber on concrete"),
+)  # fmt: skip
