@@ -49,8 +49,11 @@ class RecorderNode(Node):
         self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
         self._run_info, self._attachments = settings.run(), settings.files()
         classes = {wire: _message_class(wire) for wire in WIRES if wire.recorded}
+        # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
         self._topics = {
-            wire: self.resolve_topic_name(wire.name) for wire, kind in classes.items() if kind is not None
+            wire: self.resolve_topic_name(wire.name, only_expand=True)
+            for wire, kind in classes.items()
+            if kind is not None
         }
         self._ring = self._new_ring() if settings.mode == "ring" else None
         self._thread = BagThread(self._ring or self._open_bag(), on_error=self.get_logger().error)
@@ -58,7 +61,7 @@ class RecorderNode(Node):
         self._provenance.start()
         for wire, topic in self._topics.items():
             qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
-            self.create_subscription(classes[wire], topic, self._keep(topic), qos, raw=True)
+            self.create_subscription(classes[wire], wire.name, self._keep(topic), qos, raw=True)
         self._health = RecorderHealth(
             self, self._robot, self._directory, self._thread.account, lambda: self._mode
         )
