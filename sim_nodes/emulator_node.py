@@ -22,12 +22,13 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.priority import PLANT_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import DEVICE_STATE, MOCAP, ODOMETRY, TRUTH
 from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.first_episode import first_episode
-from fulmar_ros.motion_capture import MotionCapture
+from fulmar_ros.paced_capture import capture_maker
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.qos import publisher_qos
@@ -100,7 +101,8 @@ class EmulatorNode(Node):
         self._truth = self.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH))
         self._state = self.create_publisher(JointState, DEVICE_STATE.name, publisher_qos(DEVICE_STATE))
         self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
-        self._room = MotionCapture(rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
+        capture = capture_maker(robot, rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
+        self._room = capture(self._publish_pose)
         self._write_truth = OdometryWriter(None, frame="map")
         self._write_pose = PoseWriter()
         self._write_state = VectorWriter(robot.actuators.names)
@@ -113,6 +115,7 @@ class EmulatorNode(Node):
         """Take the device away."""
         self._stop.set()
         self._thread.join(2.0)
+        self._room.close()
         self.device.close()
         self._backend.close()
 
@@ -159,7 +162,10 @@ class EmulatorNode(Node):
             self._odometry.publish(self._write_odometry.write(sample.odometry, stamp_ns))
         if sample.odometry is not None:
             for sent_ns, state in self._room.see(sample.odometry, stamp_ns):
-                self._mocap.publish(self._write_pose.write(state, sent_ns))
+                self._publish_pose(sent_ns, state)
+
+    def _publish_pose(self, sent_ns: int, state: RigidBodyState) -> None:
+        self._mocap.publish(self._write_pose.write(state, sent_ns))
 
 
 def values_of(message: Any) -> list[float]:

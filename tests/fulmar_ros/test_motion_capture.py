@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from fulmar_core.robot import load_robot
 from fulmar_ros.motion_capture import MotionCapture
+from fulmar_ros.paced_capture import PacedCapture, capture_maker, moved_on
 from tests.states import planar_state
 
 MS = 1_000_000
@@ -26,3 +34,40 @@ def test_poses_come_late_and_are_stamped_when_they_come():
     assert capture.see(STATE, 0) == []
     assert capture.see(STATE, 20 * MS) == []
     assert [stamp for stamp, _ in capture.see(STATE, 40 * MS)] == [40 * MS]
+
+
+def test_a_pose_moves_on_at_constant_velocity_and_turn_rate():
+    state = moved_on(planar_state(1.0, 2.0, 0.3, vx=0.5, vy=-0.2, yaw_rate=0.4), 0.015)
+    assert state.position_in_world == pytest.approx([1.0075, 1.997, 0.0])
+    assert float(state.yaw) == pytest.approx(0.306, abs=1e-6)
+    assert np.linalg.norm(state.quat_xyzw) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "lockstep", "paced"), [(0.0, False, False), (50.0, False, False), (200.0, False, True), (200.0, True, False)]
+)  # fmt: skip
+def test_captures_faster_than_the_ticks_get_a_thread_of_their_own(rate_hz, lockstep, paced):
+    robot = load_robot("floating_platform")  # ticks at 50 Hz
+    make = capture_maker(robot, rate_hz=rate_hz, late_s=0.0, lockstep=lockstep)
+    assert isinstance(make(lambda _stamp, _pose: None), PacedCapture) is paced
+
+
+def test_paced_captures_come_between_measurements_and_stop_with_them():
+    """One measurement, then silence: the pose moves on for one tick of the plant and no further."""
+    poses, enough = [], threading.Event()
+
+    def publish(stamp, pose):
+        poses.append((stamp, float(pose.position_in_world[0])))
+        if stamp >= 1_020 * MS:
+            enough.set()
+
+    capture = PacedCapture(publish, rate_hz=200.0, longest_s=0.02)
+    assert capture.see(planar_state(0.0, 0.0, 0.0, vx=1.0), 1_000 * MS) == []
+    assert enough.wait(5.0)
+    time.sleep(0.03)
+    capture.close()
+    stamps, places = np.array(poses).T
+    assert len(stamps) >= 2
+    assert (np.diff(stamps) > 0).all()
+    assert stamps[-1] == 1_020 * MS
+    assert places == pytest.approx((stamps - 1_000 * MS) / 1e9)

@@ -23,6 +23,7 @@ from fulmar_bringup.commands.export import export
 from fulmar_bringup.commands.faults import faults
 from fulmar_bringup.commands.goals import goals
 from fulmar_bringup.commands.identify import identify
+from fulmar_bringup.commands.import_policy import import_policy
 from fulmar_bringup.commands.list import list_names
 from fulmar_bringup.commands.policies import policies
 from fulmar_bringup.commands.report import report
@@ -56,6 +57,7 @@ app.command()(faults)
 app.command()(train)
 app.command()(policies)
 app.command()(export)
+app.command("import")(import_policy)
 app.command(epilog=MEANINGS)(evaluate)
 app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")

@@ -71,6 +71,8 @@ class RunPlan:
     recording: Recording = Recording()
     copies: int = 1  # of each command on the wire
     controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
+    mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
+    remappings: dict[str, str] = field(default_factory=dict)  # topics under other names, for every node
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
@@ -117,6 +119,7 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         f"/{plan.robot}",
         parameters,
         network=plan.controller_network,
+        remappings=dict(plan.remappings),
     )
 
 
@@ -159,10 +162,26 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSp
             "hardware_drivers.driver_node",
             f"/{plan.robot}",
             parameters,
+            remappings=dict(plan.remappings),
         )
+    parameters |= _motion_capture(plan)
+    return NodeSpec(
+        "plant",
+        "sim_nodes",
+        "sim_node",
+        "sim_nodes.sim_node",
+        f"/{plan.robot}",
+        parameters,
+        remappings=dict(plan.remappings),
+    )
+
+
+def _motion_capture(plan: RunPlan) -> dict[str, Parameter]:
+    """Parameters of the simulated motion capture."""
+    late: dict[str, Parameter] = {}
     if plan.guards.estimator:
-        parameters["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
-    return NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", f"/{plan.robot}", parameters)
+        late["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
+    return late | ({"mocap_hz": plan.mocap_hz} if plan.mocap_hz else {})
 
 
 def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
@@ -177,10 +196,15 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
         "link": emulation.link,
         **emulation.more,
     }
-    if plan.guards.estimator:
-        parameters["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
+    parameters |= _motion_capture(plan)
     return NodeSpec(
-        "emulator", "sim_nodes", "emulator_node", "sim_nodes.emulator_node", f"/{plan.robot}", parameters
+        "emulator",
+        "sim_nodes",
+        "emulator_node",
+        "sim_nodes.emulator_node",
+        f"/{plan.robot}",
+        parameters,
+        remappings=dict(plan.remappings),
     )
 
 
@@ -203,6 +227,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         "fulmar_ros.recorder_node",
         f"/{plan.robot}",
         {key: text for key, text in texts.items() if text} | unusual,
+        remappings=dict(plan.remappings),
     )
 
 
@@ -233,7 +258,7 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
         control_hz=min(plan.control_hz, 10.0),
     )
     more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}
-    return replace(spec, parameters=spec.parameters | more)
+    return replace(spec, parameters=spec.parameters | more, remappings=dict(plan.remappings))
 
 
 def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
@@ -242,12 +267,28 @@ def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
     nodes = []
     if plan.guards.estop:
         nodes.append(
-            NodeSpec("estop", "fulmar_ros", "estop_node", "fulmar_ros.estop_node", space, dict(parameters))
+            NodeSpec(
+                "estop",
+                "fulmar_ros",
+                "estop_node",
+                "fulmar_ros.estop_node",
+                space,
+                dict(parameters),
+                remappings=dict(plan.remappings),
+            )
         )
     if plan.guards.estimator:
         chosen: dict[str, Parameter] = {**parameters, "estimator": plan.guards.estimator}
         nodes.append(
-            NodeSpec("estimator", "fulmar_ros", "estimator_node", "fulmar_ros.estimator_node", space, chosen)
+            NodeSpec(
+                "estimator",
+                "fulmar_ros",
+                "estimator_node",
+                "fulmar_ros.estimator_node",
+                space,
+                chosen,
+                remappings=dict(plan.remappings),
+            )
         )
     return tuple(nodes)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +14,7 @@ import numpy as np
 
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.remapping import read_remappings
 from fulmar_bringup.system import (
     CONTROLLERS,
     FALLBACKS,
@@ -83,6 +84,8 @@ def plan_run(
     recording: str | None = None,
     copies: int = 1,
     controller_network: str = "",
+    mocap_hz: float = 0.0,
+    remap: Sequence[str] = (),
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -111,6 +114,8 @@ def plan_run(
         recording: `whole` or `ring`; the system file's by default.
         copies: How often each command is sent.
         controller_network: Network namespace that the controller runs in; ours by default.
+        mocap_hz: Rate of a simulated motion capture beside the odometry; 0: none [Hz].
+        remap: Topics under other names, each `FROM:=TO`.
 
     Returns:
         The request.
@@ -176,6 +181,8 @@ def plan_run(
         recording=chosen_recording(controller, backend, recording),
         copies=copies,
         controller_network=controller_network,
+        mocap_hz=_checked_mocap(mocap_hz, hardware, emulate=emulate, lockstep=lockstep),
+        remappings=read_remappings(remap),
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
@@ -218,6 +225,22 @@ def check_arming(hardware: str, *, arm: bool) -> None:
             f"{driver.steering_channel} and {driver.throttle_channel}. Write arm: true into the file, or give --arm, "
             "once the propellers are clear."
         )
+
+
+def _checked_mocap(mocap_hz: float, hardware: str, *, emulate: bool, lockstep: bool) -> float:
+    """The rate itself, where something simulates a motion capture.
+
+    Raises:
+        ConfigError: The robot is real, or time stands still between commands.
+    """
+    if mocap_hz and hardware and not emulate:
+        raise ConfigError("--mocap-hz simulates a motion capture; a real robot has its own. Leave it out.")
+    if mocap_hz and lockstep:
+        raise ConfigError(
+            "in lock step time stands still between commands, and a motion capture does not. "
+            "Leave --lockstep out; --rate makes a run faster."
+        )
+    return mocap_hz
 
 
 def _checked_guards(

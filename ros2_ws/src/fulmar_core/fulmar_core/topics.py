@@ -62,7 +62,7 @@ MOCAP = Wire(
     "geometry_msgs/msg/PoseStamped",
     "plant",
     "best_effort",
-    "every capture, where an estimator runs",
+    "every capture, where an estimator runs or `mocap_hz` is set",
     "pose as motion capture reports it, Z up, stamped at capture or a constant time after",
 )
 TRUTH = Wire(

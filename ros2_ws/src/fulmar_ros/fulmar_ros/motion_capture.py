@@ -42,3 +42,6 @@ class MotionCapture:
         while self._under_way and self._under_way[0][0] <= time_ns:
             due.append(self._under_way.popleft())
         return due
+
+    def close(self) -> None:
+        """Nothing to end."""

@@ -20,7 +20,7 @@ from fulmar_core.tasks import load_task
 from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
-from fulmar_ros.motion_capture import MotionCapture
+from fulmar_ros.paced_capture import MakeCapture, capture_maker
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_settings import PlantSettings
@@ -186,11 +186,18 @@ class PlantNode(LifecycleNode):
             self.guard.reset()  # actuators begin at rest, not where the episode before left them
         self._lockstep.run(sample, steps, self._stop, on_step)
 
-    def _motion_capture(self) -> MotionCapture | None:
-        """The source of poses that stands in for the odometry, where an estimator runs."""
-        if not self.settings.estimated:
+    def _motion_capture(self) -> MakeCapture | None:
+        """Source of poses: in the place of the odometry for an estimator, or beside it at a rate of its own."""
+        settings = self.settings
+        if not settings.estimated and not settings.mocap_hz:
             return None
-        return MotionCapture(rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
+        return capture_maker(
+            self.robot,
+            rate_hz=settings.mocap_hz,
+            late_s=settings.mocap_late_s,
+            rate=settings.rate,
+            lockstep=settings.lockstep,
+        )
 
     def _make_loops(self, backend: Backend) -> None:
         """New loops: neither counts nor deadlines survive a deactivation."""

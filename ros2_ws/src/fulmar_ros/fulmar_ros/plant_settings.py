@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fulmar_core.robot import Robot
 from fulmar_core.safety.watchdog import checked_timeout, default_timeout
 
+MOST_MOCAP_HZ = 1000.0  # the fastest cameras; a plant could not publish more often in real time [Hz]
 BY_RATE = -1.0  # stands for a value that follows from the control rate
 
 
@@ -29,7 +30,7 @@ class PlantSettings:
     answer_timeout_s: float = 5.0  # longest wait for a controller in lock step [s]
     wait_for_subscribers: int = 0  # of odom, or of what an estimator is told, before the first step
     estimated: bool = False  # publish mocap/pose in the place of odom: an estimator makes odom of it
-    mocap_hz: float = 0.0  # captures; 0: at every tick [Hz]
+    mocap_hz: float = 0.0  # publish mocap/pose so often, also beside odom; 0: at every tick in its place [Hz]
     mocap_late_s: float = 0.0  # by which a pose is stamped and sent after its capture [s]
     estop: bool = False  # nothing moves before an e-stop is heard
     autostart: bool = True
@@ -49,6 +50,8 @@ class PlantSettings:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
         if min(self.mocap_hz, self.mocap_late_s) < 0.0:
             raise ValueError("mocap_hz and mocap_late_s must not be negative.")
+        if self.mocap_hz > MOST_MOCAP_HZ:
+            raise ValueError(f"mocap_hz = {self.mocap_hz:g} Hz must be at most {MOST_MOCAP_HZ:g} Hz.")
         if self.estimated and self.lockstep:
             raise ValueError("an estimator needs every measurement in between; lock step has none.")
         if self.seed < 0:

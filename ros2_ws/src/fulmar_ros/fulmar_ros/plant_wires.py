@@ -22,6 +22,7 @@ from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.input_gate import BACK_NS
+from fulmar_core.state import RigidBodyState
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     BLOCK,
@@ -41,8 +42,8 @@ from fulmar_ros.command_writers import writers_of
 from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
 from fulmar_ros.deadline import Spread
 from fulmar_ros.message_reader import stamp_ns
-from fulmar_ros.motion_capture import MotionCapture
 from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.paced_capture import MakeCapture
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.sent_states import SentStates
@@ -63,7 +64,7 @@ class PlantWires:
         *,
         simulated: bool,
         odometry: bool = True,
-        mocap: MotionCapture | None = None,
+        mocap: MakeCapture | None = None,
         lockstep: bool = False,
         simulated_time: SimulatedTime | None = None,
     ) -> None:
@@ -75,12 +76,12 @@ class PlantWires:
             guard: Takes the commands; only touched under `self.lock`.
             simulated: Whether truth and clock are published.
             odometry: Whether the plant says where it is; if not, somebody else does.
-            mocap: Publish its poses, of which an estimator makes odometry.
+            mocap: Publish the poses of the motion capture that it makes.
             lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
                 clock, without it, a person may take the actuators, and commands go before other work.
             simulated_time: Clock of a simulated plant, by which actuators follow commands.
         """
-        self._mocap = mocap
+        self._mocap = mocap(self._publish_pose) if mocap is not None else None
         self._prior = lockstep  # whether the threads that commands pass have what priority they need
         self._publish = publish_patiently if lockstep else Publisher.publish
         self._flush_s = FLUSH_S if lockstep else LAST_WORDS_S
@@ -141,6 +142,8 @@ class PlantWires:
 
     def destroy(self, node: LifecycleNode) -> None:
         """Give every endpoint back."""
+        if self._mocap is not None:
+            self._mocap.close()
         for subscription in (self._commands, *self._operator):
             node.destroy_subscription(subscription)
         node.destroy_service(self._give_back)
@@ -177,14 +180,18 @@ class PlantWires:
             return
         if sample.imu is not None and self._imu.get_subscription_count():
             self._publish(self._imu, self._write_imu.write(sample.imu, time_ns))
-        if self._mocap is not None and self._poses is not None and sample.odometry is not None:
+        if self._mocap is not None and sample.odometry is not None:
             for stamp, state in self._mocap.see(sample.odometry, time_ns):
-                self._publish(self._poses, self._write_pose.write(state, stamp))
+                self._publish_pose(stamp, state)
         self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
             self._publish(self._clock, Clock(clock=stamp_of(time_ns)))
             self._clock_ns = now
+
+    def _publish_pose(self, stamp: int, state: RigidBodyState) -> None:
+        if self._poses is not None:
+            self._publish(self._poses, self._write_pose.write(state, stamp))
 
     def _publish_block(self, place: np.ndarray, time_ns: int) -> None:
         """Say where the block is; most robots push none, so that the endpoint is made when one is there."""

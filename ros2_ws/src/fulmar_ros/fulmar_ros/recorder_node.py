@@ -51,19 +51,18 @@ class RecorderNode(Node):
         self._run_info, self._attachments = settings.run(), settings.files()
         found = {wire: _message_class(wire) for wire in WIRES if wire.recorded}
         classes = {wire: kind for wire, kind in found.items() if kind is not None}
-        self._topics = {wire: self.resolve_topic_name(wire.name) for wire in classes}
+        # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
+        self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}
         self._ring = self._new_ring() if settings.mode == "ring" else None
         self._thread = BagThread(self._ring or self._open_bag(), on_error=self.get_logger().error)
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         for wire, topic in self._topics.items():
             if wire.source == "operator" and wire.delivery == "latched":
-                subscribe_operator(
-                    self, classes[wire], wire, self._keep(topic), topic=topic, depth=EVERYTHING, raw=True
-                )
+                subscribe_operator(self, classes[wire], wire, self._keep(topic), depth=EVERYTHING, raw=True)
                 continue
             qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
-            self.create_subscription(classes[wire], topic, self._keep(topic), qos, raw=True)
+            self.create_subscription(classes[wire], wire.name, self._keep(topic), qos, raw=True)
         self._health = RecorderHealth(
             self, self._robot, self._directory, self._thread.account, lambda: self._mode
         )

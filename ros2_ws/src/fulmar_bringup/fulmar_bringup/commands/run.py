@@ -153,6 +153,24 @@ def run(
             help="Network namespace of Linux that the controller runs in, as on another computer.",
         ),
     ] = "",
+    mocap_hz: Annotated[
+        float,
+        typer.Option(
+            "--mocap-hz",
+            metavar="HZ",
+            min=0.0,
+            max=1000.0,
+            help="Simulate a motion capture beside the odometry, so often; 200 in the Zero-G Lab.",
+        ),
+    ] = 0.0,
+    remap: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FROM:=TO",
+            help="Another name for mocap/pose, odom, imu/data, ground_truth/odom or a command topic, for every node; "
+            "the bag keeps the usual one. Give it once for each topic.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
@@ -210,6 +228,8 @@ def run(
         recording=recording,
         copies=copies,
         controller_network=controller_network,
+        mocap_hz=mocap_hz,
+        remap=remap or (),
     )
     plan = request.plan
     require(  # the nodes would fail for want of them one by one

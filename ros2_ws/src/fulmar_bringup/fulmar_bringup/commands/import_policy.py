@@ -1,0 +1,75 @@
+"""`fulmar import`: a policy bundle out of a policy that another stack trained."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.console import output
+
+
+def import_policy(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Checkpoint of skrl (.pt) or rl_games (.pth), or .onnx.")
+    ],
+    robot: Annotated[str, typer.Option(metavar="R", help="The robot that it was trained for.")],
+    task: Annotated[str, typer.Option(metavar="T", help="The task that it was trained for.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the bundle.")],
+    format: Annotated[
+        str | None,
+        typer.Option(metavar="F", help="skrl, rl_games or onnx; by default what the file holds."),
+    ] = None,
+    hz: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", min=0.01, help="Command rate; the robot's own by default."),
+    ] = None,
+    activation: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A",
+            help="Between the layers of a checkpoint, such as elu; by default from params/agent.yaml of its run.",
+        ),
+    ] = None,
+    output_activation: Annotated[
+        str | None,
+        typer.Option(metavar="A", help="After the last layer, none or tanh; by default likewise."),
+    ] = None,
+) -> None:
+    """Import a policy with RoboRAN's observation: network, golden vectors of the original, and passport.
+
+    Only weights are read; a file with other Python objects is refused and nothing in it runs. Actions go to the
+    robot's actuators in their order: a policy of RoboRAN's FloatingPlatform needs a robot with its nozzles.
+
+    Try:
+
+    fulmar import best_agent.pt --robot turtlebot2 --task go_to_position --out policies/imported
+
+    fulmar run turtlebot2 --task go_to_position --policy policies/imported
+    """
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+    from policy_server.policy import Policy
+    from training.import_policy import as_format
+    from training.import_policy import import_policy as write
+
+    passport = write(
+        file,
+        out,
+        robot_name=robot,
+        task_name=task,
+        wanted=as_format(format),
+        control_hz=hz,
+        activation=activation,
+        output_activation=output_activation,
+        command="fulmar " + " ".join(sys.argv[1:]),
+    )
+    Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
+    output.print(
+        f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · "
+        f"{passport.training['imported_from']} · {passport.sha256[:12]}",
+        markup=False,
+        soft_wrap=True,
+    )
