@@ -12,6 +12,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
+# Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`.
+RUN_SIZE := 884
+DEV_SIZE := 7330
 
 # A sourced ROS shell puts its own packages in front of the ones in .venv; the two must not mix.
 unexport PYTHONPATH
@@ -26,6 +29,9 @@ DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
 define install_lock
 total=$$(grep -c '==' $(1)); \
 echo "Installing from $(1): at most $$total packages, exact versions, hashes checked."; \
+free=$$(df -BM --output=avail . | tail -n 1 | tr -dc 0-9); \
+echo "$(VENV) takes $(2) MiB; $$free MiB are free on this disk."; \
+if [ "$$free" -lt $(2) ]; then echo "Less is free than an install from nothing takes: make room, or stop with Ctrl-C." >&2; fi; \
 PYTHONUNBUFFERED=1 $(BIN)/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
 	--require-hashes -r $(1) | { \
 	seen=0; \
@@ -50,10 +56,10 @@ help: ## Show this list
 	@echo "  PYTEST_ARGS='-k lqr' what to add to pytest in 'make test'"
 
 .PHONY: setup
-setup: $(RUN_STAMP) ## Install what a robot or a simulation needs, into .venv (no torch)
+setup: $(RUN_STAMP) ## Install what a robot or a simulation needs, into .venv (no torch; 0.9 GiB)
 
 .PHONY: dev
-dev: $(DEV_STAMP) ## Install everything, also training and the tools of this workshop
+dev: $(DEV_STAMP) ## Install everything, also training and the tools for tests (7.2 GiB)
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
@@ -63,7 +69,7 @@ $(VENV)/bin/python:
 		echo "'$(PYTHON) -m venv' failed, see above. On Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 
 $(RUN_STAMP): | $(VENV)/bin/python
-	@$(call install_lock,$(RUN_LOCK))
+	@$(call install_lock,$(RUN_LOCK),$(RUN_SIZE))
 	@$(install_fulmar)
 	@rm -f $(VENV)/.run-*
 	@touch $@
@@ -71,7 +77,7 @@ $(RUN_STAMP): | $(VENV)/bin/python
 
 # The development lock holds the run-time lock, version for version, so it fulfils both stamps.
 $(DEV_STAMP): | $(VENV)/bin/python
-	@$(call install_lock,$(DEV_LOCK))
+	@$(call install_lock,$(DEV_LOCK),$(DEV_SIZE))
 	@$(install_fulmar)
 	@rm -f $(VENV)/.run-* $(VENV)/.dev-*
 	@touch $@ $(RUN_STAMP)

@@ -1,4 +1,7 @@
-"""One world as a Gymnasium environment, for libraries that take no vector environments."""
+"""Gymnasium environments over the core's batch: one world (`TaskEnv`), and many that step together (`TaskVectorEnv`).
+
+They need neither torch nor Stable-Baselines3; `training.environments` registers them with Gymnasium.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,87 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
 
 from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.episode import episode_steps
+from fulmar_core.errors import ConfigError
+from fulmar_core.learning_step import observed_step
 from fulmar_core.robot import Robot
+from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from training.vec_env import BatchVecEnv
+from training.spaces import action_space, observation_space
+from training.stranded import asked_for
+
+Infos = dict[str, Any]
+# Observations, rewards, terminated and truncated of each world.
+Outcome = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-class SingleEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """A batch of one: the same spaces, rewards and endings as `BatchVecEnv` has."""
+class Worlds:
+    """Worlds of one robot at one task, and how long their episodes have lasted.
+
+    An episode is terminated when the robot leaves the geofence or touches an obstacle, and truncated when its time
+    (`episode_s` of the task) is up.
+
+    Attributes:
+        simulation: The worlds; built anew by `begin`.
+    """
+
+    def __init__(
+        self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, seed: int, training: bool
+    ) -> None:
+        """Build the worlds; arguments as of `TaskVectorEnv`.
+
+        Raises:
+            ConfigError: There are no worlds, or the seed is negative.
+        """
+        if worlds < 1:
+            raise ConfigError(f"num_envs: found {worlds}, need at least 1.")
+        if seed < 0:
+            raise ConfigError(f"seed: found {seed}, need 0 or more.")
+        self._robot, self._task, self._scenario = robot, asked_for(task, scenario), scenario
+        self._worlds, self._training = worlds, training
+        self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
+        self.begin(seed)
+        self._horizon = episode_steps(task, self.simulation.control_dt)
+
+    @property
+    def terms(self) -> int:
+        """Number of observation terms."""
+        return len(self.simulation.observer.names)
+
+    def begin(self, seed: int) -> None:
+        """Begin the first episode of a seed (>= 0) in every world."""
+        self.simulation = BatchSimulation(
+            self._robot, self._task, self._scenario, worlds=self._worlds, seed=seed, training=self._training
+        )
+        self._age = np.zeros(self._worlds, dtype=int)
+
+    def begin_next(self, worlds: np.ndarray) -> None:
+        """Begin the next episode in some worlds, by their numbers."""
+        self.simulation.reset(worlds)
+        self._age[worlds] = 0
+
+    def observe(self, worlds: np.ndarray | None = None) -> np.ndarray:
+        """Observations of some worlds, of all by default, shape (worlds, terms)."""
+        return np.asarray(self.simulation.observe(worlds))
+
+    def step(self, actions: np.ndarray) -> Outcome:
+        """Move one control step; actions of shape (worlds, actuators) are elements of `action_space`."""
+        command = np.asarray(actions, dtype=np.float32) * self._scale
+        reward, over, seen = observed_step(self.simulation, command, effort=self._robot.costs.effort)
+        self._age += 1
+        terminated = np.asarray(over)
+        truncated = (self._age >= self._horizon) & ~terminated
+        return np.asarray(seen), np.asarray(reward), terminated, truncated
+
+
+class TaskEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """One world of a robot at a task; observations, rewards and endings are those of `BatchVecEnv`."""
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own type
 
     def __init__(
         self, robot: Robot, task: Task, scenario: Scenario, *, seed: int = 0, training: bool = True
@@ -25,19 +100,22 @@ class SingleEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             robot: The robot.
             task: Gives observation, reward and episode length.
             scenario: What episodes are drawn from.
-            seed: Seed of the episodes until `reset` is given another.
-            training: Start episodes where learning starts.
+            seed: Seed of the episodes until `reset` receives another, >= 0.
+            training: Start episodes where learning starts (`training_distance` of the task).
         """
-        self._batch = BatchVecEnv(
-            robot, task, scenario, worlds=1, seed=seed, training=training, staggered=False
-        )
-        self.observation_space = self._batch.observation_space
-        self.action_space = self._batch.action_space
-        self._waiting = True  # an episode has begun that no reset has handed out yet
+        self._world = Worlds(robot, task, scenario, worlds=1, seed=seed, training=training)
+        self.observation_space = observation_space(self._world.terms)
+        self.action_space = action_space(robot)
+        self._fresh = True  # the first episode has not been handed out yet
+
+    @property
+    def simulation(self) -> BatchSimulation:
+        """The world, a batch of one."""
+        return self._world.simulation
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    ) -> tuple[np.ndarray, Infos]:
         """Begin an episode.
 
         Args:
@@ -45,22 +123,97 @@ class SingleEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             options: None are known.
 
         Returns:
-            First observation, and nothing more.
+            First observation, shape (terms,), and an empty dictionary.
+
+        Raises:
+            ConfigError: An option is given.
         """
+        refuse(options)
         super().reset(seed=seed)
         if seed is not None:
-            self._batch.seed(seed)
-            self._batch.reset()
-        elif not self._waiting:
-            self._batch.begin_anew([0])
-        self._waiting = False
-        return np.asarray(self._batch.simulation.observe())[0], {}
+            self._world.begin(seed)
+        elif not self._fresh:
+            self._world.begin_next(np.array([0]))
+        self._fresh = False
+        return self._world.observe()[0], {}
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Move one control step; returns observation, reward, terminated, truncated and nothing more."""
-        observation, reward, done, infos = self._batch.step(np.asarray(action)[None])
-        self._waiting = bool(done[0])  # the batch begins again by itself
-        truncated = bool(infos[0].get("TimeLimit.truncated", False))
-        if done[0]:
-            observation = np.asarray(infos[0]["terminal_observation"])[None]
-        return observation[0], float(reward[0]), bool(done[0]) and not truncated, truncated, {}
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Infos]:
+        """Move one control step; returns observation, reward, terminated, truncated and an empty dictionary."""
+        observation, reward, terminated, truncated = self._world.step(np.asarray(action)[None])
+        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), {}
+
+
+class TaskVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+    """Many worlds of a robot at a task that step together, at the speed of the core's batch.
+
+    A world whose episode is over begins the next one in the same step (`AutoresetMode.SAME_STEP`): the last observation
+    of each stands in `infos["final_obs"]`, shape (worlds, terms), where `infos["_final_obs"]` is true.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own type
+        "render_modes": [],
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        scenario: Scenario,
+        *,
+        num_envs: int = 1,
+        seed: int = 0,
+        training: bool = True,
+    ) -> None:
+        """Build the worlds.
+
+        Args:
+            robot: The robot.
+            task: Gives observation, reward and episode length.
+            scenario: What episodes are drawn from.
+            num_envs: Number of worlds, >= 1.
+            seed: Seed of the episodes until `reset` receives another, >= 0.
+            training: Start episodes where learning starts (`training_distance` of the task).
+        """
+        self.num_envs = num_envs
+        self._worlds = Worlds(robot, task, scenario, worlds=num_envs, seed=seed, training=training)
+        self.single_observation_space = observation_space(self._worlds.terms)
+        self.single_action_space = action_space(robot)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._fresh = True  # the first episodes have not been handed out yet
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, Infos]:
+        """Begin an episode in every world; arguments, results and errors as of `TaskEnv.reset`."""
+        refuse(options)
+        super().reset(seed=seed)
+        if seed is not None:
+            self._worlds.begin(seed)
+        elif not self._fresh:
+            self._worlds.begin_next(np.arange(self.num_envs))
+        self._fresh = False
+        return self._worlds.observe(), {}
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Infos]:
+        """Move every world one control step; returns observations, rewards, terminated, truncated and infos."""
+        seen, reward, terminated, truncated = self._worlds.step(actions)
+        done = terminated | truncated
+        if not done.any():
+            return seen, reward, terminated, truncated, {}
+        ended = np.flatnonzero(done)
+        infos = {"final_obs": seen, "_final_obs": done}
+        self._worlds.begin_next(ended)
+        seen = seen.copy(order="K")
+        seen[ended] = self._worlds.observe(ended)
+        return seen, reward, terminated, truncated, infos
+
+
+def refuse(options: dict[str, Any] | None) -> None:
+    """Raise ConfigError if `reset` receives options; None and an empty dictionary are none."""
+    if options:
+        raise ConfigError(
+            f"reset: unknown option '{next(iter(options))}': there are none. "
+            "Choose robot, scenario and seed in gymnasium.make."
+        )

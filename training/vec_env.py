@@ -23,6 +23,7 @@ from fulmar_core.tasks import Task, fitted
 from training.compiled import step_of
 from training.coordinates import coordinate_terms, places_of, with_coordinates
 from training.orders import KINDS, check_orders, shares_asked
+from training.spaces import action_space, observation_space, shares_space
 from training.stranded import asked_for
 from training.told_truth import ToldTruth
 
@@ -106,15 +107,10 @@ class BatchVecEnv(VecEnv):
         if coordinates and not self.places:
             raise ConfigError(f"'coordinates': task '{task.name}' has no path. Leave 'coordinates' out.")
         more = coordinate_terms(len(self.places)) + (len(told_terms(robot)) if told else 0)
-        observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(names) + more,), np.float32)
-        action_space: gymnasium.Space[Any]
+        actions = shares_space(WRENCH) if wrench else action_space(robot)
         if self.takes_orders:
-            action_space = gymnasium.spaces.MultiDiscrete([KINDS] * count)
-        elif robot.actuators.binary and not wrench:
-            action_space = gymnasium.spaces.MultiBinary(count)
-        else:
-            action_space = gymnasium.spaces.Box(-1.0, 1.0, (WRENCH if wrench else count,), np.float32)
-        super().__init__(worlds, observation_space, action_space)
+            actions = gymnasium.spaces.MultiDiscrete([KINDS] * count)
+        super().__init__(worlds, observation_space(len(names) + more), actions)
         self._age = np.zeros(worlds, dtype=int)
         self._actions = np.zeros((worlds, count), dtype=np.float32)
 

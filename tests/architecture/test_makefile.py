@@ -108,6 +108,29 @@ def test_a_failed_install_is_not_taken_for_done(make, tmp_path):
     assert make("-q", "setup").returncode != 0
 
 
+@pytest.mark.parametrize(("target", "size"), [("setup", 884), ("dev", 7330)])
+@pytest.mark.parametrize("free", [100, 90_000])
+def test_size_and_free_disk_are_printed_before_an_install(make, tmp_path, target, size, free):
+    disk = tmp_path / "bin" / "df"
+    disk.parent.mkdir()
+    disk.write_text(f"#!/usr/bin/env bash\necho Avail; echo ' {free}M'\n")
+    disk.chmod(0o755)
+    result = make(target, f"PATH={disk.parent}:{os.environ['PATH']}")
+    assert result.returncode == 0
+    line = f".venv takes {size} MiB; {free} MiB are free on this disk."
+    assert result.stdout.index(line) < result.stdout.index("Ready")
+    assert ("make room" in result.stderr) == (free < size)
+
+
+def test_the_readme_and_the_first_hour_state_the_sizes_of_the_makefile(repository):
+    makefile = (repository / "Makefile").read_text()
+    for page in ("README.md", "docs/first_hour.md"):
+        text = (repository / page).read_text()
+        for name in ("RUN_SIZE", "DEV_SIZE"):
+            size = int(re.search(rf"^{name} := (\d+)$", makefile, re.MULTILINE)[1])
+            assert f"{size / 1024:.1f} GiB" in text, (page, name)
+
+
 def test_the_demo_needs_no_learning_library(make):
     plan = make("--dry-run", "demo").stdout
     assert "requirements.lock" in plan

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+import gymnasium
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
@@ -17,7 +18,8 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from training.gym_env import SingleEnv
+from training.environments import environment_id
+from training.gym_env import TaskEnv
 from training.vec_env import BatchVecEnv
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
@@ -46,7 +48,7 @@ def robot(request):
 def test_the_checker_of_stable_baselines_accepts_it(robot, task):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(SingleEnv(robot, task, RANDOMISED))
+        check_env(gymnasium.make(environment_id(task.name), robot=robot.name).unwrapped)
 
 
 def test_two_updates_of_ppo_run_and_stay_finite(robot, task):
@@ -60,7 +62,7 @@ def test_two_updates_of_ppo_run_and_stay_finite(robot, task):
 
 
 def env_of(robot="turtlebot2", task="go_to_pose", seed=3):
-    return SingleEnv(ROBOTS[robot], TASKS[task], RANDOMISED, seed=seed)
+    return TaskEnv(ROBOTS[robot], TASKS[task], RANDOMISED, seed=seed)
 
 
 def test_a_seed_brings_the_same_episode_back_and_none_the_next_one():
@@ -83,12 +85,12 @@ def test_an_episode_has_its_full_length_and_the_next_begins_where_reset_says():
     assert (steps, terminated, truncated) == (600, False, True)
     first, _ = env.reset()
     assert not np.array_equal(first, last)
-    np.testing.assert_array_equal(first, env._batch.simulation.observe()[0])
+    np.testing.assert_array_equal(first, env.simulation.observe()[0])
 
 
 def test_who_leaves_the_geofence_has_ended_for_good():
     env = env_of()
     env.reset(seed=7)
-    env._batch.simulation.truth.x[0] += 100.0
+    env.simulation.truth.x[0] += 100.0
     _, _, terminated, truncated, _ = env.step(np.zeros(2, dtype=np.float32))
     assert (terminated, truncated) == (True, False)

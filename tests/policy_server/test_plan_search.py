@@ -73,6 +73,7 @@ def test_a_plan_does_not_depend_on_what_else_is_ordered(boat, rehearsal, solvers
     np.testing.assert_array_equal(again.best.leg_s, course.best.leg_s)
 
 
+@pytest.mark.slow
 def test_ways_are_quicker_than_the_controllers_own(boat, rehearsal):
     rng, count = np.random.default_rng(2), 6
     courses, starts = list(rng.uniform(-3.0, 3.0, (count, 8, 2))), np.zeros((count, 8))
@@ -192,6 +193,7 @@ def test_what_is_followed_is_what_the_cores_own_boat_did_with_the_plan(trial, co
     np.testing.assert_allclose(after[:, :6], reference.states[1:, :6], atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_plan_that_passes_too_far_away_is_changed_until_the_boat_passes(
     boat, rehearsal, solvers, monkeypatch
 ):

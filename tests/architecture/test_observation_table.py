@@ -1,0 +1,128 @@
+"""docs/observations.md describes every observation term as the code computes it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from fulmar_core.controllers.told import PUSH_TERMS, told_terms
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.goal import Goal
+from fulmar_core.observation import Observer
+from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import load_robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import load_task
+from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+
+TASKS = config_names("tasks")
+UNITS = {"fine_distance": " m", "fine_heading_deg": "°", "fine_speed": " m/s", "fine_velocity": " m/s"} | {
+    "fine_yaw_rate": " rad/s"
+}
+RANGES = {
+    "any": (-np.inf, np.inf),
+    "0 and more": (0.0, np.inf),
+    "-1 to 1": (-1.0, 1.0),
+    "-3 to 3": (-3.0, 3.0),
+    "0 to 1": (0.0, 1.0),
+}
+
+
+def rows(page, title):
+    """Cells of the table below a heading, without its head."""
+    part = page.split(f"## {title}\n")[1].split("\n## ")[0]
+    lines = [line for line in part.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+@pytest.fixture(scope="module")
+def page(repository):
+    return (repository / "docs" / "observations.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def terms(page):
+    """Every term of the tasks with its row."""
+    named = [
+        (name, row) for row in rows(page, "Terms of the tasks") for name in re.findall(r"`(\w+)`", row[0])
+    ]
+    assert len(named) == len(dict(named)), "a term has two rows"
+    return dict(named)
+
+
+def test_every_term_of_every_task_has_its_row_and_no_row_is_left_over(terms):
+    assert set(terms) == {name for task in TASKS for name in load_task(task).observation_names}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_values_stay_in_the_range_that_the_table_states(terms, task):
+    robot, rounding = load_robot("leatherback"), 1e-5
+    worlds = BatchSimulation(robot, load_task(task), load_scenario("randomised"), worlds=64, seed=1)
+    seen = []
+    for _ in range(5):
+        worlds.step(np.full((64, 2), 0.5) * robot.actuators.scale)
+        seen.append(np.asarray(worlds.observe()))
+    values = np.vstack(seen)
+    for name, column in zip(load_task(task).observation_names, values.T, strict=False):
+        low, high = RANGES[terms[name][5]]
+        assert (column >= low - rounding).all(), name
+        assert (column <= high + rounding).all(), name
+
+
+def seen_from_one_side(task, side):
+    """Terms of a robot at the origin that looks along x; everything is ahead and to one side (1 left, -1 right)."""
+    state = PlanarState(*(np.array([value]) for value in (0.0, 0.0, 0.0, 0.2, 0.1 * side, 0.3 * side)))
+    ahead = [[[3.0, 2.0 * side, 0.5 * side], [4.0, 3.0 * side, 0.6 * side], [5.0, 4.0 * side, 0.7 * side]]]
+    discs = np.array([[[1.0, 3.0 * side, 0.2], [0.5, 4.0 * side, 0.2], [2.0, 5.0 * side, 0.2]]])
+    goal = Goal(np.array(ahead), np.zeros(1), discs, np.array([[1.0, 0.5 * side]]))
+    if isinstance(task, GoToPositionWithObstacles):
+        goal = task.surveyed(goal, load_robot("turtlebot2"))
+    return dict(
+        zip(task.observation_names, (float(term[0]) for term in task.observe(state, goal)), strict=True)
+    )
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_signs_are_those_that_the_table_states(terms, task):
+    left, right = (seen_from_one_side(load_task(task), side) for side in (1.0, -1.0))
+    for name, value in left.items():
+        assert value > 0.0, name
+        sideways = re.search("left|counter-clockwise", terms[name][2])
+        assert right[name] == pytest.approx(-value if sideways else value), name
+
+
+def test_the_table_of_tasks_has_each_task_s_terms_and_scales(page):
+    written = {row[0].strip("`"): row[1:] for row in rows(page, "Scales of each task")}
+    expected = {}
+    for name in TASKS:
+        task = load_task(name)
+        scales = [
+            f"`{key}` {getattr(task, key):g}{unit}" for key, unit in UNITS.items() if getattr(task, key, 0.0)
+        ]
+        expected[name] = [str(len(task.observation_names)), ", ".join(scales) or "none"]
+    assert written == expected
+
+
+def test_a_scale_that_is_a_key_is_one_that_every_task_with_the_term_has(terms):
+    for task in map(load_task, TASKS):
+        for name in task.observation_names:
+            key = terms[name][6].strip("`")
+            assert key not in UNITS or getattr(task, key) > 0.0, (task.name, name)
+
+
+def test_the_robots_with_terms_of_their_own_are_named(page):
+    table = {row[0]: row for row in rows(page, "Terms of the robot")}
+    task = load_task("go_to_position")
+    with_memory = {
+        name
+        for name in config_names("robots")
+        if len(Observer(load_robot(name), task).names) > len(task.observation_names)
+    }
+    assert set(re.findall(r"`(\w+)`", table["`previous_` and the actuator's name"][2])) == with_memory
+    robot = load_robot("floating_platform")
+    assert told_terms(robot) == (*PUSH_TERMS, *(f"{valve}_alive" for valve in robot.actuators.names))
+    for term in PUSH_TERMS:
+        assert any(f"`{term}`" in first for first in table), term
