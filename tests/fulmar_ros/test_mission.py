@@ -202,6 +202,7 @@ def test_a_streamed_goal_of_each_state_is_waited_for():
     assert told.lacks_something_of(4 * S)
     assert not told.lacks_something_of(3 * S)
     told.refuse(goal_at((1.0, 0.0, 0.0)), 4 * S)  # under an e-stop lock step goes on
+    told.drop()
     assert not told.lacks_something_of(4 * S)
 
 

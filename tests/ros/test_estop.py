@@ -217,6 +217,9 @@ def test_a_controller_forgets_its_goal_so_that_nothing_moves_by_itself_after_a_r
     until(lambda: ask(neighbour, ESTOP_RESET).success)
     until(lambda: "no goal yet" in neighbour.said["controller"][1]["reason"])
     assert not neighbour.commands[-1].any()
+    neighbour.repeat_goal()  # as a publisher does for a subscriber that comes late
+    until(lambda: "e-stop stopped this goal" in neighbour.said["controller"][1]["goal_refused"])
+    assert not neighbour.commands[-1].any()
     neighbour.give_goal()
     until(lambda: neighbour.commands[-1].any())
 

@@ -20,7 +20,7 @@ from tests.ros.neighbour import Neighbour, until
 
 pytestmark = [pytest.mark.real_time, pytest.mark.slow]
 
-FAR = ("--start", "3,0,0", "--goal", "0,0,0", "--duration", "90", "--rate", "3")
+FAR = ("--start", "3,0,0", "--goal", "0,0,0", "--duration", "60", "--rate", "3")
 
 
 def test_a_run_goes_on_after_an_e_stop_its_reset_and_a_new_goal(

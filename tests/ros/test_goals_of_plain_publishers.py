@@ -14,11 +14,13 @@ from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Bool
 
 from fulmar_core.goal import goal_at
-from fulmar_core.topics import GOAL_POSES, GOAL_WIRES, TRUTH
+from fulmar_core.topics import ESTOP, GOAL_POSES, GOAL_WIRES, TRUTH
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.goal_messages import goal_message
+from fulmar_ros.goal_node import GoalNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
@@ -49,8 +51,8 @@ class Watcher:
 
 
 @contextlib.contextmanager
-def system(task: str) -> Iterator[tuple[Node, Watcher]]:
-    """A plant and a controller in lock step, and a stranger's node."""
+def system(task: str, goals: str = "") -> Iterator[tuple[Node, Watcher]]:
+    """A plant and a controller in lock step, a stranger's node, and a goal node if there are goals."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
 
     def arguments(**more: object) -> list[str]:
@@ -69,10 +71,15 @@ def system(task: str) -> Iterator[tuple[Node, Watcher]]:
         stranger = Node("stranger", namespace=SPACE)
         watcher = Watcher(stranger)
         stack.enter_context(spinning(stranger, fail))
-        controller = ControllerNode(make_classical, lambda _code: None, cli_args=arguments())
+        controller = ControllerNode(
+            make_classical, lambda _code: None, cli_args=arguments(goals_streamed=bool(goals))
+        )
         stack.enter_context(spinning(controller, fail))
         plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments(backend="mock"))
         stack.enter_context(spinning(plant, fail))
+        if goals:
+            node = GoalNode(lambda _code: None, cli_args=arguments(goals=goals, stay=True))
+            stack.enter_context(spinning(node, fail))
         until(lambda: bool(watcher.places))
         yield stranger, watcher
         plant.stop()
@@ -119,3 +126,20 @@ def test_a_goal_of_a_plain_publisher_is_obeyed_be_it_volatile_or_latched(
             else:
                 until(lambda place=place: watcher.was_at(place))
             stranger.destroy_publisher(publisher)
+
+
+def test_an_e_stop_holds_a_lock_stepped_robot_whose_goals_are_streamed_and_time_goes_on(
+    ros_domain: RosDomain, tmp_path
+) -> None:
+    goals = tmp_path / "to_and_fro.yaml"
+    goals.write_text(f"kind: positions\ntitle: to and fro\npositions: {[[5.0, 0.0], [0.0, 0.0]] * 50}\n")
+    with system("go_to_position", str(goals)) as (stranger, watcher):
+        until(lambda: watcher.was_at(FIRST))
+        publisher = stranger.create_publisher(Bool, ESTOP.name, 10)
+        until(lambda: publisher.get_subscription_count() >= 2)
+        time.sleep(0.1)
+        publisher.publish(Bool(data=True))
+        until(lambda: watcher.places[-50:-1] == watcher.places[-49:])  # 50 states in one place
+        steps = len(watcher.places)
+        until(lambda: len(watcher.places) > steps + 50)
+        assert watcher.places[-1] == watcher.places[steps]

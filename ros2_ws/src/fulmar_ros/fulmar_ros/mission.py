@@ -102,7 +102,9 @@ class Mission:
         """Forget the goal, as after an emergency stop: what moves then is asked for anew, see `is_void`."""
         self._void.extend(self._given)
         self._given.clear()
-        self._goal, self._since_ns, self.goal_stamp_ns = None, None, 0
+        self._goal, self._since_ns = None, None
+        if not self._streamed:  # where they are, it says which state need not wait
+            self.goal_stamp_ns = 0
         if self._schedule is not None:
             self._schedule = Schedule()
 
