@@ -18,7 +18,7 @@ from fulmar_bringup.bags.live_node import rerun_through_node
 from fulmar_bringup.bags.rerun import Answers, rerun
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.errors import BagError, RunFailed
-from fulmar_core.topics import ESTOP, METADATA, SWAP, Wire
+from fulmar_core.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP, Wire
 from fulmar_ros.bag_types import type_store
 from policy_server.shipped import shipped_policy
 
@@ -94,6 +94,19 @@ def test_an_estop_stops_and_takes_the_goal_away(bag):
     assert answers.reasons[25].startswith("e-stop: pressed")
     assert answers.reasons[50] == "no goal yet"
     assert "e-stop: silent" in answers.reasons[80]
+
+
+def test_in_a_bag_that_lists_resets_only_a_reset_ends_a_press(bag):
+    course = at_its_pace(course_of(bag))
+    beats = range(int(course.log_ns[0]) - 50 * MS, int(course.log_ns[-1]) + 50 * MS, 100 * MS)
+    press = next(log for log in beats if log > course.log_ns[20])
+    told = saying(bag, ESTOP, *((log, log == press) for log in beats))
+    for resets, reason in (((), "e-stop: pressed"), ((int(course.log_ns[40]),), "no goal yet")):
+        listed = saying(told, ESTOP_RELEASED, *((log, "") for log in resets))
+        _, answers = again(guarded(listed, estop=True), paced=True)
+        assert answers.acted[:20].all()
+        assert answers.reasons[35].startswith("e-stop: pressed")
+        assert answers.reasons[60].startswith(reason)
 
 
 def test_while_a_press_is_on_its_way_the_record_decides(bag):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseArray
 from nav_msgs.msg import Odometry
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -97,6 +98,17 @@ def test_a_goal_without_sense_is_refused_with_a_reason(topic, spoil, reason):
     goal, problem = goal_of(spoilt(topic, spoil))
     assert goal is None
     assert reason in problem
+
+
+def test_an_array_of_poses_is_the_same_goal_as_the_path_of_these_poses():
+    path = goal_message(goal_at((1.0, 2.0, 0.3), (3.0, 4.0, -0.5)), "goal_path", 7)
+    array = PoseArray(header=path.header, poses=[stamped.pose for stamped in path.poses])
+    goal, problem = goal_of(array)
+    assert problem == ""
+    np.testing.assert_array_equal(goal.targets, goal_of(path)[0].targets)
+    assert "0 waypoints" in goal_of(PoseArray(header=path.header))[1]
+    array.header.frame_id = "map"
+    assert "must be 'odom'" in goal_of(array)[1]
 
 
 def test_obstacles_come_back_as_they_were_without_those_that_are_not_there():

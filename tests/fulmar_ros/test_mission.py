@@ -157,11 +157,53 @@ def test_a_new_goal_begins_anew_and_a_streamed_one_only_where_it_differs():
         assert told.done == 0
 
 
+def test_a_goal_that_is_repeated_with_its_stamp_changes_nothing():
+    course = goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
+    told = mission("go_through_positions")
+    assert told.give(course, 1)
+    for step in range(2):
+        told.observe(at(0.0), step * S, STILL)
+    assert not told.give(course, 1)
+    assert told.done == 1
+    assert told.give(goal_at((9.0, 0.0, 0.0)), 2)
+    assert not told.give(course, 1)  # the one before, for a subscriber that came late
+    assert told.give(goal_at((5.0, 0.0, 0.0)), 2)  # the same stamp, another goal
+    assert told.give(course, 0)
+    assert told.give(course, 0)  # without a stamp, each is new
+
+
+def test_a_velocity_that_is_repeated_does_not_end_those_that_follow_it():
+    told = mission("track_velocities")
+    for second in (1, 2):
+        told.give(goal_at((0.1 * second, 0.0, 0.0)), second * S)
+    told.turn_to(2 * S)
+    told.give(goal_at((0.1, 0.0, 0.0)), 1 * S)
+    told.turn_to(3 * S)
+    assert float(told.observe(at(0.0), 3 * S, STILL)[0]) == pytest.approx(0.2)
+
+
+def test_a_goal_that_was_dropped_or_refused_is_void_until_it_comes_with_a_new_stamp():
+    goal, other = goal_at((1.0, 0.0, 0.0)), goal_at((2.0, 0.0, 0.0))
+    told = mission("go_to_position")
+    told.give(goal, 1)
+    assert not told.is_void(goal, 1)
+    told.drop()
+    told.drop()
+    told.refuse(other, 2)
+    assert told.is_void(goal, 1)
+    assert told.is_void(other, 2)
+    assert not told.is_void(goal, 3)
+    assert not told.is_void(other, 0)
+
+
 def test_a_streamed_goal_of_each_state_is_waited_for():
     told = mission("go_to_position", streamed=True)
     told.give(goal_at((1.0, 0.0, 0.0)), 3 * S)
     assert told.lacks_something_of(4 * S)
     assert not told.lacks_something_of(3 * S)
+    told.refuse(goal_at((1.0, 0.0, 0.0)), 4 * S)  # under an e-stop lock step goes on
+    told.drop()
+    assert not told.lacks_something_of(4 * S)
 
 
 def test_velocities_begin_when_their_stamps_say():

@@ -101,6 +101,10 @@ class Neighbour:
     def give_goal(self) -> None:
         """Ask for a pose far away, so that valves open; each time anew."""
         self._goals += 1
+        self.repeat_goal()
+
+    def repeat_goal(self) -> None:
+        """The newest goal once more, with its stamp."""
         self.goal_publisher.publish(goal_message(goal_at((4.0, 0.0, 0.0)), "goal_pose", self._goals))
 
     def odometry(

@@ -12,16 +12,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import rclpy
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile
-from std_msgs.msg import Bool
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Int8
 from std_srvs.srv import Trigger
 
 from fulmar_bringup import robot_operator
 from fulmar_bringup.commands.estop import estop
 from fulmar_bringup.reset_robots import release_without_node
+from fulmar_bringup.running_robots import running_robots, unfit_publishers
 from fulmar_core.errors import RunFailed
-from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
+from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER, TELEOP
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -214,6 +217,9 @@ def test_a_controller_forgets_its_goal_so_that_nothing_moves_by_itself_after_a_r
     until(lambda: ask(neighbour, ESTOP_RESET).success)
     until(lambda: "no goal yet" in neighbour.said["controller"][1]["reason"])
     assert not neighbour.commands[-1].any()
+    neighbour.repeat_goal()  # as a publisher does for a subscriber that comes late
+    until(lambda: "e-stop stopped this goal" in neighbour.said["controller"][1]["goal_refused"])
+    assert not neighbour.commands[-1].any()
     neighbour.give_goal()
     until(lambda: neighbour.commands[-1].any())
 
@@ -283,3 +289,30 @@ def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain
     monkeypatch.setattr(robot_operator, "FIND_S", 0.2)
     with pytest.raises(RunFailed, match="ROS_DOMAIN_ID"):
         estop()
+
+
+def test_a_publisher_of_another_type_or_quality_of_service_is_a_warning_that_names_it(
+    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain
+) -> None:
+    context = rclpy.Context()  # of one process: a topic has one type there
+    rclpy.init(context=context, domain_id=ros_domain.id)
+    panel = rclpy.create_node("panel", namespace="/desk", context=context)
+    panel.create_publisher(Int8, f"{NAMESPACE}/{ESTOP.name}", 10)
+    lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    neighbour.node.create_publisher(JointState, TELEOP.name, lossy)
+    wrong_type = f"/desk/panel publishes std_msgs/msg/Int8 on {NAMESPACE}/estop, must be std_msgs/msg/Bool"
+    best_effort = f"{NAMESPACE}/neighbour publishes best effort on {NAMESPACE}/teleop/command"
+
+    def warned() -> bool:
+        drive(neighbour)
+        said = neighbour.said["plant"][1]["wire_warnings"]
+        return wrong_type in said and best_effort in said and neighbour.said["plant"][0].startswith("/desk")
+
+    until(warned)
+    robots = running_robots(neighbour.node, find_s=0.5)
+    found = unfit_publishers(neighbour.node, robots)
+    assert robots == {NAMESPACE}
+    assert [words.split(",")[0] for words in found] == [wrong_type.split(",")[0], best_effort]
+    panel.destroy_node()
+    rclpy.shutdown(context=context)
+    until(lambda: drive(neighbour) and wrong_type not in neighbour.said["plant"][1]["wire_warnings"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -114,6 +115,22 @@ def test_velocities_come_by_the_odometry_s_clock_and_end_in_standstill(
         assert 400_000_000 <= second - first < 600_000_000
         assert 800_000_000 <= last - first < 1_000_000_000
         assert {message.header.frame_id for message in ears.velocities} == {"base_link"}
+
+
+def test_a_volatile_subscriber_that_comes_late_gets_the_goal_with_its_stamp_and_disturbs_no_latched_one(
+    tmp_path, neighbour: Neighbour, ears: Ears, ros_domain: RosDomain
+) -> None:
+    with goal_node(tmp_path, POSITIONS, stay=True, **PATIENT), streaming(neighbour):
+        until(lambda: len(ears.points) == 1)
+        late = rclpy.create_node("stranger", namespace=NAMESPACE)
+        got: list[PointStamped] = []
+        late.create_subscription(PointStamped, "goal_point", got.append, 10)
+        with spinning(late, lambda error: pytest.fail(repr(error))):
+            until(lambda: bool(got))
+        assert got[0] == ears.points[0]
+        assert ears.points[1:] == got  # what the others receive is the very same message
+        time.sleep(1.2)
+        assert len(ears.points) == 2  # once for each that comes
 
 
 def test_positions_come_when_the_one_before_is_reached_and_each_once(

@@ -16,6 +16,7 @@ from importlib.metadata import version
 import psutil
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 from mcap.reader import make_reader
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
@@ -24,7 +25,7 @@ from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 
 from fulmar_core.errors import LockstepError
-from fulmar_core.topics import METADATA
+from fulmar_core.topics import GOAL_POSE, METADATA
 from fulmar_ros.patience import publish_patiently
 from fulmar_ros.qos import publisher_qos
 from tests.ros.recorder import ROBOT, odometry, publish, wait_for
@@ -35,12 +36,19 @@ pytestmark = pytest.mark.real_time
 def test_a_stopped_recorder_has_kept_every_message(record, node):
     early = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
     early.publish(String(data="early"))
+    latched = node.create_publisher(PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE))
+    latched.publish(PoseStamped())
+    volatile = node.create_publisher(PoseStamped, GOAL_POSE.name, 10)
     recorder = record("run_info:='{\"seed\": 7}'")
     recorder.wait_until_recording()
     while not early.get_subscription_count():  # endpoints find each other in any order
         time.sleep(0.01)
     publish(odometry(node), range(500))
-    assert early.wait_for_all_acked(Duration(seconds=5.0))
+    for goals in (latched, volatile):
+        assert goals.get_subscription_count()
+        goals.publish(PoseStamped())
+    for sent in (early, latched, volatile):
+        assert sent.wait_for_all_acked(Duration(seconds=5.0))
     code, out, err = recorder.end(signal.SIGINT)
     assert (code, err) == (0, "")
     assert out.startswith("recorded ")
@@ -49,6 +57,8 @@ def test_a_stopped_recorder_has_kept_every_message(record, node):
     with Reader(recorder.directory) as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}
         assert counts[f"{ROBOT}/{METADATA.name}"] == 1
+        # The latched one before it was there and the one after, which came twice, and that of a default publisher.
+        assert counts[f"{ROBOT}/{GOAL_POSE.name}"] == 3
         assert {c.topic for c in reader.connections} >= {f"{ROBOT}/odom", "/clock", "/diagnostics"}
 
 

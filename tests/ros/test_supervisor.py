@@ -124,7 +124,7 @@ def test_a_goal_that_was_refused_for_a_silent_e_stop_is_told_again(
     button.pressed = False
     giving.join()
     assert not failures
-    assert overseer.controller.values["goal_stamp_ns"] == "5"
+    assert overseer.controller.values["goal_stamp_ns"] == "6"
     assert overseer.controller.values["goal_refused"] == ""
 
 
@@ -141,7 +141,7 @@ def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_told_aga
     subscribe_operator(other, PoseStamped, GOAL_POSE, lambda _: None)
     giving.join()
     assert not failures
-    assert overseer.controller.values["goal_stamp_ns"] == "5"
+    assert overseer.controller.values["goal_stamp_ns"] == "6"
 
 
 def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_told_again_by_itself(

@@ -26,7 +26,8 @@ from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.tasks import Task, sees_obstacles
 from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
-from fulmar_ros.goal_messages import TYPES, goal_message, obstacles_message
+from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
+from fulmar_ros.late_subscribers import LateSubscribers
 from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.operator_subscription import SUBSCRIPTIONS
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -58,6 +59,8 @@ class Supervisor:
         self._error: Exception | None = None
         wire = GOAL_WIRES[task.goal_topic]
         self._goal = node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        self._sent: list[GoalMessage] = []  # of the current goal
+        LateSubscribers(node, self._goal, lambda: list(self._sent))
         self._obstacles = (
             node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
             if sees_obstacles(task)
@@ -97,7 +100,8 @@ class Supervisor:
         tracks then hangs on the plant's clock alone.
 
         An e-stop that was silent for a moment, as on a busy computer that starts many nodes, makes the controller
-        refuse the goal or forget it. Nobody pressed anything, and nothing has moved yet: it is told again.
+        refuse the goal or forget it. Nobody pressed anything, and nothing has moved yet: it is given again, stamped a
+        nanosecond later, since a repetition with the same stamp counts for nothing.
 
         Args:
             goal: The goal, without a batch axis.
@@ -117,6 +121,8 @@ class Supervisor:
             return all(wire.get_subscription_count() >= SUBSCRIPTIONS * listeners for wire in wires)
 
         while not (self._told(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
+            parts = [(part, stamp + 1) for part, stamp in parts]
+            stamps = {stamp for _, stamp in parts}
             self.wait_until(lambda: not self._reason.startswith(SILENT), alive)
             self._raise_if_pressed()
             time.sleep(TELL_AGAIN_S)
@@ -136,9 +142,11 @@ class Supervisor:
         self, parts: Sequence[tuple[Goal, int]], stamps_ns: Set[int], alive: Callable[[], None]
     ) -> bool:
         """Publish goals, each when the controller has the one before; False if a silent e-stop came between."""
+        self._sent = []
         for part, stamp in parts:
             self.controller.values.pop("goal_refused", None)  # of what was told before
-            self._goal.publish(goal_message(part, self._task.goal_topic, stamp))
+            self._sent.append(goal_message(part, self._task.goal_topic, stamp))
+            self._goal.publish(self._sent[-1])
             if not self._before_silence(partial(self._has, stamp), stamps_ns, alive):
                 return False
         return True

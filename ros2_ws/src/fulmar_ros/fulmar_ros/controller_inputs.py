@@ -21,7 +21,7 @@ from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.message_reader import block_of, goal_of, obstacles_of, stamp_ns
 from fulmar_ros.mission import Mission
 
-ENDED = "the e-stop ended this goal"
+ENDED = "the e-stop stopped this goal"
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class ControllerInputs:
         if stopped and self._estop.heard:
             if self.mission.goal_stamp_ns:
                 self.refusal = Refusal(self.mission.goal_stamp_ns, stopped)
-            self.mission.drop(pressed=self._estop.pressed)
+            self.mission.drop()
             self._follow_mission()
             self._change(outside=self._outside())
         self._change(estop=stopped, active_s=self.acted * self._control_ns / 1e9)
@@ -143,10 +143,11 @@ class ControllerInputs:
             stamp, stopped = stamp_ns(message.header.stamp), self._estop.reason(time.monotonic_ns())
             if self._estop.heard and stopped:
                 self.refusal = Refusal(stamp, stopped)
-                self.mission.skip(stamp)
-                return f"{stopped}. Give the goal again once the e-stop is released."
+                self.mission.refuse(goal, stamp)
+                return f"{stopped}. Give a new goal once the e-stop is released."
             if self.mission.is_void(goal, stamp):
-                self.refusal = Refusal(stamp, ENDED)
+                if not self.mission.goal_stamp_ns:
+                    self.refusal = Refusal(stamp, ENDED)
                 return f"{ENDED}. Publish it with a new stamp."
             self.refusal = Refusal()
             if self.mission.give(goal, stamp):

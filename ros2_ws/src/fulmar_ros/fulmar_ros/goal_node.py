@@ -25,8 +25,9 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, ODOMETRY
-from fulmar_ros.goal_messages import TYPES, goal_message
+from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.health import Health
+from fulmar_ros.late_subscribers import LateSubscribers
 from fulmar_ros.message_reader import measurement_of
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -91,6 +92,9 @@ class GoalNode(Node):
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
         self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        self._message: GoalMessage | None = None  # the newest
+        if not self._settings.lockstep:  # there a goal comes with each odometry
+            LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
         diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._health = Health(f"{robot.name}: goals", [diagnostics])
         self.create_subscription(
@@ -141,7 +145,8 @@ class GoalNode(Node):
         return self._sequence.done or self._time_ns - self._told_at_ns >= self._period_ns
 
     def _tell(self, goal: Goal, stamp_ns: int) -> None:
-        self._publisher.publish(goal_message(goal, self._sequence.topic, stamp_ns))
+        self._message = goal_message(goal, self._sequence.topic, stamp_ns)
+        self._publisher.publish(self._message)
         self._told, self._told_at_ns = goal, self._time_ns
 
     def _tell_progress(self) -> None:

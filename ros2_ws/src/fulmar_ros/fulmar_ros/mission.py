@@ -50,8 +50,7 @@ class Mission:
         self._batched_of: tuple[object, object, object] = (None, None, None)
         self._planar_of: RigidBodyState | None = None
         self._given: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # since the last drop
-        self._dropped: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)
-        self._void: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # ended by a press of the e-stop
+        self._void: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # refused, or dropped
         self.goal_stamp_ns = 0
         self.obstacles_stamp_ns = 0
 
@@ -99,29 +98,29 @@ class Mission:
         self._goal, self._since_ns = goal, None
         return True
 
-    def drop(self, *, pressed: bool = False) -> None:
-        """Forget the goal, as after an emergency stop: what moves then is asked for anew.
-
-        Args:
-            pressed: Whether a press ends the goals for good: their repetitions do not count either, see `is_void`.
-        """
-        self._dropped.extend(self._given)
+    def drop(self) -> None:
+        """Forget the goal, as after an emergency stop: what moves then is asked for anew, see `is_void`."""
+        self._void.extend(self._given)
         self._given.clear()
-        if pressed:
-            self._void.extend(self._dropped)
-            self._dropped.clear()
-        self._goal, self._since_ns, self.goal_stamp_ns = None, None, 0
+        self._goal, self._since_ns = None, None
+        if not self._streamed:  # where they are, it says which state need not wait
+            self.goal_stamp_ns = 0
         if self._schedule is not None:
             self._schedule = Schedule()
 
     def is_void(self, goal: Goal, stamp_ns: int) -> bool:
-        """Whether the e-stop ended this very goal; one with the stamp 0 is always new [ns]."""
+        """Whether this very goal was refused or dropped: a repetition of it starts nothing.
+
+        One with the stamp 0 is always new [ns].
+        """
         return bool(stamp_ns) and _key(goal, stamp_ns) in self._void
 
-    def skip(self, stamp_ns: int) -> None:
-        """Note that the streamed goal of a time came and does not count [ns]."""
+    def refuse(self, goal: Goal, stamp_ns: int) -> None:
+        """Note that a goal came and does not count, neither now nor repeated [ns]."""
         if self._streamed:
-            self.goal_stamp_ns = stamp_ns
+            self.goal_stamp_ns = stamp_ns  # the state of this time need not wait for it
+        elif stamp_ns:
+            self._void.append(_key(goal, stamp_ns))
 
     def turn_to(self, stamp_ns: int) -> None:
         """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""

@@ -134,11 +134,6 @@ class RecordedEstop:
             return early
         return "" if acted else late or early
 
-    @property
-    def pressed(self) -> bool:
-        """Whether it was pressed without a doubt since the last reset, at the time of the last call."""
-        return self._late.watch.pressed and self._early.watch.pressed
-
     def holds(self, log_ns: int) -> bool:
         """Whether it was heard, and stopped everything without a doubt, at a time of the record [ns]."""
         return all(ear.reason(log_ns) and ear.watch.heard for ear in (self._late, self._early))

@@ -160,9 +160,11 @@ class _Rerun:
                     self._controller.reset()
                 self._bearing_on = told.what
             for told in goals.get(step, ()):
-                if self._estop.holds(told.log_ns) or self._mission.is_void(told.what, told.stamp_ns):
-                    self._mission.skip(told.stamp_ns)
-                    continue  # as the node refuses it
+                if self._estop.holds(told.log_ns):
+                    self._mission.refuse(told.what, told.stamp_ns)
+                    continue
+                if self._mission.is_void(told.what, told.stamp_ns):
+                    continue
                 if self._mission.give(told.what, told.stamp_ns):
                     self._controller.reset()
                 if course.settings.lockstep:
@@ -203,7 +205,7 @@ class _Rerun:
         log_ns, recorded = int(course.log_ns[step]), bool(course.acted[step])
         stopped = self._estop.reason(log_ns, acted=recorded)
         if self._estop.holds(log_ns) and (self._gated or not recorded):
-            self._mission.drop(pressed=self._estop.pressed)
+            self._mission.drop()
         if not self._gated:
             lacks = self._source == "odometry" and course.sample[step] == ABSENT
             return "not asked in the record" if not recorded or lacks else ""

@@ -13,6 +13,7 @@ from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.environment import environment
 from fulmar_bringup.faults.command_faults import COMMAND_FAULTS
 from fulmar_bringup.faults.driver_faults import DRIVER_FAULTS
+from fulmar_bringup.faults.estop_faults import ESTOP_FAULTS
 from fulmar_bringup.faults.fault import Fault
 from fulmar_bringup.faults.finding import Finding, Outcome
 from fulmar_bringup.faults.hand_faults import HAND_FAULTS
@@ -30,6 +31,7 @@ from fulmar_core.robot import load_robot
 
 EVERY = (
     *PROCESS_FAULTS,
+    *ESTOP_FAULTS,
     *HAND_FAULTS,
     *DRIVER_FAULTS,
     *INPUT_FAULTS,

@@ -59,11 +59,6 @@ class EstopWatch:
         """Whether it has been pressed since the last reset, or an e-stop node is, or was, there."""
         return self._pressed or self._alive_ns is not None
 
-    @property
-    def pressed(self) -> bool:
-        """Whether it has been pressed since the last reset."""
-        return self._pressed
-
     def reason(self, now_ns: int) -> str:
         """Why nothing may move at this time of the same clock; empty if it may [ns]."""
         if self._pressed:

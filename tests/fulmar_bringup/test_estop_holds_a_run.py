@@ -1,0 +1,86 @@
+"""An e-stop holds a run, and ends it only if asked to; the result says that it was pressed."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from fulmar_bringup import conductor
+from fulmar_bringup.bag_reader import read_run
+from fulmar_bringup.commands.run import verdict
+from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_record import HealthSample
+from fulmar_bringup.run_summary import summarise
+from fulmar_bringup.supervisor import Report
+from fulmar_core.errors import RunFailed
+from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
+
+PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mock", 5.0)
+PRESSED = "e-stop: pressed. Reset it: fulmar estop --reset: actuators in their safe state"
+
+
+class Overseer:
+    """Shows the reports of a plant, one after another."""
+
+    def __init__(self, *plants: Report) -> None:
+        self._rest = list(plants)
+        self.plant = self._rest.pop(0)
+        self.controller = Report(heard=time.monotonic())
+
+    def wait_until(self, condition: Any, alive: Any) -> None:
+        while not condition():
+            alive()
+            self.plant = self._rest.pop(0)
+
+
+def said(level: str, message: str, mode: str = "running") -> Report:
+    return Report(level, message, {"mode": mode, "sim_time_s": "1.0"}, time.monotonic())
+
+
+def wait_for_end(monkeypatch: pytest.MonkeyPatch, *plants: Report, end_on_estop: bool = False) -> None:
+    monkeypatch.setattr(conductor, "raise_if_ended", lambda _group: None)
+    group = SimpleNamespace()
+    conductor._wait_for_end(PLAN, Overseer(*plants), group, lambda _s: None, end_on_estop=end_on_estop)
+
+
+def test_an_e_stop_holds_the_run_until_its_time_is_over(monkeypatch):
+    wait_for_end(
+        monkeypatch, said("ok", "running"), said("error", PRESSED), said("ok", "finished", "finished")
+    )
+
+
+def test_a_run_that_is_asked_to_ends_on_an_e_stop(monkeypatch):
+    with pytest.raises(RunFailed, match="plant: e-stop: pressed"):
+        wait_for_end(monkeypatch, said("ok", "running"), said("error", PRESSED), end_on_estop=True)
+
+
+def test_every_other_error_of_the_plant_ends_the_run(monkeypatch):
+    with pytest.raises(RunFailed, match="plant: no command"):
+        wait_for_end(monkeypatch, said("error", PRESSED), said("error", "no command for 500 ms"))
+
+
+def test_the_result_says_that_the_e_stop_was_pressed_and_what_does_not_fit(reached):
+    record = read_run(reached)
+    assert summarise(record)["estop_pressed"] is False
+    assert summarise(record)["warnings"] == []
+    running = {"mode": "running", WIRE_WARNINGS: f"one{BETWEEN}two"}
+    samples = (
+        HealthSample(1.0, "floating_platform: plant", 2, PRESSED, running),
+        HealthSample(2.0, "floating_platform: controller", 1, "two", {WIRE_WARNINGS: "two"}),
+    )
+    summary = summarise(replace(record, health=record.health + samples))
+    assert summary["estop_pressed"] is True
+    pressed, *others = summary["warnings"]
+    assert "e-stop was pressed" in pressed
+    assert others == ["one", "two"]
+    assert f"  warning: {pressed}\n  warning: one\n  warning: two\n" in verdict(summary)
+
+
+def test_a_press_after_the_plant_has_finished_is_none_of_the_run(reached):
+    record = read_run(reached)
+    after = HealthSample(9e9, "floating_platform: plant", 1, PRESSED, {"mode": "finished"})
+    assert summarise(replace(record, health=(*record.health, after)))["estop_pressed"] is False
