@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from fulmar_core.backend import Sample
+from fulmar_core.backend import Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import FAILED
@@ -35,6 +35,7 @@ from sim_nodes.emulators.kobuki import KobukiEmulator
 from sim_nodes.emulators.links import Link, PtyLink, TcpLink
 from sim_nodes.emulators.valves import ValveBank
 from sim_nodes.mujoco_backend import MujocoBackend
+from sim_nodes.on_air import OnAir
 
 DEVICES = ("valves", "kobuki", "kingfisher", "ardupilot")
 CATCH_UP = 25  # ticks at most: what a process misses beyond that is gone, as if the world had stood still
@@ -75,9 +76,12 @@ class EmulatorNode(Node):
         self._request_exit = request_exit
         robot = load_robot(self.settings.robot)
         scenario = load_scenario(self.settings.scenario)
-        self._backend = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
+        simulator = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
+        self.device = make_emulator(robot, simulator, self.settings)
+        self._backend: Backend = simulator
+        if isinstance(self.device, ValveBank):
+            self._backend = OnAir(simulator, scenario)
         self._sample = self._backend.reset(first_episode(robot, self.settings), seed=self.settings.seed)
-        self.device = make_emulator(robot, self._backend, self.settings)
         self._truth = self.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH))
         self._state = self.create_publisher(JointState, DEVICE_STATE.name, publisher_qos(DEVICE_STATE))
         self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
@@ -112,6 +116,8 @@ class EmulatorNode(Node):
         while deadlines.wait(self._stop):
             now_s = time.monotonic()
             command = self.device.command(now_s)
+            if isinstance(self._backend, OnAir) and isinstance(self.device, ValveBank):
+                self._backend.set_bearing(self.device.air)
             due = int((now_s - began_s) / dt) - ticks
             for _ in range(max(1, min(due, CATCH_UP))):
                 self._sample = self._backend.step(command)

@@ -179,8 +179,8 @@ class Scenario:
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     # Of robots with an air bearing, in simulated plants and emulated devices; batches know neither.
-    bearing_late_s: Range = (0.0, 0.0)  # it carries the robot so long after the start, drawn from the seed [s]
-    held_s: Range = (0.0, 0.0)  # from when to when, after the start, a hand holds the robot where it is [s]
+    bearing_late_s: Range = (0.0, 0.0)  # it carries the robot so long after it opens, drawn from the seed [s]
+    held_s: Range = (0.0, 0.0)  # from when to when, on air, a hand holds the robot where it is [s]
 
     def __post_init__(self) -> None:
         """Refuse what would do nothing, and times without meaning."""
