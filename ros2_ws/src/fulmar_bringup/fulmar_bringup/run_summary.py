@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bringup.run_beliefs import believed_dead, last_beliefs
 from fulmar_bringup.run_judgement import Judgement, judge
 from fulmar_bringup.run_record import HealthSample, RunRecord
 
@@ -56,6 +57,8 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "overruns": _total(plant, controller, "overruns"),
         "watchdog_trips": _total(plant, None, "watchdog_trips"),
         "actuator_use": _use(judgement),
+        "believed_dead": believed_dead(record),
+        "beliefs": last_beliefs(record),
         "bag": str(record.path),
     }
 

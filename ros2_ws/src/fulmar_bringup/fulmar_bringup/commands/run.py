@@ -275,6 +275,10 @@ def verdict(summary: dict[str, Any]) -> str:
             f"  {summary['steps']} commands, latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms; "
             f"{summary['overruns']} overruns, {summary['watchdog_trips']} watchdog trips"
         )
+    if summary["believed_dead"]:
+        lines.append(f"  believed dead: {', '.join(summary['believed_dead'])}")
+    if summary["beliefs"]:
+        lines.append(f"  at the end: {summary['beliefs']}")
     if summary["bag"] is None:
         lines.append("  nothing was recorded")
     else:

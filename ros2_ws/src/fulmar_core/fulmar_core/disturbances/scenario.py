@@ -187,7 +187,9 @@ class Scenario:
         for name in ("bearing_late_s", "held_s"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high < math.inf:
-                raise ValueError(f"'{name}' must be [low, high] with 0 <= low <= high, found [{low}, {high}].")
+                raise ValueError(
+                    f"'{name}' must be [low, high] with 0 <= low <= high, found [{low}, {high}]."
+                )
         its = self.sensing
         if not self.sensor_noise and (its.noise, its.bias, its.delay_s, its.dropout) != (1.0, 1.0, 0.0, 0.0):
             raise ValueError(

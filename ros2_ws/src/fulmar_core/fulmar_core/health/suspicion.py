@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-
 MAY_BE_0 = ("held", "retry_s")
 
 
@@ -35,7 +34,9 @@ class Suspicion:
     def __post_init__(self) -> None:
         """Refuse what no filter exists for."""
         if min(getattr(self, field.name) for field in fields(self) if field.name not in MAY_BE_0) <= 0.0:
-            raise ValueError("every number of a suspicion must be greater than 0; 'held' and 'retry_s' may be 0.")
+            raise ValueError(
+                "every number of a suspicion must be greater than 0; 'held' and 'retry_s' may be 0."
+            )
         if min(getattr(self, name) for name in MAY_BE_0) < 0.0:
             raise ValueError("'held' and 'retry_s' must not be negative.")
         if max(self.failure, self.change) >= 0.5:
