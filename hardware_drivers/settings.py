@@ -201,6 +201,7 @@ NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
 }
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
 SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that motion capture alone knows the place of
+FLOATS = (GpioValves, ValveTopic)  # drivers that switch an air bearing
 MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device knows where it is
 FITS = {
     "thrusters": (GpioValves, ValveTopic),
@@ -226,6 +227,11 @@ class Hardware:
     def measures_odometry(self) -> bool:
         """Whether the device knows where it is; if not, motion capture or another node says so."""
         return isinstance(self.driver, MEASURES)
+
+    @property
+    def has_bearing(self) -> bool:
+        """Whether the driver switches an air bearing, without which nothing may move."""
+        return isinstance(self.driver, FLOATS)
 
     @property
     def seen_from_outside(self) -> bool:

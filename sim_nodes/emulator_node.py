@@ -16,7 +16,7 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray, Int16MultiArray
 
-from fulmar_core.backend import Sample
+from fulmar_core.backend import Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import FAILED
@@ -41,6 +41,7 @@ from sim_nodes.emulators.topics import BASE_TIMEOUT_S, FOR_EVER_S, TopicDevice, 
 from sim_nodes.emulators.valves import ValveBank
 from sim_nodes.emulators.wiring import STRAIGHT, Wiring
 from sim_nodes.mujoco_backend import MujocoBackend
+from sim_nodes.on_air import OnAir
 
 DEVICES = ("valves", "kobuki", "kingfisher", "ardupilot", "valve_topic", "velocity_topic", "thrust_topic")
 NONE = -1  # an empty list has no type in ROS
@@ -86,9 +87,12 @@ class EmulatorNode(Node):
         self._request_exit = request_exit
         robot = load_robot(self.settings.robot)
         scenario = load_scenario(self.settings.scenario)
-        self._backend = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
+        simulator = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
+        self.device = make_emulator(robot, simulator, self.settings)
+        self._backend: Backend = simulator
+        if isinstance(self.device, ValveBank):
+            self._backend = OnAir(simulator, scenario)
         self._sample = self._backend.reset(first_episode(robot, self.settings), seed=self.settings.seed)
-        self.device = make_emulator(robot, self._backend, self.settings)
         self._wiring = Wiring(
             robot,
             order=self.settings.order,
@@ -134,6 +138,8 @@ class EmulatorNode(Node):
         while deadlines.wait(self._stop):
             now_s = time.monotonic()
             command = self._wiring.applied(self.device.command(now_s))
+            if isinstance(self._backend, OnAir) and isinstance(self.device, ValveBank):
+                self._backend.set_bearing(self.device.air)
             due = int((now_s - began_s) / dt) - ticks
             for _ in range(max(1, min(due, CATCH_UP))):
                 self._sample = self._backend.step(command)

@@ -47,24 +47,26 @@ class OnAir:
         self._lock = threading.Lock()
         self._open = True  # the bearing's valve
         self._late_s = scenario.bearing_late_s[0]
-        self._passed_s = 0.0  # since the start
-        self._opened_s = 0.0  # when the valve was opened
+        self._open_s = 0.0  # since the valve was opened
+        self._carried_s = 0.0  # since the start, on air
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Begin anew; see `Backend.reset`."""
         with self._lock:
             self._late_s = bearing_late_s(self._scenario, seed=seed, number=number)
-            self._passed_s = self._opened_s = 0.0
+            self._open_s = self._carried_s = 0.0
         return self._backend.reset(episode, seed=seed, number=number)
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Apply a command, or closed valves while the bearing is off; see `Backend.step`."""
         on, (grip_s, release_s) = self.bearing_on, self._scenario.held_s
         applied = np.asarray(command, dtype=float) if on else self._safe
-        held = grip_s <= self._passed_s < release_s
+        held = grip_s <= self._carried_s < release_s
         sample = self._backend.step(applied, ticks) if on and not held else self._backend.stand(ticks)
+        seconds = ticks * self.robot.timing.physics_dt
         with self._lock:
-            self._passed_s += ticks * self.robot.timing.physics_dt
+            self._carried_s += seconds if on else 0.0
+            self._open_s += seconds if self._open else 0.0
         return replace(sample, applied=applied)
 
     def make_safe(self) -> None:
@@ -79,12 +81,12 @@ class OnAir:
     def bearing_on(self) -> bool:
         """See `AirBearing`."""
         with self._lock:
-            return self._open and self._passed_s - self._opened_s >= self._late_s - 1e-9
+            return self._open and self._open_s >= self._late_s - 1e-9
 
     def set_bearing(self, on: bool) -> str:
         """See `AirBearing`."""
         with self._lock:
-            if on and not self._open:
-                self._opened_s = self._passed_s
+            if not on:
+                self._open_s = 0.0
             self._open = on
         return ""

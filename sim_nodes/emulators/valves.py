@@ -38,6 +38,11 @@ class ValveBank:
             valves[self._order] = levels[: self._count] == self._open_level
         return valves
 
+    @property
+    def air(self) -> bool:
+        """Whether the valve of the bearing is open."""
+        return bool(self.levels()[self._count] == self._open_level)
+
     def levels(self) -> np.ndarray:
         """Level at the pin of each valve in the order of the wiring, then at the bearing's, shape (n + 1,)."""
         self._file.seek(0)

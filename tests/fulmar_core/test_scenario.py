@@ -18,6 +18,7 @@ from fulmar_core.disturbances.scenario import (
     Slope,
     Tether,
     Wave,
+    bearing_late_s,
     draw_world,
     load_scenario,
 )
@@ -100,6 +101,8 @@ ENTRIES = {
     "sensing.dropout": (SEEING, {"sensing": Sensing(dropout=0.1)}, {"dropout"}),
     "sensing.velocity_noise": (STILL, {"sensing": Sensing(velocity_noise=(0.0, 0.1))}, {"velocity_noise"}),
     "sensing.yaw_rate_noise": (STILL, {"sensing": Sensing(yaw_rate_noise=(0.0, 0.1))}, {"yaw_rate_noise"}),
+    "bearing_late_s": (STILL, {"bearing_late_s": (1.0, 2.0)}, set()),  # of simulated plants, not of worlds
+    "held_s": (STILL, {"held_s": (1.0, 2.0)}, set()),
 }  # fmt: skip
 PARTS = {
     "push": Push,
@@ -367,3 +370,17 @@ def test_docs_tell_of_every_entry():
     text = (Path(__file__).parents[2] / "docs/scenarios.md").read_text(encoding="utf-8")
     names = {field.name for part in (Scenario, *PARTS.values()) for field in fields(part)}
     assert {name for name in names if f"`{name}`" not in text} == set()
+
+
+def test_the_air_bearing_is_late_within_its_span_and_the_same_for_one_seed():
+    scenario = replace(STILL, bearing_late_s=(1.0, 3.0))
+    late_s = [bearing_late_s(scenario, seed=4, number=number) for number in range(200)]
+    fills(np.array(late_s), 1.0, 3.0)
+    assert late_s == [bearing_late_s(scenario, seed=4, number=number) for number in range(200)]
+    assert bearing_late_s(STILL, seed=4, number=0) == 0.0
+
+
+@pytest.mark.parametrize("name", ["bearing_late_s", "held_s"])
+def test_times_that_end_before_they_begin_are_refused(name):
+    with pytest.raises(ValueError, match=name):
+        replace(STILL, **{name: (2.0, 1.0)})

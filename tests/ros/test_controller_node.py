@@ -20,6 +20,8 @@ from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.topics import (
+    ACTUATORS_STATE,
+    AIR_BEARING,
     COMMAND,
     ESTOP,
     ESTOP_RELEASED,
@@ -173,11 +175,10 @@ def test_silence_of_the_odometry_closes_the_valves(stream: Stream) -> None:
 def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
     neighbour: Neighbour, controller: ControllerNode
 ) -> None:
-    """What a deployed controller may know."""
+    """What a deployed controller may know; of a robot with thrusters on an air bearing, what these do as well."""
     heard = {subscription.topic_name for subscription in controller.subscriptions}
-    assert heard == {
-        f"{NAMESPACE}/{wire.name}" for wire in (ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP)
-    }
+    wires = (ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP, ACTUATORS_STATE, AIR_BEARING)
+    assert heard == {f"{NAMESPACE}/{wire.name}" for wire in wires}
     assert f"{NAMESPACE}/{TRUTH.name}" not in heard
     assert {STATUS.name, IMU.name}.isdisjoint(heard)
 

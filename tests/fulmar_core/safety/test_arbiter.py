@@ -34,6 +34,7 @@ LADDER = [
     ({"last_input_ns": NOW - 620 * MS}, Mode.ARMED, "no usable odom for 620 ms (limit 400 ms)"),
     ({"input_problem": "odom is NaN"}, Mode.ARMED, "odom is NaN"),
     ({"outside": "the robot is outside"}, Mode.ARMED, "the robot is outside"),
+    ({"bearing_off": True}, Mode.ARMED, "the air bearing is off"),
     ({"has_goal": False}, Mode.ARMED, "no goal yet"),
     ({"goal_distance": 8.1}, Mode.ARMED, "goal is 8.1 m away, beyond the geofence of 8 m"),
 ]

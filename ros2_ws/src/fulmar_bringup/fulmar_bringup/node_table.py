@@ -106,6 +106,8 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         parameters["area"] = list(guards.area)
     if guards.estop:
         parameters["estop"] = True
+    if plan.backend == "hardware" and load_hardware(plan.hardware).has_bearing:
+        parameters["air_bearing"] = True
     on_hardware = plan.backend == "hardware" and not guards.estimator
     if on_hardware and not load_hardware(plan.hardware).seen_from_outside:
         parameters["odometry_may_repeat"] = True  # encoders of a base at rest do; motion capture never does

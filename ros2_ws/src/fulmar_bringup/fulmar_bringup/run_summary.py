@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bringup.run_beliefs import believed_dead, last_beliefs
 from fulmar_bringup.run_judgement import Judgement, judge
 from fulmar_bringup.run_record import HealthSample, RunRecord
 from fulmar_core.safety.estop import HOLDS
@@ -60,6 +61,8 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "actuator_use": _use(judgement),
         "estop_pressed": estop_pressed(record),
         "warnings": warnings_of(record),
+        "believed_dead": believed_dead(record),
+        "beliefs": last_beliefs(record),
         "bag": str(record.path),
     }
 

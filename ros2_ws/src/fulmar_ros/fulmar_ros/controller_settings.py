@@ -12,7 +12,9 @@ from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
 
 MOST_COPIES = 3
-MISSED_TICKS = 5  # of a plant whose states of the actuators may come late or get lost, before nothing is learned
+MISSED_TICKS = (
+    5  # of a plant whose states of the actuators may come late or get lost, before nothing is learned
+)
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,9 @@ class ControllerSettings:
     )
     overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
     odometry_may_repeat: bool = False  # to the last bit, while the robot stands: that of encoders does
-    air_bearing: bool = False  # wait for `air_bearing/state`, as for every robot whose YAML declares a bearing
+    air_bearing: bool = (
+        False  # wait for `air_bearing/state`, as for every robot whose YAML declares a bearing
+    )
     copies: int = 1  # of each command, within its period; in real time only
     autostart: bool = True
 
@@ -85,7 +89,9 @@ class ControllerSettings:
 
     def hold_ns(self, robot: Robot) -> int:
         """How long a state of the actuators may stand for what came after it, before messages must be missing [ns]."""
-        longest_s = 1.75 / self.control_rate(robot) if self.lockstep else MISSED_TICKS * robot.timing.physics_dt
+        longest_s = (
+            1.75 / self.control_rate(robot) if self.lockstep else MISSED_TICKS * robot.timing.physics_dt
+        )
         return round(1e9 * longest_s)
 
     def input_gate(self, robot: Robot) -> InputGate:

@@ -251,8 +251,12 @@ def _feed(
     wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
     time.sleep(SETTLE_S)
     wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].what)))
-    told = {name: course.before(getattr(course, name)) for name in ("goals", "obstacles", "blocks", "bearing")}
-    applied_at = np.searchsorted(course.applied.stamp_ns, course.stamp_ns)  # the first state of each step or after it
+    told = {
+        name: course.before(getattr(course, name)) for name in ("goals", "obstacles", "blocks", "bearing")
+    }
+    applied_at = np.searchsorted(
+        course.applied.stamp_ns, course.stamp_ns
+    )  # the first state of each step or after it
     count, width = len(course), len(course.robot.actuators.names)
     actions, commands = np.full((count, width), np.nan), np.full((count, width), np.nan)
     shown: list[np.ndarray | None] = [None] * count
@@ -296,9 +300,7 @@ def _tell_applied(
     write = VectorWriter(course.robot.actuators.names)
     end = int(applied_at[step + 1]) if step + 1 < len(course) else len(course.applied)
     for index in range(int(applied_at[step]), end):
-        wires.applied.publish(
-            write.write(course.applied.values[index], int(course.applied.stamp_ns[index]))
-        )
+        wires.applied.publish(write.write(course.applied.values[index], int(course.applied.stamp_ns[index])))
     if not len(course.applied):
         wires.applied.publish(write.write(answer, int(course.stamp_ns[step])))
 

@@ -309,6 +309,10 @@ def verdict(summary: dict[str, Any]) -> str:
             f"{summary['overruns']} overruns, {summary['watchdog_trips']} watchdog trips"
         )
     lines += [f"  warning: {warning}" for warning in summary["warnings"]]
+    if summary["believed_dead"]:
+        lines.append(f"  believed dead: {', '.join(summary['believed_dead'])}")
+    if summary["beliefs"]:
+        lines.append(f"  at the end: {summary['beliefs']}")
     if summary["bag"] is None:
         lines.append("  nothing was recorded")
     else:

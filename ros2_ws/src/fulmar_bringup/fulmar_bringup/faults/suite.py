@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.environment import environment
+from fulmar_bringup.faults.bearing_faults import BEARING_FAULTS
 from fulmar_bringup.faults.command_faults import COMMAND_FAULTS
 from fulmar_bringup.faults.driver_faults import DRIVER_FAULTS
 from fulmar_bringup.faults.estop_faults import ESTOP_FAULTS
@@ -34,6 +35,7 @@ EVERY = (
     *ESTOP_FAULTS,
     *HAND_FAULTS,
     *DRIVER_FAULTS,
+    *BEARING_FAULTS,
     *INPUT_FAULTS,
     *COMMAND_FAULTS,
     *POLICY_FAULTS,

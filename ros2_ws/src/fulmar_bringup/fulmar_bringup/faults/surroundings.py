@@ -27,6 +27,7 @@ class Surroundings:
     answers_pass: bool = False  # the robot's commands, too, pass through a spoiler, of their own
     by_goal_node: bool = False  # a node of its own tells goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
+    scenario: str = "nominal"
     emulated: bool = False  # a driver drives an emulated device
     two_hosts: bool = False  # the controller is on another one
     bundle: Callable[[Path], None] | None = None  # what is done to the bundle before the start
@@ -56,7 +57,7 @@ def request_of(robot: str, record: Path, about: Surroundings = USUAL) -> RunRequ
         lockstep=False,
         rate=1.0,
         control_hz=None,
-        scenario="nominal",
+        scenario=about.scenario,
         seed=0,
         record=record,
         command="fulmar faults",

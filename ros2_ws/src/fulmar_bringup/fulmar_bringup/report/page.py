@@ -63,6 +63,7 @@ def page(runs: Sequence[View], drawn: Sequence[Picture], title: str, mark: str) 
         f'<div class="verdicts">{"".join(map(_verdict, runs))}</div>',
         f'<p class="faint">{escape(rule(runs))}</p>',
         *(_warning(run) for run in runs if run.record.warnings),
+        *(_beliefs(run) for run in runs if run.summary["beliefs"]),
         "<h2>In figures</h2>",
         _table(runs),
         *map(_figure, drawn),
@@ -107,6 +108,10 @@ def _verdict(run: View) -> str:
 def _warning(run: View) -> str:
     lines = "; ".join(run.record.warnings[:5])
     return f'<p class="faint">{escape(run.label)}: part of the bag could not be read. {escape(lines)}</p>'
+
+
+def _beliefs(run: View) -> str:
+    return f"<p>{_name(run)}: at the end of the run, {escape(run.summary['beliefs'])}.</p>"
 
 
 def _table(runs: Sequence[View]) -> str:

@@ -25,7 +25,9 @@ class Situation:
     turn: np.ndarray  # wanted heading minus heading, 0 where a task has none [rad]
     motion: tuple[np.ndarray, np.ndarray, np.ndarray]  # speed ahead, to the left [m/s], turn rate [rad/s]
     push: np.ndarray  # force and torque from outside, shape (..., 3) [N, N, N·m]
-    alive: np.ndarray | None  # 1, or 0 for a valve not to be opened, shape (..., n); None where nothing is estimated
+    alive: (
+        np.ndarray | None
+    )  # 1, or 0 for a valve not to be opened, shape (..., n); None where nothing is estimated
 
 
 def raw_situation(reader: Reader, observation: np.ndarray) -> Situation:

@@ -181,15 +181,17 @@ class Scenario:
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     # Of robots with an air bearing, in simulated plants and emulated devices; batches know neither.
-    bearing_late_s: Range = (0.0, 0.0)  # it carries the robot so long after the start, drawn from the seed [s]
-    held_s: Range = (0.0, 0.0)  # from when to when, after the start, a hand holds the robot where it is [s]
+    bearing_late_s: Range = (0.0, 0.0)  # it carries the robot so long after it opens, drawn from the seed [s]
+    held_s: Range = (0.0, 0.0)  # from when to when, on air, a hand holds the robot where it is [s]
 
     def __post_init__(self) -> None:
         """Refuse what would do nothing, and times without meaning."""
         for name in ("bearing_late_s", "held_s"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high < math.inf:
-                raise ValueError(f"'{name}' must be [low, high] with 0 <= low <= high, found [{low}, {high}].")
+                raise ValueError(
+                    f"'{name}' must be [low, high] with 0 <= low <= high, found [{low}, {high}]."
+                )
         its = self.sensing
         if not self.sensor_noise and (its.noise, its.bias, its.delay_s, its.dropout) != (1.0, 1.0, 0.0, 0.0):
             raise ValueError(

@@ -12,7 +12,9 @@ from fulmar_core.health.thruster_health import Health
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
 
-DEAD_BELOW = 0.5  # expected share of its thrust below which a valve counts as dead: that is likelier than not [-]
+DEAD_BELOW = (
+    0.5  # expected share of its thrust below which a valve counts as dead: that is likelier than not [-]
+)
 
 
 @dataclass(frozen=True, slots=True)

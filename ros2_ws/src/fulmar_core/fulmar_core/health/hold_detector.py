@@ -54,7 +54,14 @@ class HoldDetector:
         off = seen.copy()
         off[..., :3] -= np.where(begun[..., None], self._place, seen[..., :3])
         off[..., 2] -= 2.0 * np.pi * np.round(off[..., 2] / (2.0 * np.pi))
-        spread = self._spread * np.sqrt(1.0 + 1.0 / np.maximum(self._count, 1.0))[..., None] ** [1, 1, 1, 0, 0, 0]
+        spread = self._spread * np.sqrt(1.0 + 1.0 / np.maximum(self._count, 1.0))[..., None] ** [
+            1,
+            1,
+            1,
+            0,
+            0,
+            0,
+        ]
         still = 0.5 * np.sum((off / spread) ** 2, axis=-1)
         gain = np.where(thrust | (still > surprise), np.clip(surprise - still, -MOST, MOST), 0.0)
         evidence = self._evidence + gain - np.where(self.held, 0.0, ALLOWANCE * dt)

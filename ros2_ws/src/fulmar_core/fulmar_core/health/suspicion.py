@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-
 MAY_BE_0 = ("held", "retry_s")
 
 
@@ -24,8 +23,8 @@ class Suspicion:
     drift_torque: float = 0.003  # same [N·m]
     failure: float = 0.02  # chance that an actuator is lost, before anything is seen [-]
     change: float = 1e-3  # chance that what is lost changes, in one second [-]
-    # Evidence that the body is held rather than its valves dead, as log-likelihood; two dead valves are 8, and a hold is
-    # rarer than they are. 0: nothing is looked for [-].
+    # Evidence that the body is held rather than its valves dead, as log-likelihood: two dead valves are 8, and a hold
+    # is rarer than they are. 0: it is never taken for held [-].
     held: float = 12.0
     # A valve that is believed dead is opened once more after so long, and again after twice as long: a trial of a dead
     # valve costs one opening without effect. 0: never [s].
@@ -35,7 +34,9 @@ class Suspicion:
     def __post_init__(self) -> None:
         """Refuse what no filter exists for."""
         if min(getattr(self, field.name) for field in fields(self) if field.name not in MAY_BE_0) <= 0.0:
-            raise ValueError("every number of a suspicion must be greater than 0; 'held' and 'retry_s' may be 0.")
+            raise ValueError(
+                "every number of a suspicion must be greater than 0; 'held' and 'retry_s' may be 0."
+            )
         if min(getattr(self, name) for name in MAY_BE_0) < 0.0:
             raise ValueError("'held' and 'retry_s' must not be negative.")
         if max(self.failure, self.change) >= 0.5:

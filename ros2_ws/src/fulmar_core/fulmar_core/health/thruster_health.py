@@ -38,7 +38,9 @@ class Health:
         np.ndarray
     )  # (..., 6) the measured columns without their noise, of the likeliest set [m, rad, m/s, rad/s]
     push: np.ndarray  # (..., 3) force from outside along the world's x and y [N], torque [N·m]
-    held: np.ndarray  # (...,) whether something keeps the body from moving: then nothing is learned of the others
+    held: (
+        np.ndarray
+    )  # (...,) whether something keeps the body from moving: then nothing is learned of the others
 
 
 class ThrusterHealth:
@@ -140,7 +142,9 @@ class ThrusterHealth:
         if self._suspicion.held:
             self._heed_hold(seen, free, applied, dt)
 
-    def _heed_hold(self, seen: np.ndarray, surprise: np.ndarray, applied: np.ndarray | Applied, dt: float) -> None:
+    def _heed_hold(
+        self, seen: np.ndarray, surprise: np.ndarray, applied: np.ndarray | Applied, dt: float
+    ) -> None:
         """Learn nothing from a body that is held, and forget what was learned while it was not known to be."""
         assert self._state is not None
         commands = applied.commands if isinstance(applied, Applied) else np.asarray(applied)
@@ -151,7 +155,9 @@ class ThrusterHealth:
         if held.any():
             at_rest = seen.copy()
             at_rest[..., 3:] = 0.0
-            still = np.concatenate((np.broadcast_to(at_rest[..., None, :], (*push.shape[:-1], 6)), push), axis=-1)
+            still = np.concatenate(
+                (np.broadcast_to(at_rest[..., None, :], (*push.shape[:-1], 6)), push), axis=-1
+            )
             self._state = np.where(held[..., None, None], still, self._state)
             self._chance = np.where(held[..., None], chance, self._chance)
         self._kept = (
