@@ -136,7 +136,7 @@ def test_every_row_of_the_table_becomes_one_node(launch_with):
 def test_before_anything_starts_a_living_plant_of_the_same_name_is_looked_for(launch_with):
     CHECKED.clear()
     launch_with(Row())
-    assert CHECKED == [(Row(),)]
+    assert [(Row(),)] == CHECKED
 
 
 def test_a_node_without_parameters_gets_no_empty_parameter_file(launch_with):
