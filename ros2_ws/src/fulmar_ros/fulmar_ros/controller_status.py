@@ -69,6 +69,7 @@ class ControllerStatus:
             standby.sha256,
             succession.fell_back,
             self._swap.said,
+            self._swap.requests,
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < PERIOD_S:
@@ -84,6 +85,7 @@ class ControllerStatus:
             "controller": standby.controller.name,
             "fell_back": succession.fell_back,
             "swap": self._swap.said,
+            "swap_requests": str(self._swap.requests),
             "epoch": str(epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
             "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),
