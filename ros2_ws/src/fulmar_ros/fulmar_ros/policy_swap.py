@@ -15,8 +15,8 @@ LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 class PolicySwap:
     """Takes requests for another policy; the one that runs is not disturbed.
 
-    An operator repeats a request until it is answered. A repeat that comes while the folder is being loaded or waits for
-    its turn is the same request: it loads nothing.
+    An operator repeats a request until it is answered. A repeat that comes while the folder is being loaded, or waits
+    for its turn, is the same request: it loads nothing.
 
     Attributes:
         requests: How many were taken, without repeats.
