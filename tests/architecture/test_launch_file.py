@@ -56,6 +56,9 @@ STAND_INS = {
 }
 
 
+CHECKED = []  # rows that were looked for in the ROS domain before they were started
+
+
 def stand_in(monkeypatch, name, **attributes):
     module = ModuleType(name)
     vars(module).update(attributes)
@@ -65,6 +68,7 @@ def stand_in(monkeypatch, name, **attributes):
 @pytest.fixture
 def load(repository, monkeypatch):
     """Function that loads the launch file anew."""
+    monkeypatch.setattr("fulmar_bringup.launch_check.refuse_living_plants", CHECKED.append)
     for name, attributes in STAND_INS.items():
         stand_in(monkeypatch, name, **attributes)
 
@@ -127,6 +131,12 @@ def test_every_row_of_the_table_becomes_one_node(launch_with):
         assert (told["name"], told["namespace"]) == (row.name, row.namespace)
         assert told["parameters"] == [row.parameters]
         assert told["output"] == "screen"
+
+
+def test_before_anything_starts_a_living_plant_of_the_same_name_is_looked_for(launch_with):
+    CHECKED.clear()
+    launch_with(Row())
+    assert [(Row(),)] == CHECKED
 
 
 def test_a_node_without_parameters_gets_no_empty_parameter_file(launch_with):

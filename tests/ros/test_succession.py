@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from std_msgs.msg import String
 
+from fulmar_bringup.robot_operator import Operator
 from fulmar_core.bundle_signature import make_keys, sign_bundle
-from fulmar_core.errors import FulmarError
+from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.topics import METADATA, SWAP
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -22,7 +23,7 @@ from fulmar_ros.runtime import spinning
 from policy_server.policy import Policy
 from policy_server.policy_node import make_policy
 from policy_server.shipped import policies_directory
-from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
+from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, until
 
 pytestmark = pytest.mark.real_time
 
@@ -210,3 +211,38 @@ def test_where_signatures_are_asked_for_only_a_signed_policy_takes_over(
     assert "not signed" in values(neighbour)["swap"]
     sign_bundle(second, tmp_path / "private.pem")
     swapper.ask(second, "done")
+
+
+def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_again(
+    neighbour: Neighbour, start: Start, record: Callable[..., object], tmp_path: Path, monkeypatch
+) -> None:
+    """A recorder subscribes to requests too, and the controller's first look at one may come before it is matched.
+
+    Here the controller drops the first two: the command sends them again, and each swap loads once, also the second
+    to the folder that runs already.
+    """
+    dropped, loaded = [], []
+    taken, load = ControllerNode._on_swap, ControllerNode._load
+
+    def lossy(self: ControllerNode, message: String) -> None:
+        dropped.append(message.data) if len(dropped) < 2 else taken(self, message)
+
+    def counted(self: ControllerNode, folder: str) -> object:
+        loaded.append(folder)
+        return load(self, folder)
+
+    monkeypatch.setattr(ControllerNode, "_on_swap", lossy)
+    monkeypatch.setattr(ControllerNode, "_load", counted)
+    record()  # it is there before any controller is
+    until(lambda: neighbour.node.count_subscribers(f"{NAMESPACE}/{SWAP.name}") > 0)
+    person = Operator(neighbour.node)
+    with pytest.raises(RunFailed, match="no controller of 'floating_platform'"):
+        person.say_swap(ROBOT, "x", find_s=0.3, answer_s=0.1)
+    start(policy=SHIPPED)
+    odometry = Stream(neighbour)
+    second = str(copy_of(tmp_path, "second"))
+    for number in (1, 2):
+        assert person.say_swap(ROBOT, second, find_s=5.0, answer_s=10.0) == f"done {second}"
+        assert loaded == [second] * number
+    odometry.stop()
+    assert dropped == [second] * 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 import signal
 import tempfile
 import time
@@ -19,6 +20,7 @@ from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.goal_plan import is_endless, shown_path
 from fulmar_bringup.node_table import (
+    NodeSpec,
     RunPlan,
     controller_spec,
     emulator_spec,
@@ -74,7 +76,7 @@ def conduct(request: RunRequest) -> RunOutcome:
         The outcome; a failed run has one too, with whatever was recorded.
 
     Raises:
-        ConfigError: Another run goes on in this ROS domain.
+        ConfigError: Another run goes on in this ROS domain, or a plant of this name lives in it.
         DeviceError: The device is not there.
     """
     if request.plan.hardware and not request.plan.emulated:
@@ -106,21 +108,15 @@ def _run(request: RunRequest) -> tuple[str, int]:
     failure, plant, ends = "", Report(), list[Ended]()
     folders = contextlib.ExitStack()
     try:
-        group.start(recorder_spec(plan, **_recording(request)))
-        port = ""
-        if plan.emulated:
-            emulation = emulation_of(
-                load_hardware(plan.hardware), Path(folders.enter_context(_wires_folder()))
-            )
-            group.start(emulator_spec(plan, emulation))
-            port = emulation.port
-        group.start(plant_spec(plan, subscribers=_listeners(plan), port=port))
-        for spec in guard_specs(plan):
+        specs = _specs(request, plan, folders)
+        for spec in specs:
             group.start(spec)
-        group.start(controller_spec(plan, subscribers=2))  # plant and recorder
-        if plan.goals:
-            group.start(run_goals_spec(plan))
         with supervisor(plan.robot, load_task(plan.task)) as overseer:
+            if overseer.sees_living_plant():
+                _withdraw(group, specs, request.record)
+                overseer.refuse_living_plant()
+                for spec in specs:
+                    group.start(spec)
             plant = overseer.plant
             failure = _watch(request, plan, overseer, group)
             # The controller first: the plant then shows that its actuators are safe, and the recorder sees it.
@@ -132,6 +128,30 @@ def _run(request: RunRequest) -> tuple[str, int]:
         ends += group.stop_all()
         folders.close()
     return _with_ends(failure, ends), int(plant.values.get("steps", 0))
+
+
+def _specs(request: RunRequest, plan: RunPlan, folders: contextlib.ExitStack) -> list[NodeSpec]:
+    """Every node of a run, in the order of their start."""
+    specs, port = [recorder_spec(plan, **_recording(request))], ""
+    if plan.emulated:
+        emulation = emulation_of(load_hardware(plan.hardware), Path(folders.enter_context(_wires_folder())))
+        specs.append(emulator_spec(plan, emulation))
+        port = emulation.port
+    specs.append(plant_spec(plan, subscribers=_listeners(plan), port=port))
+    specs += guard_specs(plan)
+    specs.append(controller_spec(plan, subscribers=2))  # plant and recorder
+    return [*specs, run_goals_spec(plan)] if plan.goals else specs
+
+
+def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
+    """Stop nodes that have just been started, all at once, before they publish anything.
+
+    They start while discovery looks for others, so that the look costs no time. It ends before they are up.
+    """
+    group.stop(*(spec.name for spec in specs))
+    shutil.rmtree(
+        record, ignore_errors=True
+    )  # it did not exist before; a recorder that was quick has made it
 
 
 def _wires_folder() -> tempfile.TemporaryDirectory[str]:

@@ -267,11 +267,6 @@ def _checked_guards(
     return guards
 
 
-def default_task(robot: str) -> str:
-    """What a robot does if nobody says: the hardest of the plain tasks that its own policy can."""
-    return "go_to_pose" if shipped_policy(robot, "go_to_pose") else "go_to_position"
-
-
 def _from_file(file: GoalFile, drawn: Goal, start: PoseTuple) -> tuple[Goal, PoseTuple]:
     """The first goal of a file, and a start that suits it."""
     mission = replace(drawn, targets=first_targets(file))

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -21,12 +20,14 @@ from fulmar_bringup.running_robots import running_robots, unfit_publishers
 from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, spaces_with, stop_robots
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP
+from fulmar_ros.command_writers import full_name
 from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
 FIND_S = 7.0  # whose first announcements are lost announces himself again after 3 s
 LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
+ASK_AGAIN_S = 0.5  # a controller says at once that it has a request
 
 
 class Operator:
@@ -106,40 +107,56 @@ class Operator:
         spaces = running_robots(self._node)
         return spaces, unfit_publishers(self._node, spaces)
 
-    def say_swap(self, robot: str, folder: str, *, find_s: float) -> dict[str, str]:
-        """Ask a controller to go on with another policy.
+    def say_swap(self, robot: str, folder: str, *, find_s: float, answer_s: float) -> str:
+        """Ask a controller to go on with another policy, and again until its status answers this very request.
+
+        A recorder subscribes to the same topic, so that a subscription alone shows no controller. The first request
+        gets lost where discovery has not matched it with the controller yet.
 
         Args:
             robot: Whose controller.
             folder: The bundle, on the robot's own disk.
             find_s: How long to look for the controller [s].
+            answer_s: How long the policy may take to take over [s].
 
         Returns:
-            What the controller says of itself from then on; `swap` tells what came of it.
+            What came of it: a text that begins with `done` or `refused`.
 
         Raises:
-            RunFailed: There is no controller.
+            RunFailed: There is no controller, or it does not answer.
         """
         status: dict[str, str] = {}
 
-        def hear(message: DiagnosticArray) -> None:
-            values = {pair.key: pair.value for pair in message.status[0].values} if message.status else {}
-            if folder in values.get("swap", ""):
-                status.update(values)
+        def read(message: DiagnosticArray) -> None:
+            if message.status:
+                status.update({pair.key: pair.value for pair in message.status[0].values})
 
+        qos = subscriber_qos(STATUS, reliable=True)
+        self._node.create_subscription(DiagnosticArray, f"/{robot}/{STATUS.name}", read, qos)
         publisher = self._node.create_publisher(String, f"/{robot}/{SWAP.name}", publisher_qos(SWAP))
         until = time.monotonic() + find_s
-        while not publisher.get_subscription_count():
+        while not (status and self._takes_swaps(robot)):
             if time.monotonic() > until:
                 raise RunFailed(f"no controller of '{robot}' is heard in this ROS domain.")
             time.sleep(LOOK_S)
-        time.sleep(SETTLE_S)  # a match is seen here a moment before the other side is ready
-        publisher.publish(String(data=folder))
-        publisher.wait_for_all_acked(Duration(seconds=ANSWER_S))
-        time.sleep(SETTLE_S)  # what it says from now on is about this request
-        qos = subscriber_qos(STATUS, reliable=True)
-        self._node.create_subscription(DiagnosticArray, f"/{robot}/{STATUS.name}", hear, qos)
-        return status
+        before, until, asked_s = status.get("swap_requests"), time.monotonic() + answer_s, 0.0
+        while True:
+            said, now_s = status.get("swap", ""), time.monotonic()
+            taken = status.get("swap_requests") != before and folder in said
+            if taken and said.startswith(("done", "refused")):
+                return said
+            if now_s > until:
+                raise RunFailed(f"the controller of '{robot}' did not answer within {answer_s:g} s.")
+            if not taken and now_s - asked_s > ASK_AGAIN_S:
+                publisher.publish(String(data=folder))
+                asked_s = now_s
+            time.sleep(ASK_S)
+
+    def _takes_swaps(self, robot: str) -> bool:
+        """Whether a node that publishes the status of a controller subscribes to requests, too."""
+        asked = self._node.get_subscriptions_info_by_topic(f"/{robot}/{SWAP.name}")
+        answering = self._node.get_publishers_info_by_topic(f"/{robot}/{STATUS.name}")
+        return bool({full_name(info) for info in asked} & {full_name(info) for info in answering})
 
 
 @contextlib.contextmanager

@@ -28,6 +28,7 @@ from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.late_subscribers import LateSubscribers
+from fulmar_ros.living_plant import refuse_living_plant, sees_living_plant
 from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.operator_subscription import SUBSCRIPTIONS
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -54,6 +55,7 @@ class Supervisor:
     def __init__(self, node: Node, robot: str, task: Task) -> None:
         """Listen to plant and controller."""
         self._node, self._robot, self._task = node, robot, task
+        self._made_s = time.monotonic()
         self.plant, self.controller = Report(), Report()
         self._changed = threading.Condition()
         self._error: Exception | None = None
@@ -74,6 +76,21 @@ class Supervisor:
         )
         node.create_subscription(DiagnosticArray, STATUS.name, self._hear, subscriber_qos(STATUS))
         self._plant_service = node.create_client(ChangeState, "plant/change_state")
+
+    def sees_living_plant(self) -> bool:
+        """Whether a plant of this robot is at work already; call before ours is configured.
+
+        Returns as soon as one is seen, and otherwise when this node has had 0.8 s to discover others.
+        """
+        return sees_living_plant(self._node, f"/{self._robot}", since_s=self._made_s)
+
+    def refuse_living_plant(self) -> None:
+        """Refuse to go on where a plant of this robot is at work already, unless it is dead.
+
+        Raises:
+            ConfigError: With its name, process and host.
+        """
+        refuse_living_plant(self._node, f"/{self._robot}", since_s=self._made_s, spins=True)
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:

@@ -9,6 +9,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
+from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.node_table import NodeSpec, list_nodes
 
 ARGUMENTS = {
@@ -45,7 +46,9 @@ def to_node(spec: NodeSpec) -> Node:
 def start_nodes(context: LaunchContext) -> list[Node]:
     """Read the launch arguments, which are known only now, and list the nodes."""
     asked = {name: LaunchConfiguration(name).perform(context) or None for name in ARGUMENTS}
-    return [to_node(spec) for spec in list_nodes(**asked)]
+    specs = list_nodes(**asked)
+    refuse_living_plants(specs)
+    return [to_node(spec) for spec in specs]
 
 
 def generate_launch_description() -> LaunchDescription:

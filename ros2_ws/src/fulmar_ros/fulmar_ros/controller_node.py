@@ -199,6 +199,7 @@ class ControllerNode(LifecycleNode):
 
     def _on_swap(self, message: String) -> None:
         self._swap.ask(message.data)
+        self._tell_status(self.inputs.decide())  # at once: who asked repeats it until then
 
     def _load(self, folder: str) -> Standby:
         return load_other(

@@ -78,6 +78,7 @@ class ControllerStatus:
             *self.wire_problems,
             beliefs.dead,
             len(beliefs.words),
+            self._swap.requests,
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < PERIOD_S:
@@ -96,6 +97,7 @@ class ControllerStatus:
             "swap": self._swap.said,
             "believed_dead": ", ".join(beliefs.dead),
             "beliefs": "; ".join(beliefs.words),
+            "swap_requests": str(self._swap.requests),
             "epoch": str(epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
             "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 import time
 from collections.abc import Callable
 
@@ -40,12 +42,18 @@ class PlantHealth:
         self.mode, self.reason = "inactive", ""
         self.awaited = 0
         self._robot = robot
+        self._place: dict[str, str] = {}  # full name, host and process of the node
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
         self.more: Callable[[], dict[str, str]] = dict
 
     def open(self, node: LifecycleNode) -> None:
         """Begin to publish."""
+        self._place = {
+            "node": node.get_fully_qualified_name(),
+            "host": socket.gethostname(),
+            "pid": str(os.getpid()),
+        }
         self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._health = Health(f"{self._robot}: plant", [self._publisher])
         self._wire_watch = WireWatch(node, self._wires.subscribed)
@@ -134,6 +142,7 @@ class PlantHealth:
 
     def _values(self) -> dict[str, str]:
         values = {
+            **self._place,
             "mode": self.mode,
             "reason": self.reason,
             "steps": str(self._lockstep.steps),

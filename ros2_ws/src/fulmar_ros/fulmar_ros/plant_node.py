@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -19,6 +20,7 @@ from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
 from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.first_episode import first_episode
+from fulmar_ros.living_plant import LATE_S, living_plants, refuse_living_plant
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
 from fulmar_ros.paced_capture import MakeCapture, capture_maker
 from fulmar_ros.parameters import read_parameters
@@ -34,6 +36,7 @@ MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 SAFE_REPEATS = 5  # the safe command is published this often on the way out
 SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
+TWIN_LOOK_S = 0.1
 PATIENCE_S = 2.0  # for a backend that hangs in a step, before the node goes on without it
 
 
@@ -62,9 +65,10 @@ class PlantNode(LifecycleNode):
             cli_args: ROS arguments of this node alone, where it shares a process.
 
         Raises:
-            FulmarError: If a parameter or a configuration file is wrong.
+            FulmarError: A parameter or a configuration file is wrong, or another plant of this name lives.
         """
         super().__init__("plant", cli_args=cli_args)
+        self._made_s = time.monotonic()
         self.settings = read_parameters(self, settings_class)
         self.robot = load_robot(self.settings.robot)
         load_scenario(self.settings.scenario)  # a wrong name is told before anything starts
@@ -91,9 +95,11 @@ class PlantNode(LifecycleNode):
         )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:
+            refuse_living_plant(self, self.get_namespace(), since_s=self._made_s, spins=False)
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
                     raise FulmarError(f"plant of '{self.robot.name}' could not start: {self.health.reason}")
+            self._twin_timer = self.create_timer(TWIN_LOOK_S, self._look_for_a_twin)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Build the backend and every endpoint."""
@@ -254,6 +260,18 @@ class PlantNode(LifecycleNode):
             self._fail(str(error))
         except Exception as error:  # noqa: BLE001 - whatever a backend raises must close the actuators
             self._fail(f"{type(error).__name__}: {error}")
+
+    def _look_for_a_twin(self) -> None:
+        """Give way to another plant that discovery reports late; one that has run for longer than 5 s stays."""
+        others = living_plants(self, self.get_namespace())
+        if others:
+            self.get_logger().error(
+                f"{others[0]} lives in this ROS domain already, and was discovered late: this plant, the younger one, "
+                "ends. `/diagnostics` has the other's process and host."
+            )
+            self._request_exit(FAILED)
+        if others or time.monotonic() > self._made_s + LATE_S:
+            self._twin_timer.cancel()
 
     def _first_sample(self, backend: Backend) -> Sample:
         return backend.reset(first_episode(self.robot, self.settings), seed=self.settings.seed)

@@ -15,7 +15,11 @@ LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 class PolicySwap:
     """Takes requests for another policy; the one that runs is not disturbed.
 
+    An operator repeats a request until it is answered. A repeat that comes while the folder is being loaded, or waits
+    for its turn, is the same request: it loads nothing.
+
     Attributes:
+        requests: How many were taken, without repeats.
         said: What came of the last request: empty, or a word of loading, ready, done or refused, with the folder.
     """
 
@@ -35,9 +39,13 @@ class PolicySwap:
         self._load, self._propose, self._warn = load, propose, warn
         self._loader: threading.Thread | None = None
         self.said = ""
+        self.requests = 0
 
     def ask(self, folder: str) -> None:
         """Load the bundle of a folder, or say why not."""
+        if self.said in (f"loading {folder}", f"ready {folder}"):
+            return
+        self.requests += 1
         if self._load is None:
             self._refuse(folder, "this controller runs no policy")
         elif not folder or len(folder) > LONGEST_PATH:

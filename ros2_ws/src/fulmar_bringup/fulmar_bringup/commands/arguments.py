@@ -69,6 +69,26 @@ def read_area(text: str | None) -> Area | None:
     return x_min, x_max, y_min, y_max
 
 
+def read_goal(text: str | None) -> tuple[float, ...] | None:
+    """Read `x,y` or `x,y,deg` of --goal: x [m], y [m] and, for a pose, heading [deg].
+
+    Raises:
+        ConfigError: If it is not two or three finite numbers.
+    """
+    if text is None:
+        return None
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) not in (2, 3) or not all(math.isfinite(value) for value in values):
+        raise ConfigError(
+            f"--goal = '{text}' must be two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
+            "Example: --goal 1,-0.5 or --goal 1,-0.5,90"
+        )
+    return values
+
+
 def read_pose(text: str | None, option: str) -> tuple[float, float, float] | None:
     """Read `x,y,deg`.
 

@@ -21,6 +21,7 @@ from fulmar_bringup.commands.arguments import (
     ScenarioOption,
     SeedOption,
     read_area,
+    read_goal,
     read_pose,
 )
 from fulmar_bringup.console import console, output, print_json
@@ -34,8 +35,8 @@ def run(
         str | None,
         typer.Option(
             metavar="T",
-            help="A name from `fulmar list tasks`; go_to_pose by default, "
-            "or go_to_position where no policy for poses is shipped; with --goals, the one that takes them.",
+            help="A name from `fulmar list tasks`; by default what --goal asks for: go_to_position for x,y, "
+            "go_to_pose for x,y,deg and without a goal; with --goals, the one that takes them.",
         ),
     ] = None,
     controller: ControllerOption = "policy",
@@ -58,8 +59,8 @@ def run(
     goal: Annotated[
         str | None,
         typer.Option(
-            metavar="x,y,deg",
-            help="Where to go; drawn from the seed by default; so are many targets.",
+            metavar="x,y[,deg]",
+            help="Where to go, with a heading or without; drawn from the seed by default; so are many targets.",
         ),
     ] = None,
     goals: Annotated[
@@ -196,20 +197,30 @@ def run(
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
     from fulmar_bringup.conductor import conduct
+    from fulmar_bringup.default_task import check_heading, default_task
     from fulmar_bringup.extras import require
     from fulmar_bringup.goal_plan import default_task as task_of_goals
-    from fulmar_bringup.planning import default_task, plan_run
+    from fulmar_bringup.planning import plan_run
     from fulmar_bringup.system import CONTROLLERS, modules_of
     from fulmar_core.calibration import use_calibration
 
     use_calibration(calibration, robot)
+    place = read_goal(goal)
+    if task is None:
+        task = (
+            task_of_goals(goals)
+            if goals
+            else default_task(robot, controller, backend, goal=place, policy=policy)
+        )
+    elif place is not None and (note := check_heading(task, place)):
+        console.print(note, markup=False)
     request = plan_run(
         robot=robot,
-        task=task or (task_of_goals(goals) if goals else default_task(robot)),
+        task=task,
         controller=controller,
         backend=backend,
         policy=policy,
-        goal=read_pose(goal, "--goal"),
+        goal=(place[0], place[1], place[2] if len(place) > 2 else 0.0) if place else None,
         start=read_pose(start, "--start"),
         duration_s=duration,
         lockstep=lockstep,

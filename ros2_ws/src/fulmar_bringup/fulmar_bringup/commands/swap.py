@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,6 @@ import typer
 
 from fulmar_bringup.commands.arguments import JsonOption, RobotArgument
 from fulmar_bringup.console import output, print_json
-from fulmar_core.errors import RunFailed
 from fulmar_core.exit_codes import FAILED
 
 FIND_S, LOAD_S = 5.0, 20.0
@@ -35,16 +33,11 @@ def swap(
 
     with operator() as person:
         sent = str(folder.absolute())
-        status = person.say_swap(robot, sent, find_s=FIND_S)
-        until = time.monotonic() + LOAD_S
-        while not status.get("swap", "").startswith(("done", "refused")):
-            if time.monotonic() > until:
-                raise RunFailed(f"the controller of '{robot}' did not answer within {LOAD_S:g} s.")
-            time.sleep(0.02)
-    done = status["swap"].startswith("done")
+        said = person.say_swap(robot, sent, find_s=FIND_S, answer_s=LOAD_S)
+    done = said.startswith("done")
     if as_json:
-        print_json({"robot": robot, "policy": sent, "done": done, "said": status["swap"]})
+        print_json({"robot": robot, "policy": sent, "done": done, "said": said})
     else:
-        output.print(status["swap"], markup=False)
+        output.print(said, markup=False)
     if not done:
         raise typer.Exit(FAILED)

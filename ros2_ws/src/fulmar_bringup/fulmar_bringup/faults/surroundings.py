@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from fulmar_bringup.planning import RunRequest, default_task, plan_run
+from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_core.topics import ODOMETRY, Wire
 from policy_server.shipped import shipped_policy
 
@@ -44,7 +44,7 @@ def request_of(robot: str, record: Path, about: Surroundings = USUAL) -> RunRequ
         record: Folder of the bag; files that are needed are made beside it.
         about: What is unusual.
     """
-    task = default_task(robot)
+    task = "go_to_pose" if shipped_policy(robot, "go_to_pose") else "go_to_position"
     request = plan_run(
         robot=robot,
         task=task,

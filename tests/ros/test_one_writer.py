@@ -1,0 +1,133 @@
+"""One writer for each actuator: two nodes that command one robot, and a second plant of a robot's name."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+import rclpy
+from rclpy.context import Context
+from sensor_msgs.msg import JointState
+
+from fulmar_bringup.launch_check import refuse_living_plants
+from fulmar_bringup.node_table import NodeSpec
+from fulmar_core.errors import ConfigError
+from fulmar_core.topics import COMMAND
+from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.qos import publisher_qos
+from tests.conftest import RosDomain
+from tests.ros.cli import fulmar
+from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, open_valves, until
+
+pytestmark = pytest.mark.real_time
+
+PLANT = [
+    *(sys.executable, "-m", "sim_nodes.sim_node", "--ros-args", "-r", f"__ns:={NAMESPACE}"),
+    *("-p", "backend:=mock"),
+]
+
+
+class Commands:
+    """Opens a valve 50 times a second, from a thread."""
+
+    def __init__(self, neighbour: Neighbour) -> None:
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(neighbour,))
+        self._thread.start()
+
+    def _run(self, neighbour: Neighbour) -> None:
+        while not self._over.wait(0.02):
+            neighbour.command(open_valves(neighbour.robot))
+
+    def stop(self) -> None:
+        self._over.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def commands(neighbour: Neighbour) -> Iterator[Commands]:
+    stream = Commands(neighbour)
+    yield stream
+    stream.stop()
+
+
+def opened(neighbour: Neighbour) -> bool:
+    return bool(neighbour.applied) and bool(neighbour.applied[-1].any())
+
+
+def test_a_second_node_that_commands_closes_the_valves_until_it_is_gone(
+    neighbour: Neighbour, plant: PlantNode, commands: Commands, ros_domain: RosDomain
+) -> None:
+    """Of the same name, in another process as far as DDS knows; it need not say a word. Both are named."""
+    until(lambda: opened(neighbour))
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain.id)
+    twin = rclpy.create_node(neighbour.node.get_name(), namespace=NAMESPACE, context=context)
+    twin.create_publisher(JointState, COMMAND.name, publisher_qos(COMMAND))
+    until(lambda: not opened(neighbour))
+    name = f"{NAMESPACE}/neighbour"
+    until(lambda: f"2 nodes publish commands, and only one may: {name}, {name}" in neighbour.said["plant"][0])
+    twin.destroy_node()
+    rclpy.shutdown(context=context)
+    until(lambda: opened(neighbour))
+    assert plant.guard.watchdog.trips == 0  # the commands went on all the time
+
+
+@pytest.fixture
+def live(neighbour: Neighbour, ros_domain: RosDomain, commands: Commands) -> Iterator[psutil.Process]:
+    """A plant in a process of its own, which a neighbour drives."""
+    process = subprocess.Popen(PLANT, env=ros_domain.env)
+    until(lambda: opened(neighbour), timeout_s=20.0)
+    yield psutil.Process(process.pid)
+    process.terminate()
+    process.wait()
+
+
+def test_a_plant_whose_name_already_lives_is_refused_by_run_launch_file_and_node(
+    neighbour: Neighbour, live: psutil.Process, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """Each says which process on which host lives there, and the live robot never notices."""
+    place = f"{NAMESPACE}/plant, process {live.pid} on host {socket.gethostname()}"
+    until(lambda: "plant" in neighbour.said)
+    begun = len(neighbour.applied)
+
+    run = fulmar("run", ROBOT, "--controller", "lqr", "--record", "bag", env=ros_domain.env, cwd=tmp_path)
+    assert run.returncode == 2
+    assert place in " ".join(run.stderr.split())
+    assert not (tmp_path / "bag").exists()
+
+    node = subprocess.run(
+        PLANT, env=ros_domain.env, capture_output=True, text=True, timeout=20.0, check=False
+    )
+    assert (node.returncode, place in node.stderr) in (
+        (2, True),
+        (1, False),
+    )  # 1: discovered late, on a busy machine
+
+    plant = NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", NAMESPACE)
+    with pytest.raises(ConfigError, match=f"process {live.pid} on host"):
+        refuse_living_plants([plant])
+    refuse_living_plants([NodeSpec("plant", "sim_nodes", "sim_node", "sim_nodes.sim_node", "/another")])
+
+    assert live.is_running()
+    assert neighbour.said["plant"][0] == "running"
+    assert all(applied.any() for applied in neighbour.applied[begun:])
+
+
+def test_of_two_plants_that_start_at_once_not_both_live(ros_domain: RosDomain) -> None:
+    """Neither has published anything yet when the other looks."""
+    both = [subprocess.Popen(PLANT, env=ros_domain.env, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    try:
+        until(lambda: any(one.poll() is not None for one in both), timeout_s=20.0)
+        ended = next(one for one in both if one.poll() is not None)
+        assert "/floating_platform/plant lives in " in ended.communicate()[1]
+    finally:
+        for one in both:
+            one.kill()
+            one.wait()
