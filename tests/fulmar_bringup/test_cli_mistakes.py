@@ -55,7 +55,7 @@ def broken_configs(tmp_path, monkeypatch):
         (["commission", "turtlebot2"], "no valves to click: each pulse moves it. Give --yes"),
         (["commission", "zero_g_lab", "--write"], "--write and --out need --yes"),
         (["commission", "zero_g_lab", "--wiring", "dead"], "--wiring goes with --emulate"),
-        (["commission", "zero_g_lab", "--emulate", "--wiring", "ded"], "Did you mean 'dead'?"),
+        (["commission", "zero_g_lab", "--emulate", "--wiring", "deadly"], "Did you mean 'dead'?"),
         (["commission", "kingfisher_ardupilot", "--yes"], "not armed: arm: true or --arm"),
         (["doctor", "--for", "hardwear"], "Did you mean 'hardware'?"),
         (["doctor", "zero_g_lab"], "say `fulmar doctor --for hardware zero_g_lab`"),

@@ -99,7 +99,7 @@ def test_a_file_says_in_capitals_where_nothing_stops_the_device_when_the_driver_
     assert when_the_driver_dies(driver).startswith(UNPROTECTED) is shouts
 
 
-@pytest.mark.parametrize("wiring", ["[left, left]", "[left]", "[left, rigth]", "[-left, left]"])
+@pytest.mark.parametrize("wiring", ["[left, left]", "[left]", "[left, starboard]", "[-left, left]"])
 def test_a_wiring_that_leaves_a_side_out_is_refused(tmp_path, wiring):
     path = tmp_path / "mine.yaml"
     path.write_text(f"{TURTLEBOT}  wiring: {wiring}\n")
