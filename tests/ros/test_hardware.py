@@ -16,7 +16,9 @@ from queue import SimpleQueue
 import numpy as np
 import psutil
 import pytest
+import rclpy
 from mcap.reader import make_reader
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -26,9 +28,11 @@ from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import RunPlan, emulator_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.system import default_hardware
+from fulmar_core.errors import DeviceError, FulmarError
 from fulmar_core.paths import config_names
 from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
+from hardware_drivers.driver_node import DriverNode
 from hardware_drivers.own_watchdog import own_watchdog, when_the_driver_dies
 from hardware_drivers.settings import MavlinkBoat, load_hardware
 from sim_nodes.emulators.valves import ValveBank
@@ -284,3 +288,30 @@ def test_a_driver_whose_device_is_not_there_says_what_to_do(ros_domain: RosDomai
         assert "/dev/ttyNONE cannot be opened" in group.last_words("plant")
     finally:
         group.stop_all()
+
+
+@pytest.mark.parametrize(("asked", "arms"), [("true", True), ("false", False)])
+def test_a_boat_s_driver_says_what_it_will_do_before_it_touches_the_autopilot(
+    ros_domain: RosDomain, monkeypatch, capfd, asked: str, arms: bool
+) -> None:
+    """The autopilot is reached by `make_device` alone; by then the log has it, and the driver knows whether to arm."""
+    seen: list[tuple[bool, str]] = []
+
+    def reach(_robot, hardware, **_more):
+        seen.append((hardware.driver.arm, capfd.readouterr().err))
+        raise DeviceError("no autopilot here")
+
+    monkeypatch.setattr("hardware_drivers.driver_node.make_device", reach)
+    parameters = {"robot": "kingfisher", "hardware": "kingfisher_ardupilot", "arm": asked}
+    arguments = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        with pytest.raises(FulmarError, match="no autopilot here"):
+            DriverNode(lambda _code: None, cli_args=["--ros-args", *arguments])
+    finally:
+        rclpy.try_shutdown()
+    ((armed, log),) = seen
+    assert armed is arms
+    will = "will set MANUAL, ARM THE BOAT, and override RC channels 1 (steering) and 3 (throttle)"
+    assert (will in log) is arms
+    assert ("not armed: arm: true or --arm" in log) is not arms
