@@ -24,8 +24,14 @@ BETWEEN_S = {"floating": 0.6, "coasting": 1.0, "rolling": 0.6}
 # Shares of full thrust of a propeller; each ahead, then astern, until one shows. Propellers push less astern, so one
 # that turns backwards shows at the negative share first, by as much as another at the positive one.
 SHARES = (0.25, 0.34, 0.42, 0.5, 0.65, 0.8, 1.0)
-ASTERN = 1.6  # a propeller brakes with so many times the share that it was pulsed with, our value
-CREEPS = 0.02  # a boat that is slower need not be stopped before the next pulse [m/s]
+ALIKE = 3  # shares that the second propeller is tried with, from the one that moved the first: they are alike
+BRAKES = (
+    1.6,
+    1.0,
+    1.0,
+)  # of the share that moved it; astern, propellers push less. Our values, as the next two
+CREEPS = 0.01  # a boat that is slower need not be stopped before the next pulse [m/s]
+SPEED_OVER_S = 0.5  # a speed is averaged over so long [s]
 MOVES_BY_ITSELF = 0.3  # of one nozzle's thrust, with every wire closed
 Say = Callable[[str], None]
 
@@ -99,25 +105,31 @@ def _wheels(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> 
 
 def _propellers(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> list[Response]:
     """Response of each propeller to a positive share, at the lowest share that shows one."""
-    found, first = [], 0
+    found: list[Response] = []
+    shares: Sequence[float] = SHARES
     for wire in wires:
-        trials = [(share, sign) for share in SHARES[first:] for sign in (1.0, -1.0)]
-        for share, sign in trials:
+        for share, sign in [(share, sign) for share in shares for sign in (1.0, -1.0)]:
             say(f"{wire.name} at {100.0 * sign * share:+.0f} %")
             one = _response(session, robot, command_of(robot, wire, sign * share), "coasting")
             if min(one.clearly[0], one.clearly[2]) > CLEARLY:
-                first = SHARES.index(share)  # the other propeller is alike
-                if abs(one.change[0]) > CREEPS:
-                    _brake(session, robot, command_of(robot, wire, -sign * min(1.0, ASTERN * share)))
+                first = SHARES.index(share)
+                shares = SHARES[first : first + ALIKE]
+                _brake(session, robot, wire, share, ahead=float(np.sign(one.change[0])) * sign)
                 break
         found.append(Response(sign * one.change, one.sigma))
     return found
 
 
-def _brake(session: Session, robot: Robot, command: np.ndarray) -> None:
-    """Stop a boat that coasts, by one pulse of the propeller that has moved it."""
-    session.pulse(command, _ramp_s(robot, command) + HOLD_S)
-    session.rest(_ramp_s(robot, command))
+def _brake(session: Session, robot: Robot, wire: Wire, share: float, *, ahead: float) -> None:
+    """Stop a boat that coasts, by the propeller that has moved it; `ahead` is the sign that drives it ahead."""
+    for harder in BRAKES:
+        session.rest(SPEED_OVER_S)
+        speed = session.speed_ahead(SPEED_OVER_S)
+        if abs(speed) < CREEPS:
+            return
+        command = command_of(robot, wire, -np.sign(speed) * ahead * min(1.0, harder * share))
+        session.pulse(command, _ramp_s(robot, command) + HOLD_S)
+        session.rest(_ramp_s(robot, command))
 
 
 def _response(session: Session, robot: Robot, command: np.ndarray, motion: Motion) -> Response:

@@ -148,6 +148,15 @@ class Session:
         rates = rows[chosen, 4:7] if rows.shape[1] > 4 else None
         return Track(times[chosen], rows[chosen, 1], rows[chosen, 2], np.unwrap(rows[chosen, 3]), rates)
 
+    def speed_ahead(self, over_s: float) -> float:
+        """Mean speed ahead of the last time, by the odometry [m/s]; 0 where poses alone come."""
+        track = self.track()
+        recent = track.time_s > track.time_s[-1] - over_s
+        if track.rates is None:
+            return 0.0
+        cos, sin = np.cos(track.heading[recent]), np.sin(track.heading[recent])
+        return float(np.mean(cos * track.rates[recent, 0] + sin * track.rates[recent, 1]))
+
     def make_safe(self) -> None:
         """Send the safe command several times; the driver makes safe once more at its own end."""
         for _ in range(STOPS):
