@@ -62,10 +62,15 @@ class ValveNode(TopicDevice):
         super().__init__(address, len(order) + 1, timeout_s=FOR_EVER_S)
         self._order, self._open = list(order), float(not inverted)
 
+    @property
+    def air(self) -> bool:
+        """Whether the valve of the bearing is open."""
+        return bool(self._values[0] > 0.5)
+
     def command(self, now_s: float) -> np.ndarray:
         """See `EmulatedDevice`; a platform without air stands on the floor, whatever its valves do."""
         values = super().command(now_s)
         valves = np.zeros(len(self._order))
-        if values[0] > 0.5:
+        if self.air:
             valves[self._order] = (values[1:] > 0.5) == (self._open > 0.5)
         return valves

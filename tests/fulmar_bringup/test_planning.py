@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 
 from fulmar_bringup.conductor import conduct
+from fulmar_bringup.node_table import plant_spec
 from fulmar_bringup.planning import plan_run
 from fulmar_core.bundle_signature import make_keys, sign_bundle
 from fulmar_core.errors import BundleError, ConfigError, DeviceError, UnknownNameError
 from fulmar_core.paths import config_directory
 from fulmar_core.recording import Recording
+from hardware_drivers.settings import hardware_path
 from policy_server.shipped import shipped_policy
 
 NAN = float("nan")
@@ -201,6 +203,17 @@ def test_a_run_without_its_device_starts_nothing_and_says_what_is_missing(plan, 
     monkeypatch.setattr("fulmar_bringup.conductor.ProcessGroup", lambda: pytest.fail("a process is started"))
     with pytest.raises(DeviceError, match="/dev/ttyNONE: there is no such serial port"):
         conduct(plan(**more, goal=(1.0, 0.0, 0.0)))
+
+
+def test_a_boat_is_armed_by_its_file_or_by_the_command_line(plan, tmp_path):
+    boat = dict(
+        robot="kingfisher", controller="classical", task="go_to_position", backend="hardware", emulate=True
+    )
+    asked = plan(**boat, hardware="kingfisher_ardupilot", arm=True)
+    assert plant_spec(asked.plan).parameters["arm"] is True
+    armed = tmp_path / "armed.yaml"
+    armed.write_text(hardware_path("kingfisher_ardupilot").read_text().replace("arm: false", "arm: true"))
+    assert "arm" not in plant_spec(plan(**boat, hardware=str(armed)).plan).parameters
 
 
 def test_an_emulated_one_begins_where_the_seed_says(plan):

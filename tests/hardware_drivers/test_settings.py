@@ -8,7 +8,8 @@ import pytest
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
-from hardware_drivers.settings import hardware_of, load_hardware
+from hardware_drivers.own_watchdog import UNPROTECTED, own_watchdog, when_the_driver_dies
+from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
 
 TURTLEBOT = "title: t\nrobot: turtlebot2\ndriver:\n  kind: kobuki\n  port: /dev/ttyUSB0\n"
 
@@ -87,4 +88,20 @@ def test_too_few_valves_are_refused(tmp_path):
         "title: t\nrobot: floating_platform\ndriver: {kind: valve_topic, topic: /v, order: [1, 0]}\n"
     )
     with pytest.raises(ConfigError, match="'order' has 2 entries, the robot has 8 thrusters"):
+        load_hardware(str(path))
+
+
+@pytest.mark.parametrize("name", config_names("hardware"))
+def test_a_file_says_in_capitals_where_nothing_stops_the_device_when_the_driver_dies(name):
+    driver = load_hardware(name).driver
+    shouts = UNPROTECTED in hardware_path(name).read_text()
+    assert shouts is (own_watchdog(driver) is None)
+    assert when_the_driver_dies(driver).startswith(UNPROTECTED) is shouts
+
+
+@pytest.mark.parametrize("wiring", ["[left, left]", "[left]", "[left, starboard]", "[-left, left]"])
+def test_a_wiring_that_leaves_a_side_out_is_refused(tmp_path, wiring):
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"{TURTLEBOT}  wiring: {wiring}\n")
+    with pytest.raises(ConfigError, match="must name left and right once each"):
         load_hardware(str(path))

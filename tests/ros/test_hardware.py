@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import subprocess
 import sys
@@ -15,7 +16,9 @@ from queue import SimpleQueue
 import numpy as np
 import psutil
 import pytest
+import rclpy
 from mcap.reader import make_reader
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -25,8 +28,12 @@ from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import RunPlan, emulator_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.system import default_hardware
+from fulmar_core.errors import DeviceError, FulmarError
+from fulmar_core.paths import config_names
 from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
+from hardware_drivers.driver_node import DriverNode
+from hardware_drivers.own_watchdog import own_watchdog, when_the_driver_dies
 from hardware_drivers.settings import MavlinkBoat, load_hardware
 from sim_nodes.emulators.valves import ValveBank
 from tests.conftest import RosDomain
@@ -36,7 +43,6 @@ from tests.ros.neighbour import Neighbour, until
 pytestmark = pytest.mark.real_time
 
 STARTS_S = 40.0
-OWN_TIMEOUT_S = {"turtlebot2": 0.6, "kingfisher": 0.5, "kingfisher_ardupilot": 1.5}
 
 
 class Rig:
@@ -54,7 +60,8 @@ class Rig:
         plan = replace(plan, arm=isinstance(found.driver, MavlinkBoat))
         self.group = ProcessGroup()
         self.group.start(emulator_spec(plan, emulation))
-        self.group.start(plant_spec(plan, port=emulation.port))
+        self.plant = plant_spec(plan, port=emulation.port)
+        self.group.start(self.plant)
 
     def _heard(self, message: JointState) -> None:
         self.device.append(np.array(message.effort))
@@ -83,40 +90,52 @@ def rig(neighbour: Neighbour, request: pytest.FixtureRequest, tmp_path: Path) ->
     made.group.stop_all()
 
 
-DEVICES = [("turtlebot2", "turtlebot2"), ("kingfisher", "kingfisher"), ("kingfisher", "kingfisher_ardupilot")]
+WATCHED = [name for name in config_names("hardware") if own_watchdog(load_hardware(name).driver)]
+UNWATCHED = ("zero_g_lab", "zero_g_lab_valve_node", "kingfisher_action")
+
+
+def devices(names):
+    return pytest.mark.parametrize(
+        ("neighbour", "rig"), [(load_hardware(name).robot, name) for name in names], indirect=True, ids=names
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
-@pytest.mark.parametrize(("neighbour", "rig"), DEVICES, indirect=True, ids=[name for _, name in DEVICES])
+@devices(WATCHED)
 def test_a_killed_driver_leaves_the_device_to_its_own_watchdog(rig: Rig, request) -> None:
     """SIGKILL while it drives: the emulator's own last command is a stop, at its own time."""
-    own_s = OWN_TIMEOUT_S[request.node.callspec.id]
+    name = request.node.callspec.id
+    own_s = own_watchdog(load_hardware(name).driver).within_s
     rig.until_it_moves()
     rig.driver.send_signal(signal.SIGKILL)
     dead = time.monotonic()
     assert rig.device[-1].any()
     until(lambda: not rig.device[-1].any())
-    assert time.monotonic() - dead < own_s + 0.3
+    took_s = time.monotonic() - dead
+    logging.info(
+        f"{name}: stopped {took_s:.2f} s after SIGKILL, {when_the_driver_dies(load_hardware(name).driver)}"
+    )
+    assert took_s < own_s + 0.3
     time.sleep(0.5)
     assert not rig.device[-1].any()
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
-@pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
-def test_a_killed_driver_of_valves_leaves_them_open_and_a_new_one_closes_them(rig: Rig, tmp_path) -> None:
-    """Copper has no watchdog: what the page says of valves is so. A driver that starts again begins closed."""
+@devices(UNWATCHED)
+def test_a_killed_driver_without_a_watchdog_below_moves_on_and_a_new_one_stops_it(rig: Rig, request) -> None:
+    """The hardware file says so in capitals. A driver that starts again begins with the safe command."""
     rig.until_it_moves()
     rig.driver.send_signal(signal.SIGKILL)
     time.sleep(1.0)
     assert rig.device[-1].any()
-    (hardware, pins) = load_hardware("zero_g_lab"), tmp_path / "gpio"
-    from hardware_drivers.devices import make_device
-
-    device = make_device(rig.neighbour.robot, hardware, port=f"file://{pins}", patience_s=1.0)
-    until(lambda: not rig.device[-1].any())
-    device.close()
+    began = time.monotonic()
+    rig.group.start(rig.plant)
+    until(lambda: not rig.device[-1].any(), STARTS_S)
+    logging.info(
+        f"{request.node.callspec.id}: moved on; stopped {time.monotonic() - began:.2f} s after a new driver"
+    )
 
 
 @pytest.fixture
@@ -269,3 +288,30 @@ def test_a_driver_whose_device_is_not_there_says_what_to_do(ros_domain: RosDomai
         assert "/dev/ttyNONE cannot be opened" in group.last_words("plant")
     finally:
         group.stop_all()
+
+
+@pytest.mark.parametrize(("asked", "arms"), [("true", True), ("false", False)])
+def test_a_boat_s_driver_says_what_it_will_do_before_it_touches_the_autopilot(
+    ros_domain: RosDomain, monkeypatch, capfd, asked: str, arms: bool
+) -> None:
+    """The autopilot is reached by `make_device` alone; by then the log has it, and the driver knows whether to arm."""
+    seen: list[tuple[bool, str]] = []
+
+    def reach(_robot, hardware, **_more):
+        seen.append((hardware.driver.arm, capfd.readouterr().err))
+        raise DeviceError("no autopilot here")
+
+    monkeypatch.setattr("hardware_drivers.driver_node.make_device", reach)
+    parameters = {"robot": "kingfisher", "hardware": "kingfisher_ardupilot", "arm": asked}
+    arguments = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        with pytest.raises(FulmarError, match="no autopilot here"):
+            DriverNode(lambda _code: None, cli_args=["--ros-args", *arguments])
+    finally:
+        rclpy.try_shutdown()
+    ((armed, log),) = seen
+    assert armed is arms
+    will = "will set MANUAL, ARM THE BOAT, and override RC channels 1 (steering) and 3 (throttle)"
+    assert (will in log) is arms
+    assert ("not armed: arm: true or --arm" in log) is not arms

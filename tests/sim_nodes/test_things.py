@@ -25,9 +25,11 @@ def ahead(robot):
     """A command that pushes straight ahead."""
     kind = robot.actuators.kind
     if kind == "thrusters":
-        return np.array(
-            [0.5, 0, 0, 0, 0, 0, 0, 0.5] if robot.actuators.continuous else [1.0, 0, 0, 0, 0, 0, 0, 1]
-        )
+        share = 0.5 if robot.actuators.continuous else 1.0
+        front = [
+            nozzle.direction[0] > 0.0 and nozzle.position[0] >= 0.0 for nozzle in robot.actuators.nozzles
+        ]
+        return share * np.array(front)
     return np.array([0.7, 0.7]) if kind == "propellers" else np.array([0.4, 0.0])
 
 

@@ -34,6 +34,7 @@ class Finding:
     ok: bool
     found: str
     advice: str = ""
+    warning: bool = False  # worth a person's look, though nothing is broken
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -45,6 +46,34 @@ def diagnose() -> list[Finding]:
     findings = [_python(), *(_part(module, extra) for module, extra in PARTS.items())]
     checks: tuple[Callable[[], Finding], ...] = (_configs, _policies, _ros_round_trip, _wires, _timing, _disk)
     return findings + [check() for check in checks]
+
+
+def diagnose_hardware(name: str | None) -> list[Finding]:
+    """Check hardware files: what stops each device when its driver dies, and whether a named one is there.
+
+    Args:
+        name: Of `configs/hardware`, or a path that ends in `.yaml`; all that are known by default.
+
+    Raises:
+        ConfigError: There is no such file, or it has a mistake.
+    """
+    from hardware_drivers.own_watchdog import own_watchdog, when_the_driver_dies
+    from hardware_drivers.presence import check_presence
+    from hardware_drivers.settings import load_hardware
+
+    findings = []
+    for each in [name] if name else config_names("hardware"):
+        hardware = load_hardware(each)
+        findings += [_part(module, "hardware") for module in hardware.needs]
+        unprotected = own_watchdog(hardware.driver) is None
+        findings.append(Finding(each, True, when_the_driver_dies(hardware.driver), warning=unprotected))
+        if name:
+            try:
+                check_presence(hardware.driver)
+                findings.append(Finding(f"{each}: device", True, "its port is there"))
+            except (FulmarError, ImportError) as error:
+                findings.append(Finding(f"{each}: device", False, str(error), "See docs/hardware.md."))
+    return list(dict.fromkeys(findings))
 
 
 def _python() -> Finding:

@@ -44,7 +44,7 @@ def commission(
     Without --yes nothing moves: with the air closed, each valve clicks once in the order of the wires. With --yes and
     open air, each wire is pulsed for at most 0.3 s (propellers and wheels come up to their level before), the motion is
     read from odometry or motion capture, and the order is printed as the hardware file needs it. The e-stop, 0.5 m of
-    travel, 0.3 s without a pose and Ctrl-C end in the safe state. A boat with an autopilot needs --arm, too.
+    travel, 0.5 s without a pose and Ctrl-C end in the safe state. A boat with an autopilot needs --arm, too.
 
     The exit code is 0 if every wire was identified, 1 if one did not answer or anything else is wrong.
 

@@ -17,12 +17,21 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.robot import Robot
 
 CLICK_S, BETWEEN_CLICKS_S = 0.1, 0.9
-# At most 0.3 s at its level. Of valves our value: 1 N on 5.32 kg gives 23 mm/s, twenty times the error by poses of 1 mm.
+# At most 0.3 s at its level. For valves our value: 1 N on 5.32 kg gives 23 mm/s, some 20 standard errors.
 VALVE_PULSE_S, HOLD_S = 0.12, 0.3
 STILL_S = 1.5  # before the first pulse: what moves by itself
-BETWEEN_S = {"floating": 0.6, "coasting": 1.5, "rolling": 0.6}
-# Shares of full thrust, from the first that may turn a propeller; the next one comes where the last shows nothing.
-LEVELS = (0.4, 0.5, 0.65, 0.8, 1.0)
+BETWEEN_S = {"floating": 0.6, "coasting": 1.0, "rolling": 0.6}
+# Shares of full thrust of a propeller; each ahead, then astern, until one shows. Propellers push less astern, so one
+# that turns backwards shows at the negative share first, by as much as another at the positive one.
+SHARES = (0.25, 0.34, 0.42, 0.5, 0.65, 0.8, 1.0)
+ALIKE = 3  # shares that the second propeller is tried with, from the one that moved the first: they are alike
+BRAKES = (
+    1.6,
+    1.0,
+    1.0,
+)  # of the share that moved it; astern, propellers push less. Our values, as the next two
+CREEPS = 0.01  # a boat that is slower need not be stopped before the next pulse [m/s]
+SPEED_OVER_S = 0.5  # a speed is averaged over so long [s]
 MOVES_BY_ITSELF = 0.3  # of one nozzle's thrust, with every wire closed
 Say = Callable[[str], None]
 
@@ -68,11 +77,8 @@ def measure(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> 
     session.rest(STILL_S)
     if isinstance(robot.actuators, Thrusters):
         return _valves(session, robot, wires, say)
-    motion: Motion = "rolling" if isinstance(robot.actuators, DifferentialDrive) else "coasting"
-    found = []
-    for wire in wires:
-        say(wire.name)
-        found.append(_side(session, robot, wire, motion))
+    sides = _wheels if isinstance(robot.actuators, DifferentialDrive) else _propellers
+    found = sides(session, robot, wires, say)
     return Outcome(match_sides(found), tuple(found))
 
 
@@ -89,17 +95,47 @@ def _valves(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> 
     return Outcome(match, tuple(found))
 
 
-def _side(session: Session, robot: Robot, wire: Wire, motion: Motion) -> Response:
-    """Response of a wheel, or of a propeller at the lowest level that shows one."""
-    one = None
-    for level in LEVELS if motion == "coasting" else (1.0,):
-        command = command_of(robot, wire, level)
-        pulse = session.pulse(command, _ramp_s(robot, command) + HOLD_S)
-        session.rest(BETWEEN_S[motion])
-        (one,) = _responses(session.track(pulse.begin_s - 0.8), [pulse], motion)
-        if min(one.clearly[0], one.clearly[2]) > CLEARLY:
-            break
-    assert one is not None
+def _wheels(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> list[Response]:
+    found = []
+    for wire in wires:
+        say(wire.name)
+        found.append(_response(session, robot, command_of(robot, wire), "rolling"))
+    return found
+
+
+def _propellers(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> list[Response]:
+    """Response of each propeller to a positive share, at the lowest share that shows one."""
+    found: list[Response] = []
+    shares: Sequence[float] = SHARES
+    for wire in wires:
+        for share, sign in [(share, sign) for share in shares for sign in (1.0, -1.0)]:
+            say(f"{wire.name} at {100.0 * sign * share:+.0f} %")
+            one = _response(session, robot, command_of(robot, wire, sign * share), "coasting")
+            if min(one.clearly[0], one.clearly[2]) > CLEARLY:
+                first = SHARES.index(share)
+                shares = SHARES[first : first + ALIKE]
+                _brake(session, robot, wire, share, ahead=float(np.sign(one.change[0])) * sign)
+                break
+        found.append(Response(sign * one.change, one.sigma))
+    return found
+
+
+def _brake(session: Session, robot: Robot, wire: Wire, share: float, *, ahead: float) -> None:
+    """Stop a boat that coasts, by the propeller that has moved it; `ahead` is the sign that drives it ahead."""
+    for harder in BRAKES:
+        session.rest(SPEED_OVER_S)
+        speed = session.speed_ahead(SPEED_OVER_S)
+        if abs(speed) < CREEPS:
+            return
+        command = command_of(robot, wire, -np.sign(speed) * ahead * min(1.0, harder * share))
+        session.pulse(command, _ramp_s(robot, command) + HOLD_S)
+        session.rest(_ramp_s(robot, command))
+
+
+def _response(session: Session, robot: Robot, command: np.ndarray, motion: Motion) -> Response:
+    pulse = session.pulse(command, _ramp_s(robot, command) + HOLD_S)
+    session.rest(BETWEEN_S[motion])
+    (one,) = _responses(session.track(pulse.begin_s - 0.8), [pulse], motion)
     return one
 
 

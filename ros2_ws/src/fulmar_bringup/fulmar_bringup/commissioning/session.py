@@ -34,7 +34,7 @@ from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 MOST_TRAVEL_M = 0.5
-LOST_S = 0.3  # without a pose for so long the robot is stopped; the slowest device reports ten times a second
+LOST_S = 0.5  # without a pose for so long the robot is stopped; the slowest device reports ten times a second
 COMMAND_S = 0.02  # between commands: far below the driver's watchdog
 STOPS = 5
 READY_S = 40.0  # for driver, poses and air to come up
@@ -60,14 +60,14 @@ class Session:
         """
         self._robot, self._ended = robot, ended
         self._lock = threading.Lock()
-        self._poses: list[tuple[float, float, float, float]] = []
+        self._poses: list[tuple[float, ...]] = []  # time, x, y, heading and, of odometry, their rates
         self._delay_s = math.inf  # least of all that came: from a stamp to its reception [s]
         self._posed_s = -math.inf
         self._applied: list[tuple[float, bool]] = []
         self._applied_delay_s = math.inf
         self._plant = ("", "", "")
         self._air = not bearing
-        self._start: tuple[float, float] | None = None
+        self._start: tuple[float, ...] | None = None
         self.needs_poses = True
         wire = command_wire(robot)
         self._write = TwistWriter() if wire is VELOCITY_COMMAND else VectorWriter(robot.actuators.names)
@@ -145,7 +145,17 @@ class Session:
         times = rows[:, 0] + delay_s
         order = np.argsort(times, kind="stable")
         chosen = order[times[order] >= since_s]
-        return Track(times[chosen], rows[chosen, 1], rows[chosen, 2], np.unwrap(rows[chosen, 3]))
+        rates = rows[chosen, 4:7] if rows.shape[1] > 4 else None
+        return Track(times[chosen], rows[chosen, 1], rows[chosen, 2], np.unwrap(rows[chosen, 3]), rates)
+
+    def speed_ahead(self, over_s: float) -> float:
+        """Mean speed ahead of the last time, by the odometry [m/s]; 0 where poses alone come."""
+        track = self.track()
+        recent = track.time_s > track.time_s[-1] - over_s
+        if track.rates is None:
+            return 0.0
+        cos, sin = np.cos(track.heading[recent]), np.sin(track.heading[recent])
+        return float(np.mean(cos * track.rates[recent, 0] + sin * track.rates[recent, 1]))
 
     def make_safe(self) -> None:
         """Send the safe command several times; the driver makes safe once more at its own end."""
@@ -167,13 +177,13 @@ class Session:
             raise RunFailed(f"driver: {message}")
         with self._lock:
             age_s = time.monotonic() - self._posed_s
-            here = self._poses[-1][1:3] if self._poses else None
+            here = self._poses[-1] if self._poses else None
         if self.needs_poses and age_s > LOST_S:
             raise RunFailed(
                 f"no pose for {1e3 * age_s:.0f} ms (limit {1e3 * LOST_S:.0f} ms): is the robot in view?"
             )
         if here is not None and self._start is not None:
-            travel = math.dist(here, self._start)
+            travel = math.dist(here[1:3], self._start)
             if travel > MOST_TRAVEL_M:
                 raise RunFailed(
                     f"the robot is {travel:.2f} m from its start (limit {MOST_TRAVEL_M:g} m). Bring it back, "
@@ -203,7 +213,11 @@ class Session:
         pose = message.pose if isinstance(message, PoseStamped) else message.pose.pose
         q = pose.orientation
         heading = float(yaw_of(np.array([q.x, q.y, q.z, q.w])))
-        values = (pose.position.x, pose.position.y, heading)
+        values: tuple[float, ...] = (pose.position.x, pose.position.y, heading)
+        if isinstance(message, Odometry):
+            twist, cos, sin = message.twist.twist, math.cos(heading), math.sin(heading)
+            ahead, left = twist.linear.x, twist.linear.y
+            values += (cos * ahead - sin * left, sin * ahead + cos * left, twist.angular.z)
         if not all(map(math.isfinite, values)):
             return
         now_s, captured_s = time.monotonic(), 1e-9 * stamp_ns(message.header.stamp)

@@ -21,6 +21,9 @@ class Track:
     x: np.ndarray  # in the frame of the poses [m]
     y: np.ndarray  # [m]
     heading: np.ndarray  # without jumps [rad]
+    rates: np.ndarray | None = (
+        None  # of the three, shape (n, 3); None: poses alone are measured [m/s, m/s, rad/s]
+    )
 
 
 @dataclass(frozen=True)
@@ -65,18 +68,25 @@ def responses(track: Track, pulses: Sequence[Pulse], motion: Motion) -> list[Res
     Raises:
         ValueError: The track has too few poses for the fit.
     """
+    rates = track.rates if motion == "coasting" else None
     order = {"floating": 2, "coasting": 1, "rolling": 0}[motion]
     time_s = track.time_s - track.time_s[0]
     if len(time_s) < max(8, 2 * (order + 1 + len(pulses))):
         raise ValueError(f"{len(time_s)} poses are too few for {len(pulses)} pulses.")
-    values = np.stack((track.x, track.y, track.heading), axis=1)
+    poses = np.stack((track.x, track.y, track.heading), axis=1)
+    # Poses and rates count alike: a robot file's noise of both is of one size, in m and m/s, rad and rad/s.
+    values = poses if rates is None else np.concatenate((poses, rates))
+    powers = range(order + 1)
     fits = []
     for delay_s in DELAYS_S:
         steps = [
             _step(time_s, pulse.begin_s - track.time_s[0] + delay_s, pulse.end_s - pulse.begin_s, motion)
             for pulse in pulses
         ]
-        basis = np.stack([*(time_s**power for power in range(order + 1)), *steps], axis=1)
+        basis = np.stack([*(time_s**power for power in powers), *(step for step, _ in steps)], axis=1)
+        if rates is not None:
+            rising = (power * time_s ** max(0, power - 1) for power in powers)
+            basis = np.concatenate((basis, np.stack([*rising, *(rate for _, rate in steps)], axis=1)))
         solution = np.linalg.lstsq(basis, values, rcond=None)[0]
         square = np.mean((values - basis @ solution) ** 2, axis=0) + LEAST_SIGMA**2
         fits.append((float(np.log(square).sum()), delay_s, basis, solution, square))
@@ -96,11 +106,14 @@ def responses(track: Track, pulses: Sequence[Pulse], motion: Motion) -> list[Res
     return found
 
 
-def _step(time_s: np.ndarray, begin_s: float, lasts_s: float, motion: Motion) -> np.ndarray:
-    """Pose over time that a unit change makes: a ramp up to 1 for what rolls, its integral for what floats."""
+def _step(
+    time_s: np.ndarray, begin_s: float, lasts_s: float, motion: Motion
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pose over time that a unit change makes, and its rate: a ramp up to 1 for what rolls, else its integral."""
     passed = np.clip(time_s - begin_s, 0.0, None)
     lasts_s = max(lasts_s, 1e-3)
     within = np.minimum(passed, lasts_s)
+    ramp = within / lasts_s
     if motion == "rolling":
-        return np.asarray(within / lasts_s)
-    return np.asarray(0.5 * within**2 / lasts_s + (passed - within))
+        return ramp, ((passed > 0.0) & (passed < lasts_s)) / lasts_s
+    return 0.5 * within**2 / lasts_s + (passed - within), ramp
