@@ -22,7 +22,7 @@ from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
-from tests.ros.cli import start_fulmar
+from tests.ros.cli import fulmar, start_fulmar
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
 
 pytestmark = pytest.mark.real_time
@@ -217,6 +217,36 @@ def test_a_file_that_is_wrong_is_named(tmp_path, ros_domain: RosDomain, neighbou
     with pytest.raises(ConfigError, match=r"mine\.yaml"), goal_node(tmp_path, "kind: dances\ntitle: no\n"):
         pass
     assert rclpy.ok()
+
+
+def test_without_a_robot_or_a_controller_the_node_ends_if_it_shall_not_wait(
+    tmp_path, neighbour: Neighbour, ros_domain: RosDomain
+) -> None:
+    with (
+        goal_node(tmp_path, POSITIONS, give_up_s=0.5) as (_, codes),
+        goal_node(tmp_path, POSITIONS) as (_, waits),
+    ):
+        until(lambda: codes == [1])
+    with goal_node(tmp_path, POSITIONS, give_up_s=0.5) as (node, codes), streaming(neighbour):
+        assert "no controller subscribes" in node._without_subscriber()
+        until(lambda: codes == [1])
+    assert waits == []
+
+
+def test_with_robot_and_controller_the_node_goes_on(tmp_path, neighbour: Neighbour, ears: Ears) -> None:
+    with goal_node(tmp_path, POSITIONS, give_up_s=0.5, **PATIENT) as (node, codes), streaming(neighbour):
+        until(lambda: node._alone_checked)
+    assert codes == []
+
+
+def test_goals_for_a_robot_that_is_not_up_end_with_one_line(tmp_path, ros_domain: RosDomain) -> None:
+    words = ("goals", "lab_pose", "--robot", "floating_platform")
+    done = fulmar(*words, env=ros_domain.env, cwd=tmp_path, timeout_s=30.0)
+    assert done.returncode == 1
+    (line,) = [line for line in done.stderr.splitlines() if "ERROR" in line]
+    assert "nothing comes on /floating_platform/odom (after 5 s)" in line
+    assert "--wait" in line
+    assert "WARN" not in done.stderr
 
 
 @pytest.mark.slow

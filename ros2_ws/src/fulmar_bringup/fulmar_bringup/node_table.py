@@ -233,7 +233,9 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
     )
 
 
-def goals_spec(robot: str, goals: str, *, as_path: bool = False, control_hz: float = 10.0) -> NodeSpec:
+def goals_spec(
+    robot: str, goals: str, *, as_path: bool = False, control_hz: float = 10.0, give_up_s: float = 0.0
+) -> NodeSpec:
     """The node that tells goals from a file; no system has it by itself.
 
     Args:
@@ -241,6 +243,7 @@ def goals_spec(robot: str, goals: str, *, as_path: bool = False, control_hz: flo
         goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`.
         as_path: Tell all positions or poses at once.
         control_hz: Velocities come so often along a path [Hz].
+        give_up_s: Ends with exit code 1 where robot or controller are not there after so long; 0: waits [s].
     """
     parameters: dict[str, Parameter] = {
         "goals": goals,
@@ -248,6 +251,8 @@ def goals_spec(robot: str, goals: str, *, as_path: bool = False, control_hz: flo
         "control_hz": control_hz,
         "as_path": as_path,
     }
+    if give_up_s:
+        parameters["give_up_s"] = give_up_s
     return NodeSpec("goals", "fulmar_ros", "goal_node", "fulmar_ros.goal_node", f"/{robot}", parameters)
 
 

@@ -15,7 +15,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from fulmar_core.exit_codes import DONE
+from fulmar_core.exit_codes import DONE, FAILED
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import load_goals
 from fulmar_core.goal_sequence import STANDSTILL, goal_sequence
@@ -51,12 +51,16 @@ class GoalSettings:
     rate: float = 1.0  # seconds of the robot's own time a wall-clock second
     lockstep: bool = False  # tell the goal with each odometry: plant and controller wait for it
     stay: bool = False  # go on when everything is done, until told to stop
+    # End with exit code 1 when so long after the start there is no usable odometry, or no subscriber; 0: wait [s].
+    give_up_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values without meaning."""
         for name in ("control_hz", "input_timeout_s", "rate"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} = {getattr(self, name):g} must be finite and greater than 0.")
+        if not 0.0 <= self.give_up_s < math.inf:
+            raise ValueError(f"give_up_s = {self.give_up_s:g} must be finite and not negative.")
 
 
 class GoalNode(Node):
@@ -88,6 +92,7 @@ class GoalNode(Node):
         self._progress = self._sequence.progress
         self._said, self._said_at = "", 0.0
         self._problem, self._stale, self._over = "", False, False
+        self._alone_checked = False
         self._heard = self._settings.stay  # whoever starts all nodes together knows that somebody will listen
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
@@ -167,16 +172,41 @@ class GoalNode(Node):
 
     def _watch(self) -> None:
         """Notice silence, of the odometry and of whoever should listen; by a steady clock."""
+        if self._settings.give_up_s:
+            self._give_up_if_alone()
         with self._lock:
             now = time.monotonic()
             limit_s = self._timeout_s if self._newest else PATIENCE_S
             late = now - self._usable_at > limit_s and not self._settings.lockstep
+            late = late and not (
+                self._newest is None and self._settings.give_up_s
+            )  # that ends with a line of its own
             if late and not self._stale and not self._over:
                 self._stale = True
                 self._pause()
         if not self._heard and now - self._began > PATIENCE_S:
             self._heard = True  # told once
-            self._tell_who_listens()
+            if not self._settings.give_up_s and (alone := self._without_subscriber()):
+                self.get_logger().warning(alone)
+
+    def _give_up_if_alone(self) -> None:
+        """End if the robot or its controller is not there after the time for it."""
+        with self._lock:
+            if self._over or self._alone_checked or time.monotonic() - self._began < self._settings.give_up_s:
+                return
+            self._alone_checked = True
+            missing = self._without_subscriber()
+            if self._newest is None:
+                topic = self.resolve_topic_name(ODOMETRY.name)
+                missing = f"no usable odometry: {self._problem or f'nothing comes on {topic}'}"
+            if not missing:
+                return
+            self._over = True
+        self.get_logger().error(
+            f"{missing} (after {self._settings.give_up_s:g} s). Start the robot and its controller, or wait for them: "
+            "fulmar goals --wait"
+        )
+        self._request_exit(FAILED)
 
     def _pause(self) -> None:
         topic = self.resolve_topic_name(ODOMETRY.name)
@@ -195,14 +225,14 @@ class GoalNode(Node):
         self._tell(STANDSTILL, self._newest.stamp_ns)
         return True
 
-    def _tell_who_listens(self) -> None:
+    def _without_subscriber(self) -> str:
+        """Which topic has no subscriber, and which tasks have one; empty where there is one."""
         topic = self._publisher.topic_name
         listeners = {info.node_name for info in self.get_subscriptions_info_by_topic(topic)} - {"recorder"}
-        if not listeners:
-            tasks = [name for name in config_names("tasks") if _topic_of(name) == self._sequence.topic]
-            self.get_logger().warning(
-                f"nobody listens on {topic}; a controller does with one of the tasks {', '.join(tasks)}"
-            )
+        if listeners:
+            return ""
+        tasks = [name for name in config_names("tasks") if _topic_of(name) == self._sequence.topic]
+        return f"no controller subscribes {topic}; one does with one of the tasks {', '.join(tasks)}"
 
     def stop(self) -> None:
         """Last words: a robot that was told a velocity is told to stand still."""

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from typing import TypeVar
 
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.errors import ConfigError, did_you_mean
 
 T = TypeVar("T")
+QOS_OVERRIDES = (
+    "qos_overrides."  # rclpy declares these with the publisher or the subscription that they are for
+)
 
 
 def read_parameters(node: Node, cls: type[T]) -> T:
@@ -25,7 +29,7 @@ def read_parameters(node: Node, cls: type[T]) -> T:
         The filled dataclass.
 
     Raises:
-        ConfigError: A parameter has another type than its default, or the dataclass refuses it.
+        ConfigError: A parameter has another type than its default or is not known, or the dataclass refuses it.
     """
     assert dataclasses.is_dataclass(cls)
     values = {}
@@ -37,10 +41,27 @@ def read_parameters(node: Node, cls: type[T]) -> T:
         except ParameterException as error:
             value = _as_number(node, field.name, default, error)
         values[field.name] = tuple(value) if isinstance(field.default, tuple) else value
+    _refuse_unknown(node, values)
     try:
         return cls(**values)
     except ValueError as error:
         raise ConfigError(f"parameters of node '{node.get_name()}': {error}") from error
+
+
+def _refuse_unknown(node: Node, known: Iterable[str]) -> None:
+    """Refuse parameters that were given to a node and that it does not have: a misspelt one would change nothing.
+
+    What `-p` and files say for other nodes does not come here; what they say for all nodes does.
+
+    Raises:
+        ConfigError: There is one; rclpy's own, such as `use_sim_time`, are none.
+    """
+    for name in node._parameter_overrides:
+        if name not in known and not node.has_parameter(name) and not name.startswith(QOS_OVERRIDES):
+            raise ConfigError(
+                f"parameter '{name}' of node '{node.get_name()}' is not known.{did_you_mean(name, known)} In a file "
+                "for several nodes, write it below the name of the node that has it."
+            )
 
 
 def _as_number(node: Node, name: str, default: object, error: Exception) -> float:

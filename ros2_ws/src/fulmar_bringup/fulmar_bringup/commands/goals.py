@@ -9,6 +9,8 @@ import typer
 from fulmar_bringup.commands.list import list_names
 from fulmar_core.errors import ConfigError
 
+GIVE_UP_S = 5.0  # without odometry or without a subscriber of the goals
+
 
 def goals(
     name: Annotated[
@@ -30,6 +32,10 @@ def goals(
     control_hz: Annotated[
         float, typer.Option(metavar="HZ", min=0.01, help="Velocities come so often along a path.")
     ] = 10.0,
+    wait: Annotated[
+        bool,
+        typer.Option("--wait", help=f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default."),
+    ] = False,
 ) -> None:
     """Tell a running robot its goals, one after the other, until they are done or Ctrl-C.
 
@@ -43,6 +49,8 @@ def goals(
     and in another:
 
     fulmar goals lab_circle --robot floating_platform
+
+    Exit code: 0 done, or stopped by Ctrl-C, 1 there is no robot or no controller that takes such goals.
     """
     if name is None:
         list_names("goals")
@@ -59,7 +67,9 @@ def goals(
     file, the_robot = load_goals(name), load_robot(robot)
     goal_sequence(file, the_robot, as_path=as_path)  # whatever is wrong is said in one line
     check_pace(file, name, the_robot)
-    spec = goals_spec(robot, name, as_path=as_path, control_hz=control_hz)
+    spec = goals_spec(
+        robot, name, as_path=as_path, control_hz=control_hz, give_up_s=0.0 if wait else GIVE_UP_S
+    )
     from fulmar_ros.goal_node import GoalNode
     from fulmar_ros.runtime import run_node
 

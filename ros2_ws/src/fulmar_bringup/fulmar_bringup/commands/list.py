@@ -10,7 +10,7 @@ import typer
 from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import console, output, print_json
 from fulmar_core.errors import FulmarError, UnknownNameError
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.exit_codes import FAILED
 from fulmar_core.paths import config_names
 
 FAMILIES = (
@@ -53,7 +53,8 @@ def list_names(
         _show(found)
     for error in errors:
         console.print(f"{error['family']}: {error['error']}", markup=False, soft_wrap=True)
-    raise typer.Exit(FAILED if errors else DONE)
+    if errors:
+        raise typer.Exit(FAILED)
 
 
 def _show(found: dict[str, dict[str, str]]) -> None:
