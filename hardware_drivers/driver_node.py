@@ -104,7 +104,7 @@ class DriverNode(PlantNode):
         if isinstance(driver, ThrustTopic):
             return TopicDriver(robot, thrust_sender(self, driver.topic))
         if isinstance(driver, ValveTopic):
-            publish = valve_sender(self, driver.topic)
+            publish = valve_sender(self, driver.topic, driver.message)
 
             def send(valves: np.ndarray, bearing: bool) -> None:
                 publish(to_message(valves, bearing=bearing, order=driver.order))

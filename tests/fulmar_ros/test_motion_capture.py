@@ -44,8 +44,9 @@ def test_a_pose_moves_on_at_constant_velocity_and_turn_rate():
 
 
 @pytest.mark.parametrize(
-    ("rate_hz", "lockstep", "paced"), [(0.0, False, False), (50.0, False, False), (200.0, False, True), (200.0, True, False)]
-)  # fmt: skip
+    ("rate_hz", "lockstep", "paced"),
+    [(0.0, False, False), (50.0, False, False), (200.0, False, True), (200.0, True, False)],
+)
 def test_captures_faster_than_the_ticks_get_a_thread_of_their_own(rate_hz, lockstep, paced):
     robot = load_robot("floating_platform")  # ticks at 50 Hz
     make = capture_maker(robot, rate_hz=rate_hz, late_s=0.0, lockstep=lockstep)
