@@ -72,3 +72,8 @@ def test_paced_captures_come_between_measurements_and_stop_with_them():
     assert (np.diff(stamps) > 0).all()
     assert stamps[-1] == 1_020 * MS
     assert places == pytest.approx((stamps - 1_000 * MS) / 1e9)
+    enough.clear()
+    capture.see(planar_state(2.0, 0.0, 0.0), 1_040 * MS)  # a plant that goes on after a pause
+    assert enough.wait(5.0)
+    capture.close()
+    assert poses[-1][1] == 2.0

@@ -68,7 +68,8 @@ def test_a_run_with_a_remapped_motion_capture_estimates_from_it_and_records_it(
             executor.spin_once(timeout_sec=0.05)
         output, errors = run.communicate(timeout=20.0)
     finally:
-        run.kill()
+        if run.poll() is None:
+            run.kill()
         executor.shutdown()
         node.destroy_node()
         rclpy.shutdown(context=context)
