@@ -1,0 +1,40 @@
+"""`fulmar import`: a stranger's file in, an accepted bundle out, or one line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+pytest.importorskip("torch")
+
+from tests.fulmar_bringup.command_line import complaint
+from tests.training import foreign
+
+ASKED = ("--robot", "turtlebot2", "--task", "go_to_position", "--out")
+
+
+def test_an_imported_checkpoint_is_a_bundle_that_is_accepted(fulmar, tmp_path):
+    path = foreign.save_skrl(tmp_path / "agent.pt", foreign.network(8, 2))
+    code, out, _ = fulmar("import", path, *ASKED, tmp_path / "out", "--activation", "elu")
+    assert code == 0
+    assert "turtlebot2 · go_to_position · 10 Hz · skrl" in out
+    code, out, _ = fulmar("bundle", "check", tmp_path / "out", "--json")
+    assert code == 0
+    assert json.loads(out)["accepted"]
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ((), "Give --activation, one of elu"),
+        (("--activation", "elu", "--hz", "7"), "control_hz = 7 must divide the physics rate"),
+        (("--activation", "elu", "--format", "rl_game"), "--format rl_game is unknown"),
+        (("--activation", "elu", "--format", "rl_games"), "is a checkpoint of skrl, not of rl_games"),
+        (("--format", "onnx"), "is no ONNX model"),
+    ],
+)
+def test_a_mistake_of_an_import_gets_one_line_and_no_bundle(fulmar, more, told, tmp_path):
+    path = foreign.save_skrl(tmp_path / "agent.pt", foreign.network(8, 2))
+    assert told in complaint(fulmar("import", path, *ASKED, tmp_path / "out", *more))
+    assert not (tmp_path / "out").exists()
