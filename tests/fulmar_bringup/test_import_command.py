@@ -24,6 +24,14 @@ def test_an_imported_checkpoint_is_a_bundle_that_is_accepted(fulmar, tmp_path):
     assert json.loads(out)["accepted"]
 
 
+def test_an_import_for_a_platform_names_the_nozzles_that_its_actions_open(fulmar, tmp_path):
+    path = foreign.save_rl_games(tmp_path / "last.pth", foreign.network(6 + 8, 16), valves=8)
+    asked = ("--robot", "floating_platform", "--task", "go_to_position", "--activation", "tanh")
+    code, _, err = fulmar("import", path, *asked, "--out", tmp_path / "out")
+    assert code == 0
+    assert "its actions open thruster_1, thruster_2" in err
+
+
 @pytest.mark.parametrize(
     ("more", "told"),
     [
