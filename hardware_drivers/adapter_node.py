@@ -13,7 +13,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from std_msgs.msg import Float32MultiArray
 from std_srvs.srv import SetBool
 
 from fulmar_core.errors import ConfigError
@@ -22,6 +22,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.air_bearing import SERVICE
 from fulmar_ros.convert import TwistWriter, VectorWriter
+from fulmar_ros.foreign_topics import VALVE_MESSAGES, valve_values
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -81,7 +82,7 @@ class AdapterNode(Node):
 
     def _ear(self, driver: ValveTopic | VelocityTopic | ThrustTopic) -> tuple[type, Callable[[Any], None]]:
         if isinstance(driver, ValveTopic):
-            return Int16MultiArray, self._valves
+            return VALVE_MESSAGES[driver.message], self._valves
         if isinstance(driver, ThrustTopic):
             return Float32MultiArray, lambda message: self._pass_on(np.array(message.data, dtype=float))
         if driver.stamped:
@@ -102,8 +103,8 @@ class AdapterNode(Node):
     def _velocity(self, twist: Twist) -> None:
         self._pass_on(np.array([twist.linear.x, twist.angular.z]))
 
-    def _valves(self, message: Int16MultiArray) -> None:
-        wanted = from_message(message.data.tolist(), self._order)
+    def _valves(self, message: Any) -> None:
+        wanted = from_message(valve_values(message), self._order)
         if wanted is None:
             self._refuse(f"{len(message.data)} values, not {len(self._order) + 1} zeros and ones")
             return

@@ -127,7 +127,7 @@ class DriverNode(PlantNode):
                 lambda command: send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command)))),
             )
         if isinstance(driver, ValveTopic):
-            publish = valve_sender(self, driver.topic)
+            publish = valve_sender(self, driver.topic, driver.message)
 
             def send(valves: np.ndarray, bearing: bool) -> None:
                 publish(to_message(valves, bearing=bearing, order=driver.order))

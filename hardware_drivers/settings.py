@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from fulmar_core.config import load_config
+from fulmar_core.config import Named, load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Actuators, load_robot
+from hardware_drivers.valve_orders import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
+
+ValveMessage = Literal["int16", "byte", "uint8"]
+ValveOrder = Annotated[tuple[int, ...], Named(VALVE_ORDERS)]  # a list, or the name of one
 
 # A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
 LONGEST_LINGER_S = 2.0
@@ -48,7 +52,7 @@ class GpioValves:
     kind: Literal["gpio_valves"]
     port: str  # the chip, such as /dev/gpiochip0
     lines: tuple[str, ...]  # names or numbers, in the order of the wiring
-    order: tuple[int, ...]  # which thruster, counted from 0, each of these lines opens
+    order: ValveOrder  # which thruster, counted from 0, each of these lines opens
     bearing: Bearing
     active_low: bool = True
     min_on_s: float = 0.0  # an opened valve stays open so long, except when all must close [s]
@@ -66,11 +70,14 @@ class GpioValves:
 
 @dataclass(frozen=True)
 class ValveTopic:
-    """The SnT valve node: `std_msgs/Int16MultiArray` of nine, the bearing first."""
+    """A valve node of another stack: an array of zeros and ones, the bearing first."""
 
     kind: Literal["valve_topic"]
     topic: str
-    order: tuple[int, ...]  # which thruster, counted from 0, each entry after the first opens
+    order: ValveOrder  # which thruster, counted from 0, each entry after the first opens
+    # Int16MultiArray (FPROS, RoboRAN-deploy-to-robot), ByteMultiArray (RANS ros/ros_node.py, and the simulated platform
+    # of RoboRAN-deploy-to-robot) or UInt8MultiArray, all of std_msgs.
+    message: ValveMessage = "int16"
     bearing_on_at_start: bool = True
     linger_s: float = 1.0  # it carries the platform so long after the last valve has closed for good [s]
 

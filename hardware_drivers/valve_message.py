@@ -1,4 +1,4 @@
-"""The nine numbers that the SnT valve node takes: the bearing, then eight valves in the order of their wiring."""
+"""The nine numbers that a valve node takes: the bearing, then eight valves in the order of their wiring."""
 
 from __future__ import annotations
 

@@ -26,9 +26,10 @@ RL_GAMES_EPSILON = 1e-5  # rl_games/algos_torch/running_mean_std.py, under the r
 SKRL_EPSILON = 1e-8  # skrl/resources/preprocessors/torch/running_standard_scaler.py, beside the root
 NORMALISED_LIMIT = 5.0  # both of them cut there
 # rl_games saves the mean reward as a scalar of NumPy. These types build numbers and nothing else.
+_SCALAR = np.float32(0.0).__reduce__()[0]  # numpy's own function, under the names of NumPy 1 and 2
 NUMBERS: list[Any] = [
-    (np._core.multiarray.scalar, "numpy.core.multiarray.scalar"),  # type: ignore[attr-defined]
-    (np._core.multiarray.scalar, "numpy._core.multiarray.scalar"),  # type: ignore[attr-defined]
+    (_SCALAR, "numpy.core.multiarray.scalar"),
+    (_SCALAR, "numpy._core.multiarray.scalar"),
     np.dtype,
     np.dtypes.Float32DType,
     np.dtypes.Float64DType,

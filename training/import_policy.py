@@ -68,7 +68,10 @@ def import_policy(
         raise ConfigError(f"{out}: holds a bundle already. Give another folder, or remove it first.")
     robot, task = load_robot(robot_name), load_task(task_name)
     rate = control_hz or robot.timing.control_hz
-    robot.timing.substeps(rate)
+    try:
+        robot.timing.substeps(rate)
+    except ValueError as error:
+        raise ConfigError(f"robot '{robot.name}': {error}") from error
     try:
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:

@@ -30,7 +30,7 @@ PLAN = RunPlan(
     goals="circle",
     guards=Guards(estimator="mocap_imu", estop=True),
     mocap_hz=200.0,
-    remappings={"mocap/pose": NAME},
+    remappings=(("mocap/pose", NAME),),
 )
 
 
@@ -48,7 +48,7 @@ def test_every_node_of_a_run_gets_the_same_names():
 
 
 def test_the_bag_names_the_new_names():
-    assert f'"remappings": {{"mocap/pose": "{NAME}"}}' in run_info(PLAN)
+    assert f'"remappings": [["mocap/pose", "{NAME}"]]' in run_info(PLAN)
 
 
 def test_the_plant_gets_the_rate_of_the_motion_capture():

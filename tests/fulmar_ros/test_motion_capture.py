@@ -44,8 +44,9 @@ def test_a_pose_moves_on_at_constant_velocity_and_turn_rate():
 
 
 @pytest.mark.parametrize(
-    ("rate_hz", "lockstep", "paced"), [(0.0, False, False), (50.0, False, False), (200.0, False, True), (200.0, True, False)]
-)  # fmt: skip
+    ("rate_hz", "lockstep", "paced"),
+    [(0.0, False, False), (50.0, False, False), (200.0, False, True), (200.0, True, False)],
+)
 def test_captures_faster_than_the_ticks_get_a_thread_of_their_own(rate_hz, lockstep, paced):
     robot = load_robot("floating_platform")  # ticks at 50 Hz
     make = capture_maker(robot, rate_hz=rate_hz, late_s=0.0, lockstep=lockstep)
@@ -71,3 +72,8 @@ def test_paced_captures_come_between_measurements_and_stop_with_them():
     assert (np.diff(stamps) > 0).all()
     assert stamps[-1] == 1_020 * MS
     assert places == pytest.approx((stamps - 1_000 * MS) / 1e9)
+    enough.clear()
+    capture.see(planar_state(2.0, 0.0, 0.0), 1_040 * MS)  # a plant that goes on after a pause
+    assert enough.wait(5.0)
+    capture.close()
+    assert poses[-1][1] == 2.0

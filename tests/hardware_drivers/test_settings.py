@@ -105,3 +105,36 @@ def test_a_wiring_that_leaves_a_side_out_is_refused(tmp_path, wiring):
     path.write_text(f"{TURTLEBOT}  wiring: {wiring}\n")
     with pytest.raises(ConfigError, match="must name left and right once each"):
         load_hardware(str(path))
+
+
+VALVES = "title: t\nrobot: floating_platform\ndriver: {kind: valve_topic, topic: /v, order: ORDER, message: MESSAGE}\n"
+
+
+@pytest.mark.parametrize(
+    ("order", "thrusters"),
+    [
+        ("roboran", (5, 1, 3, 7, 0, 4, 6, 2)),
+        ("rans", (2, 5, 4, 7, 6, 1, 0, 3)),
+        ("[7, 6, 5, 4, 3, 2, 1, 0]", (7, 6, 5, 4, 3, 2, 1, 0)),
+    ],
+)
+def test_an_order_of_valves_is_a_name_or_a_list(tmp_path, order, thrusters):
+    path = tmp_path / "mine.yaml"
+    path.write_text(VALVES.replace("ORDER", order).replace("MESSAGE", "byte"))
+    driver = load_hardware(str(path)).driver
+    assert (driver.order, driver.message) == (thrusters, "byte")
+
+
+@pytest.mark.parametrize(
+    ("order", "message", "says"),
+    [
+        ("robran", "int16", r":3: 'order' = 'robran' is not known. Did you mean 'roboran'\?"),
+        ("rans", "int8", r"'message' = 'int8' is not known. Did you mean 'uint8'\?"),
+        ("[0, 0, 1, 2, 3, 4, 5, 6]", "int16", "'order' must hold each of 0 to 7 once"),
+    ],
+)
+def test_an_unknown_order_or_message_is_refused(tmp_path, order, message, says):
+    path = tmp_path / "mine.yaml"
+    path.write_text(VALVES.replace("ORDER", order).replace("MESSAGE", message))
+    with pytest.raises(ConfigError, match=says):
+        load_hardware(str(path))

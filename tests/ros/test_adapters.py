@@ -6,8 +6,9 @@ import time
 
 import pytest
 from geometry_msgs.msg import Twist
-from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from std_msgs.msg import ByteMultiArray, Float32MultiArray, Int16MultiArray, UInt8MultiArray
 
+from fulmar_ros.foreign_topics import valve_values
 from fulmar_ros.runtime import spinning
 from hardware_drivers.adapter_node import AdapterNode
 from hardware_drivers.driver_node import DriverNode
@@ -75,6 +76,29 @@ def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> N
             )
         )
         until(lambda: not any(messages[-1].data))
+        node.stop()
+
+
+@pytest.mark.parametrize(("message", "kind"), [("byte", ByteMultiArray), ("uint8", UInt8MultiArray)])
+def test_byte_arrays_with_a_named_order_go_both_ways(neighbour, heard, tmp_path, message, kind) -> None:
+    """Ours to their valve node, and their controller to ours: entry 1 of RANS's order is thruster 3."""
+    files = []
+    for name in ("out", "in"):
+        files.append(tmp_path / f"{name}.yaml")
+        files[-1].write_text(
+            "title: t\nrobot: floating_platform\n"
+            f"driver: {{kind: valve_topic, topic: /valves/{name}, order: rans, message: {message}}}\n"
+        )
+    messages = heard(kind, "/valves/out")
+    node, spin = running(DriverNode, "floating_platform", f"hardware:={files[0]}")
+    _adapter, spin_adapter = running(AdapterNode, "floating_platform", f"hardware:={files[1]}")
+    publisher = neighbour.node.create_publisher(kind, "/valves/in", 1)
+    data = [1, 1] + [0] * 7
+    theirs = kind(data=[bytes([value]) for value in data] if kind is ByteMultiArray else data)
+    with spin, spin_adapter:
+        # Their controller drives ours through the adapter, and our driver passes the same on to their valve node.
+        until(lambda: publisher.publish(theirs) or any(valve_values(m) == data for m in messages))
+        assert any(c.tolist() == [0, 0, 1, 0, 0, 0, 0, 0] for c in neighbour.commands)
         node.stop()
 
 

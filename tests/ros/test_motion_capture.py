@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import qos_profile_sensor_data
 
-from fulmar_bringup.bags.contents import read_bag
+from fulmar_bringup.bags.contents import open_bag
 from fulmar_core.topics import MOCAP, ODOMETRY
 from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.plant_node import PlantNode
@@ -68,7 +68,8 @@ def test_a_run_with_a_remapped_motion_capture_estimates_from_it_and_records_it(
             executor.spin_once(timeout_sec=0.05)
         output, errors = run.communicate(timeout=20.0)
     finally:
-        run.kill()
+        if run.poll() is None:
+            run.kill()
         executor.shutdown()
         node.destroy_node()
         rclpy.shutdown(context=context)
@@ -76,7 +77,7 @@ def test_a_run_with_a_remapped_motion_capture_estimates_from_it_and_records_it(
     assert summary["failure"] is None, errors
     assert summary["steps"] > 50
     assert len(poses) > 100
-    counts = {name: len(topic) for name, topic in read_bag(tmp_path / "bag").topics.items()}
+    counts = {name: len(topic) for name, topic in open_bag(tmp_path / "bag").topics.items()}
     assert counts["/floating_platform/mocap/pose"] > 100
     assert counts["/floating_platform/odom"] > 50
     assert NAME not in counts

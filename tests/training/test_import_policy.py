@@ -23,9 +23,8 @@ from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
 from sim_nodes.mujoco_backend import MujocoBackend
+from tests.training import foreign
 from training.import_policy import import_policy
-
-from . import foreign
 
 WORLDS = 20
 TOLERANCE = 1e-5

@@ -72,7 +72,7 @@ class RunPlan:
     copies: int = 1  # of each command on the wire
     controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
     mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
-    remappings: dict[str, str] = field(default_factory=dict)  # topics under other names, for every node
+    remappings: tuple[tuple[str, str], ...] = ()  # topics and their other names, for every node
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:

@@ -182,7 +182,7 @@ def plan_run(
         copies=copies,
         controller_network=controller_network,
         mocap_hz=_checked_mocap(mocap_hz, hardware, emulate=emulate, lockstep=lockstep),
-        remappings=read_remappings(remap),
+        remappings=tuple(read_remappings(remap).items()),
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)

@@ -2,7 +2,7 @@
 
 Knows types and files, not what a robot or a task is. The supported field types are
 bool, int, float, str, `X | None`, `Literal`, `tuple[X, ...]`, `tuple[X, Y, Z]`, `dict[str, X]`,
-nested dataclasses, and unions of dataclasses told apart by a field `kind`.
+nested dataclasses, unions of dataclasses told apart by a field `kind`, and `Annotated[X, Named({...})]`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 import re
 import types
 import typing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,6 +23,13 @@ from fulmar_core.yaml_text import YamlError, compose, plain
 
 T = TypeVar("T")
 MOST_BYTES, MOST_VALUES = 1_000_000, 100_000  # of a file; anything beyond is no configuration
+
+
+@dataclasses.dataclass(frozen=True)
+class Named:
+    """Values of a field that a file may give by name: `Annotated[X, Named({"name": value})]`."""
+
+    values: Mapping[str, Any]
 
 
 def load_config(cls: type[T], path: Path) -> T:
@@ -100,6 +107,12 @@ class _Builder:
         if self._built > MOST_VALUES:  # aliases let a small file stand for billions
             self.fail(node, f"the file stands for more than {MOST_VALUES} values.")
         origin = typing.get_origin(kind)
+        if origin is typing.Annotated:
+            kind, *notes = typing.get_args(kind)
+            names = [note.values for note in notes if isinstance(note, Named)]
+            if names and isinstance(node, ScalarNode):
+                return names[0][self._choice(tuple(names[0]), self._scalar(node, where), node, where)]
+            return self.build(kind, node, where)
         if dataclasses.is_dataclass(kind) and isinstance(kind, type):
             return self._dataclass(kind, node, where)
         if origin is tuple:
@@ -127,7 +140,7 @@ class _Builder:
         return [(str(key.value), key, value) for key, value in node.value]
 
     def _dataclass(self, cls: type, node: Node, where: str) -> Any:
-        hints = typing.get_type_hints(cls)
+        hints = typing.get_type_hints(cls, include_extras=True)
         fields = {field.name: field for field in dataclasses.fields(cls) if field.init}
         values: dict[str, Any] = {}
         for name, key_node, value in self._pairs(node, where):

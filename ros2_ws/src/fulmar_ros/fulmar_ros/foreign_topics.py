@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from std_msgs.msg import ByteMultiArray, Float32MultiArray, Int16MultiArray, UInt8MultiArray
 
 DEPTH = 1
 RELIABLE = QoSProfile(depth=DEPTH)  # matches subscribers that ask for best effort, too
 
+# Arrays of zeros and ones for valves, by the names that hardware files use.
+VALVE_MESSAGES: dict[str, type] = {
+    "int16": Int16MultiArray,
+    "byte": ByteMultiArray,
+    "uint8": UInt8MultiArray,
+}
 Send = Callable[[np.ndarray], None]
 
 
@@ -40,7 +47,15 @@ def thrust_sender(node: Node, topic: str) -> Send:
     return lambda command: publisher.publish(Float32MultiArray(data=[float(share) for share in command]))
 
 
-def valve_sender(node: Node, topic: str) -> Callable[[Sequence[int]], None]:
-    """Publishes zeros and ones as Int16MultiArray."""
-    publisher = node.create_publisher(Int16MultiArray, topic, RELIABLE)
-    return lambda values: publisher.publish(Int16MultiArray(data=list(values)))
+def valve_sender(node: Node, topic: str, message: str = "int16") -> Callable[[Sequence[int]], None]:
+    """Publishes zeros and ones as a message of `VALVE_MESSAGES`."""
+    kind = VALVE_MESSAGES[message]
+    publisher = node.create_publisher(kind, topic, RELIABLE)
+    if kind is ByteMultiArray:
+        return lambda values: publisher.publish(kind(data=[bytes([value]) for value in values]))
+    return lambda values: publisher.publish(kind(data=list(values)))
+
+
+def valve_values(message: Any) -> list[int]:
+    """The numbers in a message of `VALVE_MESSAGES`; rclpy gives each byte of a ByteMultiArray as `bytes`."""
+    return [value[0] if isinstance(value, bytes) else int(value) for value in message.data]

@@ -27,7 +27,7 @@ class PacedCapture:
     def __init__(
         self, publish: Publish, *, rate_hz: float, late_s: float = 0.0, rate: float = 1.0, longest_s: float
     ) -> None:
-        """Prepare; the thread starts with the first measurement.
+        """Prepare; a thread starts with the first measurement.
 
         Args:
             publish: Called by the thread.
@@ -43,7 +43,7 @@ class PacedCapture:
         self._lock = threading.Lock()
         self._newest: tuple[RigidBodyState, int, int] | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="mocap", daemon=True)
+        self._thread: threading.Thread | None = None
 
     def see(self, state: RigidBodyState, time_ns: int) -> list[tuple[int, RigidBodyState]]:
         """Note a measurement.
@@ -57,15 +57,18 @@ class PacedCapture:
         """
         with self._lock:
             self._newest = (state, time_ns, time.monotonic_ns())
-        if self._thread.ident is None:
+        if self._thread is None:
+            self._stop.clear()
+            self._thread = threading.Thread(target=self._run, name="mocap", daemon=True)
             self._thread.start()
         return []
 
     def close(self) -> None:
-        """End the thread."""
+        """End the thread; the next measurement starts another."""
         self._stop.set()
-        if self._thread.ident is not None:
+        if self._thread is not None:
             self._thread.join()
+            self._thread = None
 
     def _run(self) -> None:
         take_priority(PLANT_PRIORITY)

@@ -230,6 +230,8 @@ class PlantNode(LifecycleNode):
         if self._thread is not None:
             self._thread.join(PATIENCE_S)
             self._thread = None
+        if self._backend is not None:
+            self.wires.end_capture()
 
     def _dismantle(self) -> None:
         self.stop()

@@ -142,8 +142,7 @@ class PlantWires:
 
     def destroy(self, node: LifecycleNode) -> None:
         """Give every endpoint back."""
-        if self._mocap is not None:
-            self._mocap.close()
+        self.end_capture()
         for subscription in (self._commands, *self._operator):
             node.destroy_subscription(subscription)
         node.destroy_service(self._give_back)
@@ -212,6 +211,11 @@ class PlantWires:
         """Publish what the actuators are doing from this time on, if somebody listens."""
         if self._state.get_subscription_count():
             self._publish(self._state, self._write_state.write(command, time_ns))
+
+    def end_capture(self) -> None:
+        """Publish no pose any more before the next measurement."""
+        if self._mocap is not None:
+            self._mocap.close()
 
     def expect_no_answers(self) -> None:
         """Take and time no command any more that answers what was sent so far."""

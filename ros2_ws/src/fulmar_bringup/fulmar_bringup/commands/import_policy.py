@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import output
+from fulmar_bringup.console import console, output
 
 
 def import_policy(
@@ -73,3 +73,10 @@ def import_policy(
         markup=False,
         soft_wrap=True,
     )
+    if passport.action == "on_off":
+        console.print(
+            f"its actions open {', '.join(passport.actuator_names)}, in this order. RoboRAN's FloatingPlatform numbers "
+            "other nozzles than RANS's platform: give the robot whose nozzles it was trained with.",
+            markup=False,
+            soft_wrap=True,
+        )
