@@ -54,7 +54,7 @@ def test_a_truncated_bag_is_read_up_to_the_cut_and_says_so(copy, share):
     assert done.exit_code == 0 or "damage:" in done.stdout
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 2**32 - 1), flips=st.integers(1, 12))
 @example(seed=114314, flips=11)  # ends an area where it begins
 def test_flipped_bits_end_in_figures_or_in_one_clear_line(tmp_path_factory, seed, flips):

@@ -214,6 +214,7 @@ def test_a_planner_whose_policy_is_not_there_is_missing(tmp_path):
     assert pair.missing and (pair.kind, pair.reason) == ("planner", "no policy is shipped")
 
 
+@pytest.mark.slow
 def test_a_planner_is_judged_over_the_episode_that_it_plans_for(tmp_path, monkeypatch):
     unit = unit_of(
         tmp_path, controller="planner", robot="kingfisher", task="go_through_positions", episodes=3

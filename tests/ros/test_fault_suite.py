@@ -21,7 +21,7 @@ from tests.ros.cli import fulmar, json_of
 pytestmark = pytest.mark.real_time
 
 ROBOTS = ("floating_platform", "turtlebot2", "kingfisher")
-QUICK = {"floating_platform": "controller_killed", "kingfisher": "odometry_not_a_number"}
+QUICK = {"floating_platform": "controller_killed"}
 THROUGH_THE_COMMAND = ("turtlebot2", "bundle_refused")
 KEYS = [
     "name",

@@ -33,7 +33,7 @@ from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 pytestmark = pytest.mark.real_time
 
 
-def test_a_stopped_recorder_has_kept_every_message(record, node):
+def test_a_stopped_recorder_has_kept_every_message_and_leaves_no_process(record, node):
     early = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
     early.publish(String(data="early"))
     latched = node.create_publisher(PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE))
@@ -60,14 +60,19 @@ def test_a_stopped_recorder_has_kept_every_message(record, node):
         # The latched one before it was there and the one after, which came twice, and that of a default publisher.
         assert counts[f"{ROBOT}/{GOAL_POSE.name}"] == 3
         assert {c.topic for c in reader.connections} >= {f"{ROBOT}/odom", "/clock", "/diagnostics"}
+    check_provenance(recorder.file())
+    with pytest.raises(ProcessLookupError):
+        os.kill(recorder.process.pid, 0)
+    assert not [thread for thread in threading.enumerate() if thread.name == "bag"]
 
 
-def test_sigterm_closes_the_bag_too(record, node):
-    recorder = record()
-    recorder.wait_until_recording()
-    publish(odometry(node), range(20))
-    assert recorder.end(signal.SIGTERM)[0] == 0
-    assert recorder.stamps_by_rosbags() == list(range(20))
+def check_provenance(file):
+    """A bag carries the code and the packages that made it."""
+    with file.open("rb") as stream:
+        files = {file.name: file.data for file in make_reader(stream).iter_attachments()}
+    told = json.loads(files["provenance.json"])
+    assert told["packages"]["numpy"] == version("numpy")
+    assert set(told) == {"fulmar_version", "git_revision", "python", "platform", "packages"}
 
 
 def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
@@ -86,7 +91,7 @@ def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
     assert lost_s < 1.3, "half a second between flushes, the rest for a busy machine"
 
 
-def test_a_paused_recorder_goes_on_where_it_was(record, node):
+def test_a_paused_recorder_goes_on_where_it_was_and_sigterm_closes_its_bag(record, node):
     recorder = record()
     recorder.wait_until_recording()
     publisher = odometry(node)
@@ -95,7 +100,7 @@ def test_a_paused_recorder_goes_on_where_it_was(record, node):
     time.sleep(0.5)
     recorder.process.send_signal(signal.SIGCONT)
     publish(publisher, range(50, 100))
-    assert recorder.end(signal.SIGINT)[0] == 0
+    assert recorder.end(signal.SIGTERM)[0] == 0
     assert recorder.stamps_by_rosbags() == list(range(100))
 
 
@@ -236,17 +241,6 @@ def test_a_recorder_says_once_a_second_what_became_of_the_messages(record, node,
     assert said[0].status[0].name == "floating_platform: recorder"
 
 
-def test_a_bag_carries_the_code_and_the_packages_that_made_it(record):
-    recorder = record()
-    recorder.wait_until_recording()
-    assert recorder.end(signal.SIGINT)[0] == 0
-    with recorder.file().open("rb") as stream:
-        files = {file.name: file.data for file in make_reader(stream).iter_attachments()}
-    told = json.loads(files["provenance.json"])
-    assert told["packages"]["numpy"] == version("numpy")
-    assert set(told) == {"fulmar_version", "git_revision", "python", "platform", "packages"}
-
-
 def test_a_recorder_splits_by_time(record, node):
     recorder = record("split_s:=0.5")
     recorder.wait_until_recording()
@@ -262,12 +256,3 @@ def test_an_unknown_mode_is_refused_with_one_line(record):
     assert recorder.process.returncode == 2
     assert "rnig" in err
     assert err.count("\n") == 1
-
-
-def test_no_process_or_thread_is_left_behind(record):
-    recorder = record()
-    recorder.wait_until_recording()
-    assert recorder.end(signal.SIGINT)[0] == 0
-    with pytest.raises(ProcessLookupError):
-        os.kill(recorder.process.pid, 0)
-    assert not [thread for thread in threading.enumerate() if thread.name == "bag"]

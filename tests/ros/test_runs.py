@@ -45,7 +45,7 @@ def command_bytes(bag: Path) -> list[bytes]:
 def test_a_lockstep_run_reaches_its_goal_and_says_so_in_json(
     controller: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
-    """The very command of the README, with the figures that outside checks read."""
+    """The very command of the README, with the figures that outside checks read; a policy's again, byte for byte."""
     asked = (
         "floating_platform",
         "--task",
@@ -66,27 +66,11 @@ def test_a_lockstep_run_reaches_its_goal_and_says_so_in_json(
     assert summary["steps"] == 300
     assert summary["duration_s"] == pytest.approx(60.0)
     assert (tmp_path / "bag" / "metadata.yaml").is_file()
-
-
-def test_two_lockstep_runs_with_one_seed_give_the_same_command_bytes(
-    ros_domain: RosDomain, tmp_path: Path
-) -> None:
-    """Lock step leaves nothing to chance."""
-    for name in ("one", "two"):
-        asked = (
-            "floating_platform",
-            "--controller",
-            "policy",
-            "--lockstep",
-            "--seed",
-            "7",
-            "--duration",
-            "10",
-        )
-        fulmar("run", *asked, "--record", name, env=ros_domain.env, cwd=tmp_path)
-    one, two = command_bytes(tmp_path / "one"), command_bytes(tmp_path / "two")
-    assert len(one) >= 50
-    assert one == two
+    if controller == "policy":
+        fulmar("run", *asked, "--control-hz", "5", "--record", "again", env=ros_domain.env, cwd=tmp_path)
+        commands = command_bytes(tmp_path / "bag")
+        assert len(commands) >= 300
+        assert commands == command_bytes(tmp_path / "again")
 
 
 def test_the_mock_backend_runs_without_mujoco(ros_domain: RosDomain, tmp_path: Path) -> None:
@@ -101,13 +85,6 @@ def test_the_mock_backend_runs_without_mujoco(ros_domain: RosDomain, tmp_path: P
         "--control-hz",
         "5",
     )
-    done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-
-
-def test_go_to_position_runs_on_its_own_goal_topic(ros_domain: RosDomain, tmp_path: Path) -> None:
-    """`goal_point` instead of `goal_pose`."""
-    asked = ("floating_platform", "--task", "go_to_position", "--controller", "lqr", "--lockstep")
     done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 

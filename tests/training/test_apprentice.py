@@ -54,8 +54,8 @@ def error(learner, env):
 
 
 def test_lessons_bring_a_policy_near_to_what_the_lqr_does(settings):
-    many = replace(settings.algorithm, lessons=120)
-    assert error(*learned(replace(settings, algorithm=many), 120)) < 0.3 * error(*learned(settings, 1))
+    many = replace(settings.algorithm, lessons=60)
+    assert error(*learned(replace(settings, algorithm=many), 60)) < 0.3 * error(*learned(settings, 1))
 
 
 def test_after_its_lessons_it_learns_as_any_other(settings, monkeypatch):

@@ -45,10 +45,14 @@ def cut(settings):
     return replace(settings, algorithm=ppo, worlds=32, evaluate_every_s=1e6)
 
 
-@pytest.fixture
-def quick(monkeypatch):
+def cut_short(monkeypatch):
     load = specialist.load_training_settings
     monkeypatch.setattr(specialist, "load_training_settings", lambda *given: cut(load(*given)))
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    cut_short(monkeypatch)
 
 
 def job_in(folder, settings, **limits):
@@ -60,10 +64,20 @@ def learned(folder, settings, **limits):
     return learn(job_in(folder, settings, **limits), ProgressFile(folder / "progress.json"))
 
 
-@pytest.fixture
-def run(tmp_path, settings, quick):
-    learned(tmp_path / "run", settings, updates=6)
-    return tmp_path / "run"
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, settings):
+    """A run that tests only read."""
+    folder = tmp_path_factory.mktemp("specialist") / "run"
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        cut_short(monkeypatch)
+        learned(folder, settings, updates=6)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bundle(run):
+    """Its bundle, with the passport."""
+    return run.parent / "bundle", export(run, run.parent / "bundle")
 
 
 def seen(*lost):
@@ -91,19 +105,19 @@ def test_it_takes_over_at_every_set_that_strands_the_robot(run):
     assert {tuple(np.flatnonzero(row)) for row in losses} == set(stranding_losses(ROBOT, 2))
 
 
-def test_the_exported_bundle_hands_over_as_the_network_does(run, tmp_path):
-    passport = export(run, tmp_path / "bundle")
+def test_the_exported_bundle_hands_over_as_the_network_does(run, bundle):
+    folder, passport = bundle
     assert passport.training["specialist"]["updates"] == 2
     rows = seen(STRANDED, MORE, ABLE)
-    session = onnxruntime.InferenceSession(tmp_path / "bundle" / "policy.onnx")
+    session = onnxruntime.InferenceSession(folder / "policy.onnx")
     logits = session.run(["logits"], {"observation": rows})[0]
     np.testing.assert_allclose(logits, load_network(run / NETWORK_FILE).infer(rows)[1], atol=1e-4)
 
 
-def test_golden_vectors_prove_the_specialist_too(run, tmp_path):
-    export(run, tmp_path / "bundle")
-    Policy(tmp_path / "bundle", ROBOT, TASK)  # checks them
-    dead = np.load(tmp_path / "bundle" / "golden.npz")["observations"][:, -8:] < 0.5
+def test_golden_vectors_prove_the_specialist_too(bundle):
+    folder, _ = bundle
+    Policy(folder, ROBOT, TASK)  # checks them
+    dead = np.load(folder / "golden.npz")["observations"][:, -8:] < 0.5
     told = {tuple(np.flatnonzero(row)) for row in dead}
     assert told > set(stranding_losses(ROBOT, 2))
     assert () in told
