@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseArray
 from mcap.records import Channel, Message, Schema
 from rclpy.serialization import serialize_message
 
@@ -14,7 +15,7 @@ from fulmar_bringup.bag_reader import read_run
 from fulmar_core.errors import BagError
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import load_robot
-from fulmar_core.topics import GOAL_WIRES
+from fulmar_core.topics import GOAL_POSES, GOAL_WIRES
 from fulmar_ros.bag_records import read_records
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
@@ -116,6 +117,21 @@ def test_a_goal_on_a_topic_that_the_task_does_not_hear_is_left_out_and_named(tmp
     assert record.warnings == (
         "1 messages of /floating_platform/goal_pose are left out: no goals of the task 'track_velocities'.",
     )
+
+
+def test_waypoints_as_an_array_of_poses_are_goals_of_the_same_task_in_their_order(tmp_path):
+    bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_through_positions"})
+    for log_ns, name in ((2, GOAL_POSES.name), (1, "goal_path")):
+        path = goal_message(goal_at((float(log_ns), 0.0, 0.0)), "goal_path", 1)
+        array = PoseArray(header=path.header, poses=[stamped.pose for stamped in path.poses])
+        kind = GOAL_POSES.type if name == GOAL_POSES.name else GOAL_WIRES[name].type
+        bag.add_topic(f"/floating_platform/{name}", kind, "latched")
+        message = array if name == GOAL_POSES.name else path
+        bag.write(f"/floating_platform/{name}", serialize_message(message), log_ns=log_ns)
+    bag.close()
+    record = read_run(tmp_path / "bag")
+    assert [goal.targets[0, 0] for goal in record.goals] == [1.0, 2.0]
+    assert not record.warnings
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.999])

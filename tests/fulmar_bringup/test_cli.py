@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from fulmar_bringup import conductor
+from fulmar_bringup import conductor, diagnosis, robot_operator
 from tests.fulmar_bringup.command_line import EVALUATE, RUN, SHIPPED
 
 
@@ -120,3 +122,12 @@ def test_limits_of_a_run_reach_its_plan(fulmar, monkeypatch, tmp_path):
     with pytest.raises(PlannedError):
         fulmar(*RUN, "--area=-2,2,-1,1", "--max-run-time", "60")
     assert (guards[0].area, guards[0].max_run_time_s) == ((-2.0, 2.0, -1.0, 1.0), 60.0)
+
+
+@pytest.mark.parametrize("unfit", [[], ["/panel publishes std_msgs/msg/Int8 on /boat/estop"]])
+def test_the_doctor_names_publishers_that_do_not_reach_a_running_robot(monkeypatch, unfit):
+    person = SimpleNamespace(look_at_wires=lambda: ({"/boat"}, unfit))
+    monkeypatch.setattr(robot_operator, "operator", lambda: contextlib.nullcontext(person))
+    finding = diagnosis._wires()
+    assert finding.ok is not bool(unfit)
+    assert finding.found == (unfit[0] if unfit else "boat")

@@ -10,7 +10,7 @@ import pytest
 
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.commands.run import verdict
-from fulmar_bringup.run_judgement import judge
+from fulmar_bringup.run_judgement import _goals, judge
 from fulmar_bringup.run_record import Motion
 from fulmar_bringup.run_summary import summarise
 from fulmar_core.errors import BagError
@@ -219,6 +219,17 @@ def test_gates_are_counted_from_the_robot_s_own_way(tmp_path):
     record = read_run(write_run(tmp_path / "bag", plan))
     as_gates = dataclasses.replace(record, info={**record.info, "task": "race_gates"})
     assert judge(as_gates).figure("goals_reached") >= 1.0
+
+
+def test_a_goal_that_is_repeated_with_its_stamp_is_the_same_goal(reached):
+    record = read_run(reached)
+    again = dataclasses.replace(record.goals[0], stamp_s=5.0)
+    later = dataclasses.replace(again, log_s=again.log_s + 20.0)
+    once = dataclasses.replace(record, goals=(again, later))
+    assert len(_goals(once)) == 1
+    assert (
+        len(_goals(dataclasses.replace(record, goals=(again, dataclasses.replace(later, stamp_s=6.0))))) == 2
+    )
 
 
 def test_a_velocity_is_judged_against_the_target_of_its_time(tmp_path):

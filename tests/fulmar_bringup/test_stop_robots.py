@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
+from fulmar_bringup import reset_robots
 from fulmar_bringup import stop_robots as module
+from fulmar_bringup.reset_robots import robots_to_reset
 from fulmar_bringup.stop_robots import stop_robots
 
 
@@ -29,7 +31,8 @@ class Seen:
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
         return [
-            (f"/{name}/estop/trigger", [])
+            (f"/{name}/estop/{service}", [])
+            for service in ("trigger", "reset")
             for name, from_s in self._buttons.items()
             if self._now_s() >= from_s
         ]
@@ -57,6 +60,7 @@ class Seen:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, seconds in {"STAY_S": 0.3, "MISS_S": 0.6, "ANSWER_S": 0.4}.items():
         monkeypatch.setattr(module, name, seconds)
+    monkeypatch.setattr(reset_robots, "MISS_S", 0.6)
 
 
 def test_a_robot_is_stopped_when_it_is_seen_and_its_button_is_pressed_when_that_is_seen():
@@ -92,3 +96,21 @@ def test_a_button_that_does_not_answer_keeps_nobody_waiting_for_ever():
 
 def test_where_nobody_is_seen_nobody_is_stopped():
     assert stop_robots(Seen({}, {}), None, find_s=0.1) == []
+
+
+def test_a_robot_is_reset_by_its_node_and_counts_as_without_one_only_after_a_while():
+    began_s = time.monotonic()
+    seen = Seen({"boat": 0.0, "rover": 0.0}, {"boat": 0.4})
+    assert robots_to_reset(seen, None, find_s=1.0) == ({"/boat"}, {"/rover"})
+    assert 0.6 <= time.monotonic() - began_s < 1.2
+
+
+def test_the_robot_that_is_named_is_reset_at_once_where_its_node_is_seen():
+    began_s = time.monotonic()
+    seen = Seen({"boat": 0.0, "rover": 0.0}, {"boat": 0.0})
+    assert robots_to_reset(seen, "boat", find_s=1.0) == ({"/boat"}, set())
+    assert time.monotonic() - began_s < 0.3
+
+
+def test_where_nothing_is_seen_nothing_is_reset():
+    assert robots_to_reset(Seen({}, {}), None, find_s=0.1) == (set(), set())

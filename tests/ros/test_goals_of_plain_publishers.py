@@ -131,8 +131,8 @@ def test_a_goal_of_a_plain_publisher_is_obeyed_be_it_volatile_or_latched(
 def test_an_e_stop_holds_a_lock_stepped_robot_whose_goals_are_streamed_and_time_goes_on(
     ros_domain: RosDomain, tmp_path
 ) -> None:
-    goals = tmp_path / "to_and_fro.yaml"
-    goals.write_text(f"kind: positions\ntitle: to and fro\npositions: {[[5.0, 0.0], [0.0, 0.0]] * 50}\n")
+    goals = tmp_path / "there_and_back.yaml"
+    goals.write_text(f"kind: positions\ntitle: there and back\npositions: {[[5.0, 0.0], [0.0, 0.0]] * 50}\n")
     with system("go_to_position", str(goals)) as (stranger, watcher):
         until(lambda: watcher.was_at(FIRST))
         publisher = stranger.create_publisher(Bool, ESTOP.name, 10)

@@ -158,7 +158,7 @@ def _goals(record: RunRecord, task: Task) -> list[GivenGoal]:
     """Goals as they came; what was asked for if the bag has none."""
     given: list[GivenGoal] = []
     for goal in record.goals:
-        # A goal file is told again and again, and any goal is repeated with its stamp for subscribers that come late.
+        # A goal file comes again and again, and any goal is repeated with its stamp for subscribers that come late.
         repeats = given and (record.info.get("goals") or 0.0 < goal.stamp_s == given[-1].stamp_s)
         again = repeats and np.array_equal(goal.targets, given[-1].targets)
         if len(goal.targets) and not again:

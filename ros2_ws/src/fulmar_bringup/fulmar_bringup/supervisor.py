@@ -117,7 +117,7 @@ class Supervisor:
         tracks then hangs on the plant's clock alone.
 
         An e-stop that was silent for a moment, as on a busy computer that starts many nodes, makes the controller
-        refuse the goal or forget it. Nobody pressed anything, and nothing has moved yet: it is given again, stamped a
+        refuse the goal or forget it. It was not pressed, and nothing has moved yet: it is given again, stamped a
         nanosecond later, since a repetition with the same stamp counts for nothing.
 
         Args:

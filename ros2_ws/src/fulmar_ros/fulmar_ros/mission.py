@@ -23,7 +23,7 @@ from fulmar_core.tasks.push_block import PushBlock
 GOALS_REMEMBERED = 200  # stamps of goals; publishers repeat at most the last 100
 BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
 
-GoalKey = tuple[int, bytes]  # stamp [ns] and targets
+GoalKey = tuple[int, int]  # stamp [ns] and hash of the targets
 
 
 class Mission:
@@ -211,4 +211,4 @@ class Mission:
 
 
 def _key(goal: Goal, stamp_ns: int) -> GoalKey:
-    return stamp_ns, np.asarray(goal.targets, dtype=float).tobytes()
+    return stamp_ns, hash(np.asarray(goal.targets, dtype=float).tobytes())

@@ -84,14 +84,20 @@ class _Once:
     def __call__(self, *received: Any) -> None:
         # The EventsExecutor of rclpy 7.1 passes message and info as one tuple, other executors as two arguments.
         message, info = received if len(received) == 2 else received[0]
-        key = (info["source_timestamp"], info["publication_sequence_number"])
-        if key in self._known:
+        if self._is_second(info["source_timestamp"], info["publication_sequence_number"]):
             return
-        if len(self._order) == REMEMBERED:
-            self._known.discard(self._order[0])
-        self._order.append(key)
-        self._known.add(key)
         if self._with_info:
             self._callback(message, info)
         else:
             self._callback(message)
+
+    def _is_second(self, sent_ns: int, number: int) -> bool:
+        """Whether this message came before; without a time of sending, twice is better than never."""
+        key = (sent_ns, number)
+        if not sent_ns or key in self._known:
+            return bool(sent_ns)
+        if len(self._order) == REMEMBERED:
+            self._known.discard(self._order[0])
+        self._order.append(key)
+        self._known.add(key)
+        return False

@@ -313,7 +313,7 @@ def _goals(
                 warnings.append(f"a message of {wire.name} was left out: {problem}.")
                 continue
             found.append(Told(log, stamp_of(message), goal, index))
-    found.sort(key=lambda told: told.log_ns)
+    found.sort(key=lambda each: each.log_ns)
     if asked is not None:
         found = [Told(begin_ns, 0, _goal(asked))]
     return tuple(found)

@@ -1,0 +1,48 @@
+"""Messages of operator wires, delivered by two subscriptions, are passed on once."""
+
+from __future__ import annotations
+
+import inspect
+
+from fulmar_ros import operator_subscription
+from fulmar_ros.operator_subscription import _Once
+
+
+def info(sent_ns: int, number: int) -> dict[str, int]:
+    return {"source_timestamp": sent_ns, "publication_sequence_number": number}
+
+
+def test_the_second_delivery_of_a_message_is_dropped_by_every_executor():
+    got: list[str] = []
+    once = _Once(got.append, with_info=False)
+    once("a", info(5, 1))  # message and info as two arguments, or as one tuple
+    once(("a", info(5, 1)))
+    once(("a", info(6, 2)))  # the same content, sent again
+    once("b", info(5, 2))  # of another publisher, in the same nanosecond
+    assert got == ["a", "a", "b"]
+
+
+def test_rclpy_takes_it_for_a_callback_that_asks_for_info():
+    signature = inspect.signature(_Once(print, with_info=False))
+    assert len(signature.parameters) == 2
+
+
+def test_without_a_time_of_sending_no_message_is_lost():
+    got: list[str] = []
+    once = _Once(got.append, with_info=False)
+    for _ in range(2):
+        once("press", info(0, 0))
+    assert got == ["press"] * 2
+
+
+def test_the_info_is_passed_on_where_it_is_asked_for():
+    got: list[tuple[str, dict[str, int]]] = []
+    _Once(lambda message, about: got.append((message, about)), with_info=True)("a", info(5, 1))
+    assert got == [("a", info(5, 1))]
+
+
+def test_its_memory_is_bounded():
+    once = _Once(lambda _message: None, with_info=False)
+    for number in range(operator_subscription.REMEMBERED + 10):
+        once("a", info(7, number))
+    assert len(once._known) == len(once._order) == operator_subscription.REMEMBERED
