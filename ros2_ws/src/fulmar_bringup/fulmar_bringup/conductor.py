@@ -226,10 +226,16 @@ def _wait_for_end(
         if time.monotonic() - began > limit_s:
             raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
 
+    errors: list[str] = []
+
     def finished() -> bool:
-        return overseer.plant.values.get("mode") == "finished" or failed()
+        if failed():
+            errors.append(overseer.plant.message)  # kept: a command that comes now takes the error back
+        return bool(errors) or overseer.plant.values.get("mode") == "finished"
 
     overseer.wait_until(finished, running)
+    if errors:
+        raise RunFailed(f"plant: {errors[0]}")
     running()
 
 

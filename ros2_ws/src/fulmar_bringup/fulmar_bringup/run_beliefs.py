@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from fulmar_bringup.run_record import RunRecord
 
 STANDS_S = 1.0  # a belief that went sooner, and before the end, is none that a run is remembered for [s]
@@ -17,9 +19,10 @@ def believed_dead(record: RunRecord) -> list[str]:
         Their names, in the order in which they were first named.
     """
     said = [sample for sample in record.health if "believed_dead" in sample.values]
+    ends = [sample.log_s for sample in said[1:]] + [math.inf]
     lasted: dict[str, float] = {}
-    for sample, following in zip(said, [*said[1:], None], strict=True):
-        length = following.log_s - sample.log_s if following else STANDS_S
+    for sample, end_s in zip(said, ends, strict=False):  # of none at all there is an end, too
+        length = end_s - sample.log_s
         for name in filter(None, sample.values["believed_dead"].split(", ")):
             lasted[name] = lasted.get(name, 0.0) + length
     return [name for name, length in lasted.items() if length >= STANDS_S]

@@ -48,6 +48,8 @@ class BeliefReader:
         shares = dict(zip(self._names, health.effectiveness.tolist(), strict=True))
         dead = tuple(name for name, share in shares.items() if share < DEAD_BELOW)
         words = [f"valve {name} believed dead (effectiveness {shares[name]:.2f})" for name in dead]
+        if bool(health.held):
+            words.append("the robot does not move, whatever its valves do: it is held, or stands without air")
         force = np.stack(to_body(health.motion[2], health.push[0], health.push[1]))
         if not self._reach.holds(force):
             words.append(f"a push of {np.hypot(*force):.2f} N is believed, beyond what the valves can hold")
