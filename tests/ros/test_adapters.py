@@ -131,8 +131,9 @@ def test_an_adapter_that_hears_our_own_driver_passes_nothing_on_and_ends(neighbo
     file = "hardware:=zero_g_lab_valve_node"
     node, spin = running(DriverNode, "floating_platform", file)
     _adapter, spin_adapter = running(AdapterNode, "floating_platform", file, request_exit=ended.append)
-    with spin, spin_adapter:
-        until(lambda: bool(ended))
+    with spin:
+        with spin_adapter:
+            until(lambda: bool(ended))
         assert set(ended) == {2}
         first = [1.0] + [0.0] * 7
         until(lambda: neighbour.command(first) or bool(neighbour.applied and neighbour.applied[-1].any()))

@@ -22,7 +22,7 @@ from fulmar_core.topics import COMMAND
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos
 from tests.conftest import RosDomain
-from tests.ros.cli import fulmar
+from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, open_valves, until
 
 pytestmark = pytest.mark.real_time
@@ -77,6 +77,20 @@ def test_a_second_node_that_commands_closes_the_valves_until_it_is_gone(
     rclpy.shutdown(context=context)
     until(lambda: opened(neighbour))
     assert plant.guard.watchdog.trips == 0  # the commands went on all the time
+
+
+@pytest.mark.slow
+def test_a_run_ends_where_another_node_commands_its_robot_and_its_result_names_both(
+    neighbour: Neighbour, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """The neighbour has a publisher of commands, and never uses it."""
+    asked = ("--controller", "lqr", "--goal", "1,0,0", "--record", "bag", "--json")
+    done = fulmar("run", ROBOT, *asked, env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 1
+    failure = json_of(done.stdout)["failure"]
+    assert failure.startswith("plant: 2 nodes publish commands, and only one may: ")
+    assert f"{NAMESPACE}/controller, {NAMESPACE}/neighbour" in failure
+    assert not neighbour.applied[-1].any()
 
 
 @pytest.fixture

@@ -11,8 +11,13 @@ PARTICIPANT_BYTES = (
 )
 
 
+UNNAMED = "a node of unknown name"  # discovery reports endpoints some moments before the names of their nodes
+
+
 def full_name(info: TopicEndpointInfo) -> str:
     """Name of an endpoint's node, with its namespace."""
+    if info.node_name == "_NODE_NAME_UNKNOWN_":
+        return UNNAMED
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 

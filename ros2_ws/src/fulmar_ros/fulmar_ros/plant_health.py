@@ -13,6 +13,7 @@ from rclpy.lifecycle import LifecycleNode
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.topics import DIAGNOSTICS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
+from fulmar_ros.command_writers import UNNAMED
 from fulmar_ros.health import Health
 from fulmar_ros.lockstep_loop import LockstepLoop
 from fulmar_ros.plant_wires import PlantWires
@@ -24,6 +25,7 @@ from fulmar_ros.wire_watch import WireWatch
 
 LOOK_S = 0.1  # how soon a change is noticed
 AT_LEAST_S = 1.0  # how often it is said without a change
+NAMES_LOOKS = 10  # in which discovery reports the name of a node whose publisher is known
 HANGS_S = 0.5  # a step that takes longer than this, and than ten ticks, will not come back
 
 
@@ -41,6 +43,7 @@ class PlantHealth:
         """Begin inactive."""
         self.mode, self.reason = "inactive", ""
         self.awaited = 0
+        self._unnamed_looks = 0
         self._robot = robot
         self._place: dict[str, str] = {}  # full name, host and process of the node
         self._said: tuple[object, ...] = ()
@@ -98,7 +101,9 @@ class PlantHealth:
             return "error", self.reason, "fault"
         contested = self._contested()
         if contested:
-            return "error", f"{contested}. Actuators in their safe state until the others stop.", contested
+            self._unnamed_looks = self._unnamed_looks + 1 if UNNAMED in contested else 0
+            level = "warn" if 0 < self._unnamed_looks <= NAMES_LOOKS else "error"
+            return level, f"{contested}. Actuators in their safe state until the others stop.", contested
         if self.mode == "running" and self._realtime is not None:
             now = time.monotonic_ns()
             late_s = self._realtime.since_tick_s(now)
