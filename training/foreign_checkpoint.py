@@ -170,7 +170,8 @@ def _skrl(content: Mapping[str, Any], path: Path) -> Checkpoint:
     _check_feed_forward(state, path)
     names = [name for name in _weights(state) if not _of_the_critic(name)]
     layers = tuple(_layer(state, name, path) for name in names)
-    statistics = content.get("state_preprocessor") or content.get("observation_preprocessor") or {}
+    key = "state_preprocessor" if "state_preprocessor" in content else "observation_preprocessor"
+    statistics = _tensors(content.get(key, {}), path, key)
     mean, deviation = _statistics(statistics, "running_mean", "running_variance", layers, path)
     scale = torch.sqrt(deviation) + SKRL_EPSILON if statistics else deviation
     return _checked(Checkpoint("skrl", layers, mean, scale, _limit(statistics)), path)
@@ -197,10 +198,16 @@ def _rl_games(content: Any, path: Path) -> Checkpoint:
 
 
 def _tensors(content: Any, path: Path, key: str) -> State:
+    """A state dictionary, if it is one: names, and plain tensors on the CPU."""
     if not isinstance(content, Mapping) or not all(
-        isinstance(value, torch.Tensor) for value in content.values()
+        isinstance(name, str)
+        and isinstance(value, torch.Tensor)
+        and value.layout is torch.strided
+        and value.device.type == "cpu"
+        and not value.is_quantized
+        for name, value in content.items()
     ):
-        raise ConfigError(f"{path}: '{key}' must hold a state dictionary of tensors.")
+        raise ConfigError(f"{path}: '{key}' must hold a state dictionary of dense tensors.")
     return content
 
 
@@ -238,7 +245,7 @@ def _layer(state: State, name: str, path: Path) -> tuple[torch.Tensor, torch.Ten
 
 
 def _statistics(
-    state: Any, mean: str, variance: str, layers: tuple[tuple[torch.Tensor, torch.Tensor], ...], path: Path
+    state: State, mean: str, variance: str, layers: tuple[tuple[torch.Tensor, torch.Tensor], ...], path: Path
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Running mean and variance; 0 and 1 where the learner did not normalise."""
     width = layers[0][0].shape[1] if layers else 0
@@ -252,7 +259,7 @@ def _statistics(
         ) from error
 
 
-def _limit(statistics: Any) -> float:
+def _limit(statistics: State) -> float:
     return NORMALISED_LIMIT if statistics else math.inf
 
 

@@ -236,6 +236,17 @@ def test_what_does_not_fit_is_refused_with_what_does(robot, task, activation, me
         ),
         ({"policy": {"net.0.weight": torch.full((2, 8), math.nan)}}, "not finite"),
         ({"policy": {}}, "has no layers"),
+        ({"policy": [torch.zeros(2)]}, "'policy' must hold a state dictionary"),
+        ({"policy": {1: torch.zeros(2, 8)}}, "'policy' must hold a state dictionary"),
+        ({"policy": {"net.weight": torch.zeros(2, 8).to_sparse()}}, "of dense tensors"),
+        (
+            {"policy": {"net.weight": torch.zeros(2, 8)}, "state_preprocessor": torch.zeros(2)},
+            "'state_preprocessor' must",
+        ),
+        (
+            {"policy": {"net.weight": torch.zeros(2, 8)}, "state_preprocessor": {"mean": torch.zeros(8)}},
+            "lack 'running_mean'",
+        ),
         ({"model": {"a2c_network.actor_mlp.0.weight": torch.zeros(2, 8)}}, "it is no policy"),
     ],
 )
