@@ -96,7 +96,6 @@ def test_a_course_too_short_to_know_ones_place_from_is_left_to_the_policy(planne
     np.testing.assert_array_equal(planner.act(seen), policy().act(seen))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("patient", [True, False], ids=["no plan is found", "every plan is late"])
 def test_without_plans_it_goes_on_as_its_policy_would(patient, monkeypatch):
     planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=patient)
@@ -126,7 +125,6 @@ def carry_off(simulation, row, metres):
     simulation.step(np.zeros((len(x), 2)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("patient", [True, False])
 def test_a_lost_boat_leaves_no_plan_behind_but_one_that_others_wait_for(patient, monkeypatch):
     planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=patient)
@@ -142,7 +140,6 @@ def test_a_lost_boat_leaves_no_plan_behind_but_one_that_others_wait_for(patient,
         assert [number for number, plans in enumerate(busy.given) if plans.cancelled()] == given_up
 
 
-@pytest.mark.slow
 def test_in_real_time_no_step_waits_for_a_plan(monkeypatch):
     planner = Planner(ROBOT, TASK, policy, SETTINGS, patient=False)
     monkeypatch.setattr(planner, "_planning", Planless(ready=False))
@@ -198,7 +195,6 @@ def test_another_course_begins_anew_and_a_reset_forgets_it(planner, monkeypatch)
     np.testing.assert_array_equal(planner.act(simulation.observe()), policy().act(simulation.observe()))
 
 
-@pytest.mark.slow
 def test_it_says_which_waypoint_comes_next_on_its_own_course_alone(planner, monkeypatch):
     monkeypatch.setattr(planner, "_planning", Planless(ready=True))
     simulation = simulated(2)
@@ -211,7 +207,6 @@ def test_it_says_which_waypoint_comes_next_on_its_own_course_alone(planner, monk
     assert planner.coming(places[:, ::-1]) is None
 
 
-@pytest.mark.slow
 def test_on_a_course_that_passes_the_same_places_again_it_counts_as_the_judge_does(planner, monkeypatch):
     monkeypatch.setattr(planner, "_planning", Planless(ready=True))
     simulation = simulated(1, "ideal")
