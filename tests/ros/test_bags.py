@@ -15,6 +15,7 @@ from rosgraph_msgs.msg import Clock
 from fulmar_bringup.bags.contents import open_bag
 from fulmar_bringup.bags.decode import stamps_ns
 from fulmar_bringup.bags.player import play, schedule
+from fulmar_bringup.bags.reference import TOLERANCES
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import CLOCK, ODOMETRY
 from fulmar_ros.message_reader import stamp_ns
@@ -98,9 +99,15 @@ def test_a_loop_begins_again_until_it_is_stopped(ros_domain: RosDomain):
     assert done.messages > 100
 
 
+def rerun_through_node(bag: Path) -> list[str]:
+    """The command line that re-runs a reference bag on any processor."""
+    tolerances = [f"--tolerance={field}={limit}" for field, limit in TOLERANCES.items()]
+    return ["bag", "rerun", str(bag), "--through", "node", *tolerances, "--json"]
+
+
 @pytest.mark.parametrize("bag", [POLICY, LQR], ids=lambda bag: bag.name)
 def test_the_deployed_node_gives_the_recorded_answers(bag: Path, ros_domain: RosDomain, tmp_path: Path):
-    done = fulmar("bag", "rerun", str(bag), "--through", "node", "--json", env=ros_domain.env, cwd=tmp_path)
+    done = fulmar(*rerun_through_node(bag), env=ros_domain.env, cwd=tmp_path)
     found = json_of(done.stdout)
     assert done.returncode == 0, found["first_difference"]
     assert found["asked"] == found["steps"]
@@ -109,7 +116,7 @@ def test_the_deployed_node_gives_the_recorded_answers(bag: Path, ros_domain: Ros
 
 def test_the_deployed_node_is_given_the_guards_of_the_run(ros_domain: RosDomain, tmp_path: Path):
     bag = BAGS / "floating_platform_go_to_pose_lqr_guarded"  # may act for 15 of its 20 s
-    done = fulmar("bag", "rerun", str(bag), "--through", "node", "--json", env=ros_domain.env, cwd=tmp_path)
+    done = fulmar(*rerun_through_node(bag), env=ros_domain.env, cwd=tmp_path)
     found = json_of(done.stdout)
     assert done.returncode == 0, found["first_difference"]
     assert found["asked"] == 76
