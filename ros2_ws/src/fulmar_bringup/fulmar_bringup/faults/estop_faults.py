@@ -6,7 +6,7 @@ import rclpy
 from std_msgs.msg import Bool
 
 from fulmar_bringup.faults.fault import Fault
-from fulmar_bringup.faults.finding import Outcome, stopped
+from fulmar_bringup.faults.finding import STAYS_S, Outcome, stopped
 from fulmar_bringup.faults.live_system import LiveSystem
 from fulmar_bringup.faults.witness import wait_for
 from fulmar_core.errors import RunFailed
@@ -26,6 +26,8 @@ def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
         if not wait_for(lambda: publisher.get_subscription_count() >= NODES, MATCH_S):
             raise RunFailed(f"fewer than {NODES} nodes subscribe {publisher.topic_name} within {MATCH_S:g} s")
         since_s = live.until_it_moves()
+        # The very next tick may be safe: a state that still moves the robot must be on record, at most two ticks old.
+        wait_for(lambda: any(moves for _, moves in live.witness.applied_since(since_s)), STAYS_S)
         publisher.publish(Bool(data=True))
         return stopped(live, since_s, live.silenced_s)
     finally:
