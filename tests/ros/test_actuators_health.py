@@ -67,7 +67,7 @@ def test_a_command_does_not_wait_for_a_health_that_only_a_recorder_wants(
     """Else recording would make the control loop slower."""
     answered = []
 
-    def see(measurement: Measurement, _command: np.ndarray, _informer: Informer, *, wanted: bool) -> None:
+    def see(measurement: Measurement, _informer: Informer, *, wanted: bool) -> None:
         answered.append(wanted and controller._answered_ns == measurement.stamp_ns)
 
     monkeypatch.setattr(controller._actuators, "see", see)

@@ -65,6 +65,7 @@ def test_in_lock_step_a_late_bearing_is_waited_for_and_the_bag_runs_again_the_sa
     assert found["decision"] == found["command"] == 0, found
 
 
+@pytest.mark.slow
 def test_a_dead_valve_is_named_by_the_run_and_its_report(ros_domain: RosDomain, tmp_path: Path) -> None:
     asked = (
         "floating_platform",

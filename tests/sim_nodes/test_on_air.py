@@ -119,7 +119,7 @@ def drive(lqr, backend, sample, seconds):
     return float(np.hypot(*place(sample)[:2])), lqr.health
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_held_for_2_s_by_hand_the_lqr_accuses_no_valve_and_reaches_its_goal(seed):
     backend = OnAir(MujocoBackend(ROBOT), replace(NOMINAL, held_s=(1.0, 3.0)))
     start = np.random.default_rng(seed).uniform((-1.0, -1.0, -3.0), (1.0, 1.0, 3.0))
@@ -136,10 +136,10 @@ def test_without_the_test_for_a_hold_valves_are_accused_that_work():
     gains = replace(lqr._weights, observer=replace(lqr._weights.observer, held=0.0, retry_s=0.0))
     lqr = type(lqr)(ROBOT, TASK, gains, control_hz=5.0)
     accused = []
-    for seed in range(4):
+    for seed in range(2):
         backend = OnAir(MujocoBackend(ROBOT), replace(NOMINAL, held_s=(1.0, 3.0)))
         start = np.random.default_rng(seed).uniform((-1.0, -1.0, -3.0), (1.0, 1.0, 3.0))
-        _, believed = drive(lqr, backend, backend.reset(episode(start), seed=seed), 14.0)
+        _, believed = drive(lqr, backend, backend.reset(episode(start), seed=seed), 8.0)
         accused.append(believed.effectiveness.min() < 0.5)
     assert any(accused)
 
