@@ -97,7 +97,8 @@ def test_whatever_ends_it_closes_the_valves(neighbour: Neighbour, ros_domain, tm
     press = neighbour.node.create_client(Trigger, ESTOP_TRIGGER)
     run = start_fulmar("commission", "zero_g_lab", "--emulate", "--yes", env=ros_domain.env, cwd=tmp_path)
     try:
-        until(lambda: bool(device) and device[-1].any(), STARTS_S)
+        until(lambda: run.poll() is not None or (bool(device) and device[-1].any()), STARTS_S)
+        assert run.poll() is None, run.stderr.read()
         children = run.children(recursive=True)
         if ending == "e-stop":
             assert press.wait_for_service(5.0)
