@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float32MultiArray, Int16MultiArray
+from std_msgs.msg import Float32MultiArray
 
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
@@ -28,6 +28,7 @@ from fulmar_core.topics import DEVICE_STATE, MOCAP, ODOMETRY, TRUTH
 from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.first_episode import first_episode
+from fulmar_ros.foreign_topics import VALVE_MESSAGES
 from fulmar_ros.paced_capture import capture_maker
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_settings import PlantSettings
@@ -58,6 +59,7 @@ class EmulatorSettings(PlantSettings):
     active_low: bool = True
     inverted: bool = False  # a valve node opens its valves at 0
     stamped: bool = False  # a base takes TwistStamped
+    message: str = "int16"  # of VALVE_MESSAGES, which a valve node takes
     sides: tuple[str, ...] = STRAIGHT  # that each channel of a base or boat turns, with a '-' where backwards
     dead: tuple[int, ...] = (NONE,)  # wires that are cut
 
@@ -66,6 +68,8 @@ class EmulatorSettings(PlantSettings):
         super().__post_init__()
         if self.device not in DEVICES:
             raise ValueError(str(UnknownNameError("device", self.device, DEVICES)))
+        if self.message not in VALVE_MESSAGES:
+            raise ValueError(str(UnknownNameError("message", self.message, VALVE_MESSAGES)))
         if not self.link:
             raise ValueError("'link' must be a path, tcp:<port> or udp:<port>.")
 
@@ -90,7 +94,7 @@ class EmulatorNode(Node):
         simulator = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
         self.device = make_emulator(robot, simulator, self.settings)
         self._backend: Backend = simulator
-        if isinstance(self.device, ValveBank):
+        if isinstance(self.device, (ValveBank, ValveNode)):
             self._backend = OnAir(simulator, scenario)
         self._sample = self._backend.reset(first_episode(robot, self.settings), seed=self.settings.seed)
         self._wiring = Wiring(
@@ -138,7 +142,7 @@ class EmulatorNode(Node):
         while deadlines.wait(self._stop):
             now_s = time.monotonic()
             command = self._wiring.applied(self.device.command(now_s))
-            if isinstance(self._backend, OnAir) and isinstance(self.device, ValveBank):
+            if isinstance(self._backend, OnAir) and isinstance(self.device, (ValveBank, ValveNode)):
                 self._backend.set_bearing(self.device.air)
             due = int((now_s - began_s) / dt) - ticks
             for _ in range(max(1, min(due, CATCH_UP))):
@@ -151,9 +155,10 @@ class EmulatorNode(Node):
 
     def _listen(self, device: TopicDevice) -> None:
         """Take commands from the device's topic, and publish odometry as the node of such a base or boat does."""
-        kind: type = {"valve_topic": Int16MultiArray, "thrust_topic": Float32MultiArray}.get(
-            self.settings.device, TwistStamped if self.settings.stamped else Twist
-        )
+        kind: type = {
+            "valve_topic": VALVE_MESSAGES[self.settings.message],
+            "thrust_topic": Float32MultiArray,
+        }.get(self.settings.device, TwistStamped if self.settings.stamped else Twist)
         self.create_subscription(
             kind, device.address, lambda message: device.receive(values_of(message), time.monotonic()), 1
         )
@@ -177,7 +182,7 @@ class EmulatorNode(Node):
 def values_of(message: Any) -> list[float]:
     """The numbers of a command of another stack."""
     if hasattr(message, "data"):
-        return [float(value) for value in message.data]
+        return [float(value[0] if isinstance(value, bytes) else value) for value in message.data]
     twist = getattr(message, "twist", message)
     return [twist.linear.x, twist.angular.z]
 

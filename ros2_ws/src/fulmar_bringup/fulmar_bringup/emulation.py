@@ -18,7 +18,7 @@ from hardware_drivers.settings import (
     VelocityTopic,
 )
 
-Parameters = Mapping[str, bool | list[int] | list[str]]
+Parameters = Mapping[str, bool | str | list[int] | list[str]]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,8 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
     """
     driver = hardware.driver
     if isinstance(driver, ValveTopic):
-        return Emulation(driver.kind, driver.topic, "", {"order": list(driver.order)})
+        takes: Parameters = {"order": list(driver.order), "message": driver.message}
+        return Emulation(driver.kind, driver.topic, "", takes)
     if isinstance(driver, VelocityTopic):
         sides: Parameters = {"stamped": driver.stamped, "sides": list(driver.wiring)}
         return Emulation(driver.kind, driver.topic, "", sides)

@@ -125,9 +125,7 @@ class ControllerWires:
         self._subscriptions = []
         # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
         if on_bearing is not None:
-            self._subscriptions.append(
-                node.create_subscription(Bool, AIR_BEARING.name, on_bearing, subscriber_qos(AIR_BEARING))
-            )
+            self._subscriptions += subscribe_operator(node, Bool, AIR_BEARING, on_bearing)
         if can_be_watched(robot):
             applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
             self._subscriptions.append(
