@@ -159,7 +159,7 @@ def test_the_list_shows_the_good_files_and_a_line_for_each_broken_one(fulmar, br
     (broken_configs / "robots" / "turtlebot2.yaml").write_text(text.replace("radius: 0.177", "radius: 177"))
     code, out, err = fulmar("list", "robots")
     assert code == 1
-    assert "floating_platform  air-bearing platform" in out
+    assert "floating_platform          air-bearing platform" in out
     broken, wrong = err.splitlines()
     assert "robots/jetbot.yaml:1: not valid YAML" in broken
     assert "'body.radius' = 177 m is not plausible" in wrong

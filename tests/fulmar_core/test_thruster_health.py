@@ -160,7 +160,7 @@ def test_a_turn_across_the_half_circle_is_no_surprise():
 
 def test_robots_that_roll_or_swim_are_refused():
     for name, robot in ROBOTS.items():
-        assert can_be_watched(robot) == (name in ("floating_platform", "modular_freeflyer"))
+        assert can_be_watched(robot) == robot.air_bearing, name
     with pytest.raises(ConfigError, match="kingfisher"):
         ThrusterHealth(ROBOTS["kingfisher"])
 

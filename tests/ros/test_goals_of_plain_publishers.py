@@ -56,7 +56,7 @@ def system(task: str, goals: str = "") -> Iterator[tuple[Node, Watcher]]:
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
 
     def arguments(**more: object) -> list[str]:
-        settings = {"robot": ROBOT, "task": task, "lockstep": True, **more}
+        settings = {"robot": ROBOT, "lockstep": True, **more}
         return [
             "--ros-args",
             "-r",
@@ -68,23 +68,23 @@ def system(task: str, goals: str = "") -> Iterator[tuple[Node, Watcher]]:
         pytest.fail(repr(error))
 
     with contextlib.ExitStack() as stack:
+        stack.callback(rclpy.try_shutdown)
         stranger = Node("stranger", namespace=SPACE)
         watcher = Watcher(stranger)
         stack.enter_context(spinning(stranger, fail))
         controller = ControllerNode(
-            make_classical, lambda _code: None, cli_args=arguments(goals_streamed=bool(goals))
+            make_classical, lambda _code: None, cli_args=arguments(task=task, goals_streamed=bool(goals))
         )
         stack.enter_context(spinning(controller, fail))
-        plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments(backend="mock"))
+        plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments(task=task, backend="mock"))
         stack.enter_context(spinning(plant, fail))
         if goals:
             node = GoalNode(lambda _code: None, cli_args=arguments(goals=goals, stay=True))
             stack.enter_context(spinning(node, fail))
+        stack.callback(controller.stop)
+        stack.callback(plant.stop)
         until(lambda: bool(watcher.places))
         yield stranger, watcher
-        plant.stop()
-        controller.stop()
-    rclpy.try_shutdown()
 
 
 def speed_of(place: tuple[float, float]) -> float:

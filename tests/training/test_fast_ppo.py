@@ -45,7 +45,7 @@ def learner(kind, action_space, *, precision=torch.float32, **kwargs):
     return made
 
 
-@pytest.mark.parametrize(("precision", "near"), [(torch.float32, 1e-5), (torch.bfloat16, 3e-2)])
+@pytest.mark.parametrize(("precision", "near"), [(torch.float32, 1e-5), (fast_precision(), 3e-2)])
 def test_outputs_and_gradients_are_those_of_torch(precision, near):
     torch.manual_seed(1)
     hidden = nn.Sequential(nn.Linear(4, 16), nn.Tanh(), nn.Linear(16, 8), nn.Tanh())
