@@ -86,6 +86,10 @@ class Neighbour:
                 {pair.key: pair.value for pair in status.values},
             )
 
+    def withdraw_command(self) -> None:
+        """Command no more: another node is to."""
+        self.node.destroy_publisher(self._command)
+
     def command(self, values: list[float], names: list[str] | None = None, stamp_ns: int = 0) -> None:
         """Send one command, an answer to the observation of a stamp or to none."""
         writer = VectorWriter(names or self.robot.actuators.names)

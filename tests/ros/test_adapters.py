@@ -92,6 +92,7 @@ def test_byte_arrays_with_a_named_order_go_both_ways(neighbour, heard, tmp_path,
     messages = heard(kind, "/valves/out")
     node, spin = running(DriverNode, "floating_platform", f"hardware:={files[0]}")
     _adapter, spin_adapter = running(AdapterNode, "floating_platform", f"hardware:={files[1]}")
+    neighbour.withdraw_command()  # the plant obeys no two nodes, and the adapter is one
     publisher = neighbour.node.create_publisher(kind, "/valves/in", 1)
     data = [1, 1] + [0] * 7
     theirs = kind(data=[bytes([value]) for value in data] if kind is ByteMultiArray else data)

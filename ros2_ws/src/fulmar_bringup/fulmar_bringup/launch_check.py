@@ -15,7 +15,7 @@ from fulmar_ros.middleware import set_up_middleware
 
 
 def refuse_living_plants(specs: Iterable[NodeSpec]) -> None:
-    """Refuse to start nodes where a plant of one of their namespaces lives already; takes 0.8 s.
+    """Refuse to start nodes where a plant of one of their namespaces lives already; takes a second.
 
     The plant would refuse by itself, but by then a second controller has stopped the robot that lives. With security
     enabled it is left to the plant: the launcher has no enclave to look from.

@@ -80,7 +80,7 @@ class Supervisor:
     def sees_living_plant(self) -> bool:
         """Whether a plant of this robot is at work already; call before ours is configured.
 
-        Returns as soon as one is seen, and otherwise when this node has had 0.8 s to discover others.
+        Returns as soon as one is seen, and otherwise when this node has had `DISCOVERY_S` to discover others.
         """
         return sees_living_plant(self._node, f"/{self._robot}", since_s=self._made_s)
 

@@ -18,15 +18,19 @@ from fulmar_ros.command_writers import full_name
 from fulmar_ros.qos import subscriber_qos
 
 PLANT = "plant"  # name of the node
-DISCOVERY_S = (
-    0.5  # from the creation of a node until it knows the others on a computer that is not overloaded
+# From the creation of a node until it knows the others on a computer that is not overloaded: 0.11 to 0.62 s measured.
+DISCOVERY_S = 1.0
+BRIEFLY_S = (
+    0.5  # how long a plant delays its own start for that; what it discovers later ends it, see `LATE_S`
 )
-LATE_S = 5.0  # the same on one that is
+LATE_S = 5.0  # the same on a computer that is overloaded
 WORDS_S = 3.0  # a plant publishes diagnostics once a second
 LOOK_S = 0.05
 
 
-def refuse_living_plant(node: Node, namespace: str, *, since_s: float, spins: bool) -> None:
+def refuse_living_plant(
+    node: Node, namespace: str, *, since_s: float, spins: bool, within_s: float = DISCOVERY_S
+) -> None:
     """Refuse to start a plant under a namespace where another one lives.
 
     Returns at once where the node is old enough and nothing is found. A plant that dies while it is asked who it is
@@ -37,25 +41,27 @@ def refuse_living_plant(node: Node, namespace: str, *, since_s: float, spins: bo
         namespace: Of the plant, absolute.
         since_s: When the node was created, on the monotonic clock [s].
         spins: Whether another thread serves the node's callbacks.
+        within_s: How old the node has to be before it finds nothing [s].
 
     Raises:
         ConfigError: Another plant lives there; with its name, process and host.
     """
-    if not sees_living_plant(node, namespace, since_s=since_s):
+    if not sees_living_plant(node, namespace, since_s=since_s, within_s=within_s):
         return
     where = _where(node, namespace, spins=spins)
     if where:
         domain = os.environ.get("ROS_DOMAIN_ID", "") or "0"
         raise ConfigError(
-            f"a plant of the name {namespace}/{PLANT} lives in ROS domain {domain} already: {where}. Two would drive "
-            "one robot, or be driven by one controller. Stop that one, or set ROS_DOMAIN_ID to another number."
+            f"a plant of the name {namespace.rstrip('/')}/{PLANT} lives in ROS domain {domain} already: {where}. "
+            "Two would drive one robot, or be driven by one controller. Stop that one, or set ROS_DOMAIN_ID to "
+            "another number."
         )
 
 
-def sees_living_plant(node: Node, namespace: str, *, since_s: float) -> bool:
+def sees_living_plant(node: Node, namespace: str, *, since_s: float, within_s: float = DISCOVERY_S) -> bool:
     """Whether another plant is discovered under a namespace; arguments as of `refuse_living_plant`."""
     while not living_plants(node, namespace):
-        if time.monotonic() > since_s + DISCOVERY_S:
+        if time.monotonic() > since_s + within_s:
             return False
         time.sleep(LOOK_S)
     return True
@@ -67,13 +73,13 @@ def living_plants(node: Node, namespace: str) -> list[str]:
     Two plants that start at once publish nothing yet: beside a plant every node of its name counts.
     """
     own = node.get_fully_qualified_name()
-    names = [
-        full_name(info) for info in node.get_publishers_info_by_topic(f"{namespace}/{ACTUATORS_STATE.name}")
-    ]
+    namespace = namespace.rstrip("/")  # a node without one lives under "/"
+    topic = f"{namespace}/{ACTUATORS_STATE.name}"
+    names = [full_name(info) for info in node.get_publishers_info_by_topic(topic)]
     if own in names:
         names.remove(own)
     if own == f"{namespace}/{PLANT}":
-        same = [found for found in node.get_node_names_and_namespaces() if found == (PLANT, namespace)]
+        same = [found for found in node.get_node_names_and_namespaces() if found == (PLANT, namespace or "/")]
         names += [own] * (len(same) - 1)
     return names
 
@@ -81,14 +87,9 @@ def living_plants(node: Node, namespace: str) -> list[str]:
 def _where(node: Node, namespace: str, *, spins: bool) -> str:
     """Name, process and host of the plant that is seen; empty where it is gone before it has said them."""
     words: list[str] = []
-    ours = (str(os.getpid()), socket.gethostname())
 
     def read(message: DiagnosticArray) -> None:
-        for status in message.status:
-            values = {pair.key: pair.value for pair in status.values}
-            place = values.get("pid", ""), values.get("host", "")
-            if place != ours and values.get("node", "") == f"{namespace}/{PLANT}":
-                words.append(f"{values['node']}, process {place[0]} on host {place[1]}")
+        words.extend(place for _, place in others_in(message, f"{namespace.rstrip('/')}/{PLANT}"))
 
     subscription = node.create_subscription(
         DiagnosticArray, DIAGNOSTICS.name, read, subscriber_qos(DIAGNOSTICS, reliable=True, depth=10)
@@ -103,6 +104,20 @@ def _where(node: Node, namespace: str, *, spins: bool) -> str:
         return words[0] if words else ""
     finally:
         node.destroy_subscription(subscription)
+
+
+def others_in(message: DiagnosticArray, name: str) -> list[tuple[int, str]]:
+    """Other plants of a full name in a diagnostics message: when each started [ns, wall clock], and its place."""
+    ours = (str(os.getpid()), socket.gethostname())
+    found = []
+    for status in message.status:
+        values = {pair.key: pair.value for pair in status.values}
+        process, host = values.get("pid", ""), values.get("host", "")
+        if (process, host) != ours and values.get("node", "") == name:
+            started = values.get("started_ns", "")
+            place = f"{name}, process {process} on host {host}"
+            found.append((int(started) if started.isdecimal() else 0, place))
+    return found
 
 
 @contextlib.contextmanager

@@ -45,17 +45,18 @@ class PlantHealth:
         self.awaited = 0
         self._unnamed_looks = 0
         self._robot = robot
-        self._place: dict[str, str] = {}  # full name, host and process of the node
+        self._place: dict[str, str] = {}  # full name, host, process and age of the node
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
         self.more: Callable[[], dict[str, str]] = dict
 
-    def open(self, node: LifecycleNode) -> None:
-        """Begin to publish."""
+    def open(self, node: LifecycleNode, *, started_ns: int) -> None:
+        """Begin to publish; with when the node was created, by the wall clock [ns]."""
         self._place = {
             "node": node.get_fully_qualified_name(),
             "host": socket.gethostname(),
             "pid": str(os.getpid()),
+            "started_ns": str(started_ns),
         }
         self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._health = Health(f"{self._robot}: plant", [self._publisher])

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from fulmar_core.backend import AirBearing, Backend, Sample
@@ -18,15 +19,17 @@ from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
+from fulmar_core.topics import DIAGNOSTICS
 from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.first_episode import first_episode
-from fulmar_ros.living_plant import LATE_S, living_plants, refuse_living_plant
+from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
 from fulmar_ros.paced_capture import MakeCapture, capture_maker
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.plant_wires import PlantWires
+from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.realtime_loop import RealtimeLoop
 from fulmar_ros.runtime import RequestExit, settle_memory
 from fulmar_ros.simulated_time import SimulatedTime
@@ -36,7 +39,6 @@ MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 SAFE_REPEATS = 5  # the safe command is published this often on the way out
 SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
-TWIN_LOOK_S = 0.1
 PATIENCE_S = 2.0  # for a backend that hangs in a step, before the node goes on without it
 
 
@@ -69,6 +71,7 @@ class PlantNode(LifecycleNode):
         """
         super().__init__("plant", cli_args=cli_args)
         self._made_s = time.monotonic()
+        self._started_ns = time.time_ns()
         self.settings = read_parameters(self, settings_class)
         self.robot = load_robot(self.settings.robot)
         load_scenario(self.settings.scenario)  # a wrong name is told before anything starts
@@ -95,11 +98,19 @@ class PlantNode(LifecycleNode):
         )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:
-            refuse_living_plant(self, self.get_namespace(), since_s=self._made_s, spins=False)
+            refuse_living_plant(
+                self, self.get_namespace(), since_s=self._made_s, spins=False, within_s=BRIEFLY_S
+            )
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
                     raise FulmarError(f"plant of '{self.robot.name}' could not start: {self.health.reason}")
-            self._twin_timer = self.create_timer(TWIN_LOOK_S, self._look_for_a_twin)
+            self._twin_words = self.create_subscription(
+                DiagnosticArray,
+                DIAGNOSTICS.name,
+                self._yield_to_older,
+                subscriber_qos(DIAGNOSTICS, reliable=True, depth=10),
+            )
+            self._twin_timer = self.create_timer(LATE_S, self._end_watch)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Build the backend and every endpoint."""
@@ -123,7 +134,7 @@ class PlantNode(LifecycleNode):
         if isinstance(self._backend, AirBearing):
             self._air = AirBearingWires(self, self._backend)
         self._make_loops(self._backend)
-        self.health.open(self)
+        self.health.open(self, started_ns=self._started_ns)
         return DONE
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -263,17 +274,24 @@ class PlantNode(LifecycleNode):
         except Exception as error:  # noqa: BLE001 - whatever a backend raises must close the actuators
             self._fail(f"{type(error).__name__}: {error}")
 
-    def _look_for_a_twin(self) -> None:
-        """Give way to another plant that discovery reports late; one that has run for longer than 5 s stays."""
-        others = living_plants(self, self.get_namespace())
-        if others:
+    def _yield_to_older(self, message: DiagnosticArray) -> None:
+        """End where an older plant of our name lives that discovery reported late; a younger one ends itself."""
+        older = [
+            place
+            for began, place in others_in(message, self.get_fully_qualified_name())
+            if began < self._started_ns
+        ]
+        if older:
             self.get_logger().error(
-                f"{others[0]} lives in this ROS domain already, and was discovered late: this plant, the younger one, "
-                "ends. `/diagnostics` has the other's process and host."
+                f"{older[0]} lives in this ROS domain already. This plant is younger, and ends."
             )
+            self._end_watch()
             self._request_exit(FAILED)
-        if others or time.monotonic() > self._made_s + LATE_S:
-            self._twin_timer.cancel()
+
+    def _end_watch(self) -> None:
+        """Look for older plants no more."""
+        self._twin_timer.cancel()
+        self.destroy_subscription(self._twin_words)
 
     def _first_sample(self, backend: Backend) -> Sample:
         return backend.reset(first_episode(self.robot, self.settings), seed=self.settings.seed)
