@@ -15,7 +15,7 @@ from fulmar_core.plausible_ranges import UNITS, Plausible, Range
 
 LEAST_SHARE = 0.02  # of the largest usual value: where anything from 0 on is usual, less is no likely unit
 logger = logging.getLogger(__name__)
-# Whoever runs a program shows warnings once; nodes that load the same file again stay silent.
+# A program shows warnings once; nodes that load the same file again stay silent.
 logger.addHandler(logging.NullHandler())
 
 

@@ -6,9 +6,8 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-PARTICIPANT_BYTES = (
-    12  # of an endpoint's GUID: they name the process, the others the endpoint in it (RTPS 2.5, 9.3.1)
-)
+# Of an endpoint's GUID: they name the process, the others the endpoint in it (RTPS 2.5, 9.3.1)
+PARTICIPANT_BYTES = 12
 
 
 UNNAMED = "a node of unknown name"  # discovery reports endpoints some moments before the names of their nodes

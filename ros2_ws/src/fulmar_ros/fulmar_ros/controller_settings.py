@@ -12,9 +12,8 @@ from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
 
 MOST_COPIES = 3
-MISSED_TICKS = (
-    5  # of a plant whose states of the actuators may come late or get lost, before nothing is learned
-)
+# Of a plant whose states of the actuators may come late or get lost, before nothing is learned
+MISSED_TICKS = 5
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,8 @@ from fulmar_ros.qos import subscriber_qos
 PLANT = "plant"  # name of the node
 # From the creation of a node until it knows the others on a computer that is not overloaded: 0.11 to 0.62 s measured.
 DISCOVERY_S = 1.0
-BRIEFLY_S = (
-    0.5  # how long a plant delays its own start for that; what it discovers later ends it, see `LATE_S`
-)
+# How long a plant delays its own start for that; what it discovers later ends it, see `LATE_S`
+BRIEFLY_S = 0.5
 LATE_S = 5.0  # the same on a computer that is overloaded
 WORDS_S = 3.0  # a plant publishes diagnostics once a second
 LOOK_S = 0.05

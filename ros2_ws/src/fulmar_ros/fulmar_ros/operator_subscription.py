@@ -15,9 +15,8 @@ from fulmar_core.topics import Wire
 from fulmar_ros.qos import STREAM_DEPTH, subscriber_qos
 
 SUBSCRIPTIONS = 2  # of one latched wire, as its publishers count them
-REMEMBERED = (
-    5000  # messages by which a second delivery is recognised; the middleware keeps no more for a reader
-)
+# Messages by which a second delivery is recognised; the middleware keeps no more for a reader
+REMEMBERED = 5000
 
 
 def subscribe_operator(

@@ -100,7 +100,7 @@ def _of_topic(topic: Topic, bag: Bag) -> dict[str, Any]:
     stamps, unstamped = stamps_ns(read), 0
     if stamps is not None:
         unstamped = int(np.sum(stamps == 0))
-        # 0 means "not set": it tells no time, and would lie decades before the other stamps.
+        # 0 means "not set": as a time it would lie decades before the other stamps.
         stamps, log_ns = stamps[stamps != 0], log_ns[stamps != 0]
     # In lock step messages come as fast as the machine goes: only stamps tell a rate.
     by_stamp = stamps is not None and len(np.unique(stamps)) > 1

@@ -110,7 +110,7 @@ def _print(found: dict[str, Any], line: str) -> None:
         same = "as the file says" if drives == wire["file_says"] else f"the file says {wire['file_says']}"
         output.print(f"{wire['name']}: {drives} ({same})", markup=False)
     for group in found["indistinguishable"]:
-        output.print(f"no motion tells apart: {', '.join(group)}", markup=False)
+        output.print(f"no motion distinguishes: {', '.join(group)}", markup=False)
     for problem in found["problems"]:
         output.print(f"WRONG: {problem}", markup=False, soft_wrap=True)
     if line:

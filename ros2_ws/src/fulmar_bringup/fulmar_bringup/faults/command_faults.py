@@ -20,9 +20,8 @@ from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.qos import publisher_qos
 
 STRANGER_S = 0.02  # between its commands
-DISCOVERY_S = (
-    0.3  # until nodes on one computer know of a new publisher, and for the look of a tenth of a second
-)
+# Until nodes on one computer know of a new publisher, and for the look of a tenth of a second
+DISCOVERY_S = 0.3
 COMMANDS = Surroundings(spoilt=None)
 
 

@@ -13,15 +13,12 @@ from fulmar_core.commissioning.response import Response
 from fulmar_core.robot import Robot
 
 CLEARLY = 5.0  # standard errors that a change must exceed to count
-LEAST_SHARE = (
-    0.07  # of one nozzle's impulse; a seventh of it is what a nozzle takes away when all of eight blow
-)
-WEAK_SHARE = (
-    0.35  # below it, valves are inverted or the pressure is low: by more than mass and thrust are uncertain
-)
-WORST_MISMATCH = (
-    0.75  # of a unit force and a unit torque; neighbouring directions of eight nozzles are 1.4 apart
-)
+# Of one nozzle's impulse; a seventh of it is what a nozzle takes away when all of eight blow
+LEAST_SHARE = 0.07
+# Below it, valves are inverted or the pressure is low: by more than mass and thrust are uncertain
+WEAK_SHARE = 0.35
+# Of a unit force and a unit torque; neighbouring directions of eight nozzles are 1.4 apart
+WORST_MISMATCH = 0.75
 SAME = 1e-3  # nozzles whose forces and torques differ by less cannot be told apart
 ROUNDS = 3  # of matching and scaling the torque, since yaw inertias are known badly
 
@@ -136,7 +133,7 @@ def left_over(match: Match, count: int) -> int | None:
 
 
 def indistinct(robot: Robot) -> list[tuple[str, ...]]:
-    """Groups of nozzles whose forces and torques are equal, so that no motion tells them apart."""
+    """Groups of nozzles whose forces and torques are equal, so that no motion distinguishes them."""
     thrusters = robot.actuators
     if not isinstance(thrusters, Thrusters):
         return []

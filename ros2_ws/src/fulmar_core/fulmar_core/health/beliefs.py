@@ -12,9 +12,8 @@ from fulmar_core.health.thruster_health import Health
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
 
-DEAD_BELOW = (
-    0.5  # expected share of its thrust below which a valve counts as dead: that is likelier than not [-]
-)
+# Expected share of its thrust below which a valve counts as dead: that is likelier than not [-]
+DEAD_BELOW = 0.5
 
 
 @dataclass(frozen=True, slots=True)

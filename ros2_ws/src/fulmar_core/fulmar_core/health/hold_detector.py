@@ -1,7 +1,7 @@
 """Whether something keeps a body from moving: a hand, a cable, or the floor under an air bearing without air.
 
 A body that does not move although its valves open is explained by dead valves and pushes, too, so a bank of hypotheses
-about those learns nonsense while somebody holds the robot. This is the test against it: a cumulative sum (Page 1954,
+about those learns nonsense while a person holds the robot. This is the test against it: a cumulative sum (Page 1954,
 "Continuous inspection schemes") of how much better standing still explains the measurements than the whole bank does.
 Up to two dead valves explain a standstill as well; what they cannot explain is that none of several valves has an
 effect.

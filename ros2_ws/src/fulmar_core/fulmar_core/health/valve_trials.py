@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 LONGEST_S = 60.0  # each further trial waits twice as long, up to this [s]
-OPENINGS_S = (
-    0.2  # a valve has had its trial once it was open for so long: that tells a dead valve from a good one [s]
-)
+# A valve has had its trial once it was open for so long: that distinguishes a dead valve from a good one [s]
+OPENINGS_S = 0.2
 
 
 class ValveTrials:
