@@ -40,6 +40,7 @@ from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import HOLDS
+from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from hardware_drivers.presence import check_presence
@@ -211,8 +212,11 @@ def _wait_for_end(
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
 
     def failed() -> bool:
-        held = overseer.plant.message.startswith(HOLDS) and not end_on_estop
-        return overseer.plant.level == "error" and not held
+        said = overseer.plant.message
+        held = said.startswith(HOLDS) and not end_on_estop
+        # Before the controller acts, a late command changes nothing; one that hangs or dies is noticed all the same.
+        waits = said.startswith(NO_COMMAND) and overseer.controller.values.get("mode") == "armed"
+        return overseer.plant.level == "error" and not (held or waits)
 
     def running() -> None:
         raise_if_ended(group)

@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode
 
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.topics import DIAGNOSTICS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.command_writers import UNNAMED
@@ -118,7 +119,7 @@ class PlantHealth:
                 limit_ms = self._guard.watchdog.timeout_ns / 1e6
                 return (
                     "error",
-                    f"no command for {silent_ns / 1e6:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state",
+                    f"{NO_COMMAND} {silent_ns / 1e6:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state",
                     "tripped",
                 )
         stopped = self._estop()

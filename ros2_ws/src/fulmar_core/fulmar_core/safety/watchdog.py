@@ -6,6 +6,7 @@ from fulmar_core.errors import SafetyError
 
 SHORTEST_S = 0.2
 LONGEST_S = 0.5
+NO_COMMAND = "no command for"  # how the report of a trip begins
 
 
 def default_timeout(control_dt: float) -> float:
