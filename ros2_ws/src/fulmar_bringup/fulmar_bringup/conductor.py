@@ -171,8 +171,8 @@ def _listeners(plan: RunPlan) -> int:
 
 def _with_ends(failure: str, ends: list[Ended]) -> str:
     """Add the children that did not end well when they were asked to, unless the failure speaks of them already."""
-    # SIGINT itself ends a child only before it can listen, and then nothing is lost.
-    bad = [end for end in ends if end.returncode not in (0, -signal.SIGINT)]
+    # SIGTERM itself ends a child only before it can listen, and then nothing is lost.
+    bad = [end for end in ends if end.returncode not in (0, -signal.SIGTERM)]
     if failure:
         bad = [end for end in bad if end.name not in failure and not end.forced]
     return "; ".join([*([failure] if failure else []), *(f"{end.text} when it was stopped" for end in bad)])

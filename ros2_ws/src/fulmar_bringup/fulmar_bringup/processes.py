@@ -83,7 +83,7 @@ class ProcessGroup:
         return None
 
     def stop(self, *names: str) -> list[Ended]:
-        """Stop some children and wait for them: asked first, then told, then ended.
+        """Stop some children and wait for them: asked first, then killed.
 
         Args:
             names: Which; those that have ended already are reported too.
@@ -93,7 +93,8 @@ class ProcessGroup:
         """
         chosen = [(name, self._children[name]) for name in names if name in self._children]
         killed: set[int] = set()
-        for number, patience_s in ((signal.SIGINT, PATIENCE_S), (signal.SIGTERM, 1.0), (signal.SIGKILL, 2.0)):
+        # Not SIGINT: it ends a node that still imports its modules with a traceback, SIGTERM without a word.
+        for number, patience_s in ((signal.SIGTERM, PATIENCE_S), (signal.SIGKILL, 2.0)):
             alive = [child for _, child in chosen if child.poll() is None]
             for child in alive:
                 # A stopped process hears nothing but the last signal.

@@ -132,6 +132,9 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
             # which burns a core and starves the timers. A finite wait in a loop does what spin() should.
             while not over.done():
                 executor.spin_until_future_complete(over, timeout_sec=SPIN_S)
+        except InvalidHandle:
+            if not over.done():  # else the node was destroyed below a callback that took too long to end
+                raise
         except Exception as error:  # noqa: BLE001 - whatever a callback raises is the owner's to judge
             on_error(error)
 
