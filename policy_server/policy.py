@@ -10,14 +10,21 @@ import numpy as np
 import onnxruntime
 
 from fulmar_core.bundle_signature import verify_bundle
-from fulmar_core.controllers.told import told_for
+from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, with_disturbances
 from fulmar_core.errors import BundleError
-from fulmar_core.health.applied import Applied
-from fulmar_core.health.thruster_health import Health
 from fulmar_core.observation import Observer
-from fulmar_core.policy_bundle import GOLDEN, NETWORK, Bundle, Golden, Passport, check_fit, read_bundle
+from fulmar_core.policy_bundle import (
+    GOLDEN,
+    NETWORK,
+    Bundle,
+    Golden,
+    Passport,
+    check_fit,
+    read_bundle,
+    takes_disturbances,
+)
 from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
 
 GOLDEN_TOLERANCE = (
@@ -59,8 +66,8 @@ class Policy:
         self.passport = bundle.passport
         self.control_hz = control_hz or robot.timing.control_hz
         check_fit(self.passport, robot, task, self.control_hz, where=str(folder))
-        self._told = told_for(robot, task, self.control_hz, len(self.passport.observation_names))
-        self.observation_names = Observer(robot, task).names
+        self._observer = Observer(robot, task)
+        self.estimator = ESTIMATOR if takes_disturbances(self.passport.observation_names, robot) else None
         self._session = _open(bundle)
         self._memory: np.ndarray | None = None
         _check_shapes(self._session, self.passport, folder)
@@ -69,16 +76,11 @@ class Policy:
     def reset(self) -> None:
         """Forget what was seen, if the network remembers anything."""
         self._memory = None
-        if self._told:
-            self._told.reset()
 
-    def act(self, observation: Array) -> Array:
-        """Choose actuators; shapes as in `Controller.act`.
-
-        A network with memory remembers every row by itself, until `reset` or another number of rows.
-        """
-        rows = np.atleast_2d(np.asarray(observation))
-        batch = np.asarray(self._told.complete(rows) if self._told else rows, dtype=np.float32)
+    def act(self, inputs: Inputs) -> np.ndarray:
+        """Choose actuators; see `Controller.act`."""
+        seen = with_disturbances(self._observer, inputs) if self.estimator else inputs.observation
+        batch = np.asarray(seen, dtype=np.float32)
         if self.passport.memory:
             if self._memory is None or len(self._memory) != len(batch):
                 self._memory = np.zeros((len(batch), self.passport.memory), dtype=np.float32)
@@ -87,19 +89,7 @@ class Policy:
             )
         else:
             (command,) = self._session.run(["command"], {"observation": batch})
-        if self._told:
-            self._told.acts(command)
-        return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
-
-    def see_applied(self, applied: Applied | None) -> None:
-        """See `ActuatorObserver`; nothing to a network that is not given estimates."""
-        if self._told:
-            self._told.see_applied(applied)
-
-    @property
-    def health(self) -> Health | None:
-        """What is estimated of valves and push for the network; None where it is not given that."""
-        return self._told.health if self._told else None
+        return np.asarray(command)
 
     def metadata(self) -> dict[str, Any]:
         """The passport, with the name of the controller."""

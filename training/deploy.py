@@ -68,6 +68,7 @@ def deployed_network(
         limit=float(normaliser.clip_obs),
         memory=2 * trained.lstm.hidden_size if trained.lstm else 0,
         combinations=len(choice.commands) if choice else 0,
+        disturbances=isinstance(worlds, BatchVecEnv) and worlds.told,
         knows_dead=choice is not None and worlds.told,
         side=mirror.side if mirror else None,
         places=places,

@@ -11,17 +11,19 @@ import numpy as np
 import onnx
 import torch
 
-from fulmar_core.controllers.told import Told, told_for, told_terms
+from fulmar_core.control_loop import ControlLoop
+from fulmar_core.controllers.disturbance_inputs import disturbance_terms, with_disturbances
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
+from fulmar_core.goal import goal_in_float64
 from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import FORMAT, Golden, Passport, action_of, write_bundle
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from training.interrupt import polite_interrupt
-from training.network import DeployedNetwork, load_network
+from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record
 
 GOLDEN_VECTORS = 64
@@ -46,8 +48,7 @@ def export(run: Path, out: Path) -> Passport:
     robot, task = load_robot(record["robot"]), load_task(record["task"])
     network, names = load_network(run / NETWORK_FILE), Observer(robot, task).names
     plan = network.plan
-    told = told_for(robot, task, float(record["control_hz"]), plan.inputs)
-    names += told_terms(robot) if told else ()
+    names += disturbance_terms(robot) if plan.disturbances else ()
     if plan.inputs != len(names):
         raise ConfigError(
             f"{run}: the network takes {plan.inputs} terms, '{robot.name}' and '{task.name}' now have {len(names)}. "
@@ -75,7 +76,7 @@ def export(run: Path, out: Path) -> Passport:
         | {"curve": _curve(record)}
         | _verdict(record),
     )
-    return write_bundle(out, _to_onnx(network), _golden(network, robot, task, told), passport)
+    return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
 
 
 def _curve(record: dict[str, Any]) -> list[dict[str, float]]:
@@ -144,7 +145,7 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
         part.doc_string = ""
 
 
-def _golden(network: DeployedNetwork, robot: Robot, task: Task, told: Told | None) -> Golden:
+def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
     """What the network makes of held-out episodes at their start, and a few commands later.
 
     Where it hands over to a specialist, every other robot is told of a loss that strands it.
@@ -152,19 +153,25 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task, told: Told | Non
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
     )
-    memory = np.zeros((GOLDEN_VECTORS // 2, network.plan.memory), dtype=np.float32)
+    loop = ControlLoop(
+        robot,
+        task,
+        NetworkController(network, robot, task, robot.timing.control_hz),
+        robots=simulation.worlds,
+    )
+    loop.begin(goal_in_float64(simulation.goal))
+    memory = np.zeros((simulation.worlds, network.plan.memory), dtype=np.float32)
     moments = []
-    for _ in range(GOLDEN_STEPS + 1):
-        seen = np.asarray(simulation.observe())
-        seen = np.asarray(told.complete(seen) if told else seen, dtype=np.float32)
+    for number in range(GOLDEN_STEPS + 1):
+        inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
+        seen = with_disturbances(loop.observer, inputs) if network.plan.disturbances else inputs.observation
+        seen = seen.astype(np.float32)
         if network.specialist is not None:
             losses = network.losses.numpy()
             stranded = seen[::2, -losses.shape[1] :]
             stranded[:] = 1.0 - np.resize(losses, stranded.shape)
         command, logits, after = network.infer(seen, memory)
         moments.append((seen, memory, command, logits, after))
-        simulation.step(command)
-        if told:
-            told.acts(command)
+        simulation.move(loop.take(inputs, command).command)
         memory = after
     return Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))

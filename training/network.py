@@ -12,7 +12,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from fulmar_core.controllers.told import told_for
+from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, with_disturbances
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.errors import ConfigError
 from fulmar_core.observation import Observer
@@ -39,6 +40,7 @@ class NetworkPlan:
     limit: float  # normalised observations are cut to this
     memory: int = 0  # numbers that an LSTM before the hidden layers carries over; 0: there is none
     combinations: int = 0  # of valves, to choose from for a wrench
+    disturbances: bool = False  # its last inputs are `disturbance_terms`
     knows_dead: bool = False  # its last inputs are 1 for each valve, or 0 where it is dead
     side: int | None = None  # where this input is negative, it sees and answers the mirror image
     places: tuple[int, ...] = ()  # where targets begin in what it takes, if it is shown their coordinates too
@@ -257,28 +259,22 @@ class NetworkController:
     def __init__(self, network: DeployedNetwork, robot: Robot, task: Task, control_hz: float) -> None:
         """Wrap a network; rate in Hz."""
         self._network = network
-        self.observation_names = Observer(robot, task).names
+        self._observer = Observer(robot, task)
         self.control_hz = control_hz
         self._memory: np.ndarray | None = None
-        self._told = told_for(robot, task, control_hz, network.plan.inputs)
+        self.estimator = ESTIMATOR if network.plan.disturbances else None
 
     def reset(self) -> None:
         """Forget what was seen."""
         self._memory = None
-        if self._told:
-            self._told.reset()
 
-    def act(self, observation: Array) -> Array:
-        """Choose actuators; shapes as in `Controller.act`."""
-        batch = np.atleast_2d(observation)
+    def act(self, inputs: Inputs) -> np.ndarray:
+        """Choose actuators; see `Controller.act`."""
+        batch = with_disturbances(self._observer, inputs) if self.estimator else inputs.observation
         if self._memory is not None and len(self._memory) != len(batch):
             self._memory = None
-        if self._told:
-            batch = self._told.complete(batch)
         command, _, self._memory = self._network.infer(batch, self._memory)
-        if self._told:
-            self._told.acts(command)
-        return command.reshape((*np.shape(observation)[:-1], command.shape[-1]))
+        return np.asarray(command)
 
     def metadata(self) -> dict[str, Any]:
         """Its kind; an unfinished network has no identity worth recording."""

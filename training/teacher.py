@@ -11,8 +11,7 @@ import numpy as np
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr
-from fulmar_core.controllers.situation import raw_situation
-from fulmar_core.controllers.told import PUSH_TERMS
+from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS
 from fulmar_core.controllers.wrench_choice import WrenchChoice
 from fulmar_core.errors import ConfigError
 from training.vec_env import BatchVecEnv
@@ -44,7 +43,7 @@ def teacher_of(worlds: BatchVecEnv) -> Teacher:
     if isinstance(law, Lqr):  # what it remembers is of its own past, and the past here is its apprentice's
         law = Lqr(robot, task, replace(law.gains, observer=None), control_hz=robot.timing.control_hz)
     if worlds.choice is not None and isinstance(law, Lqr):
-        return WrenchTeacher(law, worlds.choice, told=worlds.told)
+        return WrenchTeacher(law, worlds.choice, worlds)
     if isinstance(worlds.action_space, gymnasium.spaces.Box) and worlds.choice is None:
         return CommandTeacher(law, worlds)
     raise ConfigError(
@@ -56,29 +55,29 @@ def teacher_of(worlds: BatchVecEnv) -> Teacher:
 class WrenchTeacher:
     """The LQR; where the network is told pushes, it takes them as told instead of estimating."""
 
-    def __init__(self, law: Lqr, choice: WrenchChoice, *, told: bool) -> None:
-        """Bind it to what chooses valves for wrenches."""
-        self._law, self._choice, self._told = law, choice, told
+    def __init__(self, law: Lqr, choice: WrenchChoice, worlds: BatchVecEnv) -> None:
+        """Bind it to the worlds, and to what chooses valves for wrenches in them."""
+        self._law, self._choice, self._worlds = law, choice, worlds
 
     def actions(self, observations: np.ndarray) -> np.ndarray:
         """Shares of the wanted wrench; see `Teacher`."""
-        seen = np.asarray(observations, dtype=float)
-        terms = len(self._law.observation_names)
-        now = raw_situation(self._law.reader, seen[:, :terms])
-        if self._told:
-            now = replace(now, push=seen[:, terms : terms + len(PUSH_TERMS)])
-        return np.asarray(self._choice.shares_of(self._law.wanted(seen[:, :terms], now)), dtype=np.float32)
+        inputs = self._worlds.inputs()
+        now = self._law.frame.situation(inputs)
+        if self._worlds.told:
+            terms = inputs.observation.shape[1]
+            now = replace(now, push=np.asarray(observations[:, terms : terms + len(PUSH_TERMS)], dtype=float))
+        return np.asarray(self._choice.shares_of(self._law.wanted(inputs, now)), dtype=np.float32)
 
 
 class CommandTeacher:
     """A law whose commands are what the network's actions are: shares of full command."""
 
     def __init__(self, law: Law, worlds: BatchVecEnv) -> None:
-        """Bind it to the scale of the worlds' actuators."""
-        self._law = law
+        """Bind it to the worlds and the scale of their actuators."""
+        self._law, self._worlds = law, worlds
         self._scale = np.asarray(worlds.robot.actuators.scale, dtype=float)
 
     def actions(self, observations: np.ndarray) -> np.ndarray:
         """Shares of full command; see `Teacher`."""
-        seen = np.asarray(observations, dtype=float)[:, : len(self._law.observation_names)]
-        return np.clip(self._law.act(seen) / self._scale, -1.0, 1.0).astype(np.float32)
+        shares = np.clip(self._law.act(self._worlds.inputs()) / self._scale, -1.0, 1.0)
+        return self._worlds.answered(shares.astype(np.float32))

@@ -10,12 +10,15 @@ import numpy as np
 import torch
 from stable_baselines3.common.vec_env import VecEnv
 
-from fulmar_core.controllers.told import told_terms
+from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.errors import ConfigError
+from fulmar_core.goal import goal_in_float64
 from fulmar_core.observation import shares
+from fulmar_core.planar import in_float64
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
@@ -72,7 +75,7 @@ class BatchVecEnv(VecEnv):
             training: Start episodes where learning starts.
             strength: How much of the scenario counts, from 0 to 1; may be moved later by `set_strength` [-].
             staggered: First episodes have random lengths.
-            told: Observations also tell pushes and dead valves (`fulmar_core.controllers.told`).
+            told: Observations also tell pushes and dead valves (`fulmar_core.controllers.disturbance_inputs`).
             wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
             gas: What a valve costs in that choice, as a multiple.
             mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
@@ -106,7 +109,7 @@ class BatchVecEnv(VecEnv):
         self.places = places_of(names) if coordinates else ()
         if coordinates and not self.places:
             raise ConfigError(f"'coordinates': task '{task.name}' has no path. Leave 'coordinates' out.")
-        more = coordinate_terms(len(self.places)) + (len(told_terms(robot)) if told else 0)
+        more = coordinate_terms(len(self.places)) + (len(disturbance_terms(robot)) if told else 0)
         actions = shares_space(WRENCH) if wrench else action_space(robot)
         if self.takes_orders:
             actions = gymnasium.spaces.MultiDiscrete([KINDS] * count)
@@ -193,9 +196,21 @@ class BatchVecEnv(VecEnv):
         actions = np.asarray(actions, dtype=np.float32)
         if self.takes_orders:
             actions = actions - 1.0
-        if self.mirror is not None:
-            actions = np.where(self._mirrored[:, None], actions @ self.mirror.done, actions)
+        actions = self.answered(actions)
         self._actions = self._valves(self.choice, actions) if self.choice else actions
+
+    def answered(self, shares: np.ndarray) -> np.ndarray:
+        """Shares of full command, mirrored where the last observation was; twice is not at all."""
+        if self.mirror is None:
+            return shares
+        return np.where(self._mirrored[:, None], shares @ self.mirror.done, shares)
+
+    def inputs(self) -> Inputs:
+        """What a controller without an estimator would act on now."""
+        simulation = self.simulation
+        observation, previous = (np.asarray(part, dtype=float) for part in (simulation.observe(), simulation.command))
+        state, goal = in_float64(simulation.measured), goal_in_float64(simulation.goal)
+        return Inputs(state, goal, observation, previous, None, 0, simulation.control_dt)
 
     def _valves(self, choice: WrenchChoice, shares: np.ndarray) -> np.ndarray:
         # By PyTorch, which keeps to the threads it was given; NumPy's would be in the way of another run's.

@@ -87,6 +87,11 @@ def stack_goals(goals: list[Goal]) -> Goal:
     return Goal(*(np.stack([getattr(g, name) for g in goals]) for name in Goal.__slots__))
 
 
+def goal_in_float64(goal: Goal) -> Goal:
+    """The same goal as NumPy arrays of float64."""
+    return Goal(*(np.asarray(getattr(goal, name), dtype=float) for name in Goal.__slots__))
+
+
 def offset_to(state: PlanarState, target: Array) -> tuple[Array, Array]:
     """Vector from a body to a target in the world, shapes (...,) [m]."""
     return target[..., 0] - state.x, target[..., 1] - state.y

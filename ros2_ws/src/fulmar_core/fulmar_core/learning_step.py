@@ -13,7 +13,6 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.push_block import PushBlock
 
 
 def learning_step(
@@ -45,9 +44,7 @@ def learning_step(
         The reward, less what the actuators cost and what is in the way; and whether the episode is over before its
         time, because the robot left the geofence or touched something. Shapes (worlds,).
     """
-    reward = task.reward(before, after, goal) - _cost(robot, effort, previous, command)
-    if isinstance(task, PushBlock):
-        reward = reward + task.block_reward(goal, ended)
+    reward = task.reward(before, after, goal, ended) - _cost(robot, effort, previous, command)
     penalty = getattr(task, "penalty", None)  # tasks where nothing is in the way have none
     if penalty is not None:
         reward = reward - penalty(after, goal, robot)

@@ -68,6 +68,11 @@ def at_rest(x: Array, y: Array, yaw: Array) -> PlanarState:
     return PlanarState(x, y, yaw, zero, zero, zero)
 
 
+def in_float64(state: PlanarState) -> PlanarState:
+    """The same state as NumPy arrays of float64."""
+    return PlanarState(*(np.asarray(getattr(state, name), dtype=float) for name in COLUMNS))
+
+
 def planar_of(state: RigidBodyState) -> PlanarState:
     """The planar part of a rigid-body state."""
     position, velocity = state.position_in_world, state.velocity_in_world

@@ -24,7 +24,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from fulmar_core.controllers.told import told_terms
+from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.errors import BundleError, did_you_mean
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
@@ -234,8 +234,10 @@ def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *
             f"policy '{where}' was trained at {passport.control_hz:g} Hz, but would run at {control_hz:g} Hz. "
             f"Train and export it at {control_hz:g} Hz, or run it with control_hz = {passport.control_hz:g}."
         )
-    seen = Observer(robot, task).names
-    _check_names("observation", passport.observation_names, seen + _told(passport, robot, len(seen)), where)
+    needed = Observer(robot, task).names
+    if takes_disturbances(passport.observation_names, robot):
+        needed += disturbance_terms(robot)
+    _check_names("observation", passport.observation_names, needed, where)
     _check_names("actuator", passport.actuator_names, robot.actuators.names, where)
     action = action_of(robot)
     if passport.action != action:
@@ -250,9 +252,9 @@ def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *
         )
 
 
-def _told(passport: Passport, robot: Robot, seen: int) -> tuple[str, ...]:
-    """What a network that takes more than is seen must be told."""
-    return told_terms(robot) if len(passport.observation_names) > seen else ()
+def takes_disturbances(names: tuple[str, ...], robot: Robot) -> bool:
+    """Whether a network with inputs of these names takes estimated disturbances of a robot."""
+    return not set(disturbance_terms(robot)).isdisjoint(names)
 
 
 def action_of(robot: Robot) -> Action:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from fulmar_core.backend import Backend, Sample
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import progressed, tell_course
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
-from fulmar_core.health.informer import Informer
+from fulmar_core.goal import Goal, goal_in_float64
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join
-from fulmar_core.observation import Observer, slewed
-from fulmar_core.planar import planar_of, stack_planar
+from fulmar_core.planar import PlanarState, planar_of, stack_planar
 from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, fitted
 
@@ -85,19 +86,12 @@ def batches(
             first=first + done,
             control_hz=controller.control_hz,
         )
-        dt = simulation.control_dt
-        controller.reset()
-        log, judge = TrajectoryLog(robot, task, dt), Judge(task, simulation.goal, dt)
-        steps, informer = episode_steps(task, dt), Informer(robot, controller)
-        for step in range(steps):
-            informer.see(simulation.measured, simulation.command, dt)
-            tell_course(controller, simulation.goal)
-            action = np.asarray(controller.act(simulation.observe()))
-            simulation.goal = progressed(controller, simulation.goal)
-            simulation.step(action)
-            log.add(simulation.truth, judge.see(simulation.truth, simulation.goal.block), simulation.command)
-            progress(done * steps + (step + 1) * count)
-        yield log.trajectories()
+        before = done * episode_steps(task, simulation.control_dt)
+
+        def further(steps: int, before: int = before) -> None:
+            progress(before + steps)
+
+        yield _roll_out(controller, robot, task, simulation, simulation.goal, further)
 
 
 def roll_out_in_backends(
@@ -143,52 +137,74 @@ def roll_out_in_backends(
             def further(steps: int, done: int = done) -> None:
                 progress(done + steps)
 
-            runs.append(_side_by_side(controller, backends, task, scenario, numbers, seed, further))
+            robot = backends[0].robot
+            drawn = draw_episodes(robot, fitted(task, robot), scenario, seed=seed, numbers=np.asarray(numbers))
+            samples = [
+                backend.reset(drawn[i], seed=seed, number=each)
+                for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
+            ]
+            worlds = _Backends(backends, samples, robot.timing.substeps(controller.control_hz))
+            runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further))
     return join(runs)
 
 
-def _side_by_side(
-    controller: Controller,
-    backends: list[Backend],
-    task: Task,
-    scenario: Scenario,
-    numbers: range,
-    seed: int,
-    progress: Progress,
+class _Worlds(Protocol):
+    """Worlds that are stepped side by side: the core's batch, or as many simulators."""
+
+    @property
+    def measured(self) -> PlanarState:
+        """Odometry now, shapes (worlds,)."""
+        ...
+
+    @property
+    def truth(self) -> PlanarState:
+        """True state now, shapes (worlds,)."""
+        ...
+
+    @property
+    def block(self) -> Array | None:
+        """Where the things to push are, shape (worlds, 2); None where there are none [m]."""
+        ...
+
+    def move(self, command: Array) -> None:
+        """Apply commands within every limit for one control step, shape (worlds, n)."""
+        ...
+
+
+def _roll_out(
+    controller: Controller, robot: Robot, task: Task, worlds: _Worlds, goal: Goal, progress: Progress
 ) -> Trajectories:
-    robot = backends[0].robot
-    task = fitted(task, robot)
-    substeps = robot.timing.substeps(controller.control_hz)
-    control_dt = substeps * robot.timing.physics_dt
-    drawn = draw_episodes(robot, task, scenario, seed=seed, numbers=np.asarray(numbers))
-    samples = [
-        backend.reset(drawn[i], seed=seed, number=number)
-        for i, (backend, number) in enumerate(zip(backends, numbers, strict=False))
-    ]
-    count = len(samples)
-    observer = Observer(robot, task)
-    controller.reset()
-    informer = Informer(robot, controller)
-    goal, command = drawn.goal, np.tile(robot.actuators.safe_command, (count, 1))
-    log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, drawn.goal, control_dt)
-    for step in range(episode_steps(task, control_dt)):
-        measured, block = stack_planar([planar_of(sample.measured) for sample in samples]), _blocks(samples)
-        if block is not None:
-            goal = dataclasses.replace(goal, block=block)
-        goal = task.advance(goal, measured, np.asarray(step * control_dt)) if step else goal
-        informer.see(measured, command, control_dt)
-        tell_course(controller, goal)
-        action = np.asarray(controller.act(observer(measured, goal, command)))
-        goal = progressed(controller, goal)
-        command = slewed(robot.actuators.limited(action), command, robot, control_dt)
-        samples = [backend.step(each, substeps) for backend, each in zip(backends, command, strict=False)]
-        truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])
-        log.add(truth, judge.see(truth, _blocks(samples)), command)
-        progress((step + 1) * count)
+    """Run one episode in each world; what happened is taken from the true states."""
+    loop = ControlLoop(robot, task, controller, robots=len(goal.done))
+    log, judge = TrajectoryLog(robot, loop.task, loop.dt), Judge(loop.task, goal, loop.dt)
+    loop.reset()
+    loop.begin(goal_in_float64(goal))
+    for number in range(episode_steps(task, loop.dt)):
+        if worlds.block is not None:
+            assert loop.goal is not None
+            loop.goal = replace(loop.goal, block=np.asarray(worlds.block, dtype=float))
+        step = loop.step(worlds.measured, round(1e9 * number * loop.dt))
+        worlds.move(step.command)
+        log.add(worlds.truth, judge.see(worlds.truth, worlds.block), step.command)
+        progress((number + 1) * len(goal.done))
     return log.trajectories()
 
 
-def _blocks(samples: list[Sample]) -> np.ndarray | None:
-    """Where the things to push are, shape (samples, 2); None where there are none [m]."""
-    places = [sample.block for sample in samples if sample.block is not None]
-    return np.stack(places) if len(places) == len(samples) else None
+class _Backends:
+    """Simulators that are stepped side by side."""
+
+    def __init__(self, backends: list[Backend], samples: list[Sample], substeps: int) -> None:
+        """Begin with the samples of their resets."""
+        self._backends, self._substeps = backends, substeps
+        self._take(samples)
+
+    def move(self, command: Array) -> None:
+        """Apply commands for one control step."""
+        stepped = zip(self._backends, command, strict=False)
+        self._take([backend.step(each, self._substeps) for backend, each in stepped])
+
+    def _take(self, samples: list[Sample]) -> None:
+        self.measured = stack_planar([planar_of(sample.measured) for sample in samples])
+        self.truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])
+        places = [sample.block for sample in samples if sample.block is not None]
+        self.block = np.stack(places) if len(places) == len(samples) else None

@@ -180,18 +180,37 @@ class BatchSimulation(Moves):
         self._actuation.hold(self._xp.asarray(self.command.T, copy=True))
         self._measure()
 
+    @property
+    def block(self) -> Array | None:
+        """Where the things to push are, shape (worlds, 2); None where there are none [m]."""
+        return self.goal.block if isinstance(self.task, PushBlock) else None
+
     def step(self, command: Array) -> None:
-        """Apply one command for one control step.
+        """Do one control step of a learner: limit and apply its command, and advance the goals by what is measured.
 
         Args:
-            command: Anything finite, shape (worlds, n); limits and slew are applied here.
+            command: Anything finite, shape (worlds, n).
         """
         xp = self._xp
         given = self._real(command)
         # One actuator after the other in memory, worlds side by side: most of what follows goes actuator by actuator.
         by_actuator = xp.stack([given[:, i] for i in range(given.shape[1])])
         wanted = self.robot.actuators.limited(by_actuator.T)
-        self.command = slewed(wanted, self.command, self.robot, self.control_dt)
+        self._move(slewed(wanted, self.command, self.robot, self.control_dt))
+        time_s = xp.astype(self._steps, self._dtype) * self.control_dt
+        self.goal = self.task.advance(self.goal, self.measured, time_s)
+
+    def move(self, command: Array) -> None:
+        """Apply one command for one control step, as a backend does; goals advance where they are followed.
+
+        Args:
+            command: Within every limit, shape (worlds, n).
+        """
+        self._move(self._real(command))
+
+    def _move(self, command: Array) -> None:
+        xp = self._xp
+        self.command = command
         noise = None
         if self._noisy:
             bits = words(self._noise_keys, self._steps, self.command.shape[1])
@@ -212,7 +231,6 @@ class BatchSimulation(Moves):
         self._steps = self._steps + 1
         if isinstance(self.task, PushBlock):
             self.goal, self.truth = self.task.pushed(self.goal, before, self.truth, self.robot)
-        self.goal = self.task.advance(self.goal, self.truth, time_s + self.control_dt)
         self._measure()
 
     def moving(self) -> dict[str, Any]:

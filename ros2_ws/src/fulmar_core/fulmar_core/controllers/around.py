@@ -11,11 +11,11 @@ import numpy as np
 CREEP = 0.15  # least distance that is told, so that a robot that stands at an obstacle can still leave [m]
 
 
-def room_ahead(discs: tuple[np.ndarray, np.ndarray, float], course: np.ndarray) -> np.ndarray:
+def room_ahead(discs: tuple[np.ndarray, np.ndarray, np.ndarray], course: np.ndarray) -> np.ndarray:
     """How far it is along the course to the first disc.
 
     Args:
-        discs: Centres in the body's frame, shapes (..., k) [m], and the width of all [m].
+        discs: Centres in the body's frame and widths, three arrays of shape (..., k) [m].
         course: Direction of travel in the body's frame, shape (...,) [rad].
 
     Returns:
@@ -26,4 +26,5 @@ def room_ahead(discs: tuple[np.ndarray, np.ndarray, float], course: np.ndarray) 
     along, beside = c * x + s * y, c * y - s * x
     to_edge = along - np.sqrt(np.maximum(wide * wide - beside * beside, 0.0))
     ahead = (np.abs(beside) < wide) & (along > 0.0)
-    return np.asarray(np.min(np.where(ahead, np.maximum(to_edge, CREEP), np.inf), axis=-1))
+    room = np.where(ahead, np.maximum(to_edge, CREEP), np.inf)
+    return np.asarray(np.min(room, axis=-1, initial=np.inf))

@@ -1,36 +1,64 @@
-"""What a controller is: a function from a task's observation to an actuator command."""
+"""What a controller is: a function from the inputs of one control step to an actuator command."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Protocol
 
-from fulmar_core.rotation import Array
+import numpy as np
+
+from fulmar_core.goal import Goal
+from fulmar_core.health.actuator_estimator import ActuatorEstimate
+from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.planar import PlanarState
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Inputs of one control step, of n robots side by side; a node controls one, n = 1.
+
+    Arrays are NumPy's, of float64. Lengths are in metres, angles in radians, and the frame is the odometry's.
+    """
+
+    state: PlanarState  # as measured, shapes (n,)
+    goal: Goal  # with every target; `goal.current` (n, 3) is the one that counts now
+    observation: np.ndarray  # the task's terms and the robot's own, in the order of `Observer.names`, shape (n, k)
+    previous: np.ndarray  # command of the step before, after every limit, shape (n, m)
+    estimates: ActuatorEstimate | None  # of an estimator that the controller asks for; None without one
+    stamp_ns: int  # when the state was measured, on the plant's clock [ns]
+    dt: float  # time of one control step [s]
 
 
 class Controller(Protocol):
-    """One interface for learned and classical controllers, on the robot and in evaluation."""
+    """One interface for learned and classical controllers, on the robot and in evaluation.
+
+    Attributes:
+        name: Under which it was chosen.
+        control_hz: How often it is asked [Hz].
+        estimator: Settings of the actuator estimator whose estimate it wants among its inputs; None for none.
+    """
 
     name: str
-    observation_names: tuple[str, ...]
     control_hz: float
+    estimator: Suspicion | None
 
     def reset(self) -> None:
         """Forget everything about the past: a new goal, a new episode, or time jumped."""
         ...
 
-    def act(self, observation: Array) -> Array:
+    def act(self, inputs: Inputs) -> np.ndarray:
         """Choose a command.
 
-        A controller that remembers anything does so for each row by itself, until `reset` or another number of rows.
+        A controller that remembers anything does so for each robot by itself, until `reset` or another number of them.
 
         Args:
-            observation: Terms in the order of `observation_names`, shape (n,) or (worlds, n).
+            inputs: Of n robots.
 
         Returns:
-            One value for each actuator, in the robot's order, shape (m,) or (worlds, m).
+            One value for each actuator, in the robot's order and units, shape (n, m).
         """
         ...
 
     def metadata(self) -> dict[str, Any]:
-        """Who this is, as JSON-ready values with a `sha256` of whatever defines its behaviour."""
+        """Identity of the controller, as JSON-ready values with a `sha256` of whatever defines its behaviour."""
         ...

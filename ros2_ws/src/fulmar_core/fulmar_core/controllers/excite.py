@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.identification.model import nominal_world
 from fulmar_core.motion import actuation_of, move
@@ -78,27 +79,26 @@ class Excite(Law):
         self._left = 0  # control steps that the command is still held
         self._held: np.ndarray | None = None
 
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """Hold a command, or choose another one; shapes as in `Controller.act`."""
-        rows = np.atleast_2d(observation)
-        if self._held is None or len(self._held) != len(rows) or self._left <= 0:
+        if self._held is None or len(self._held) != len(inputs.previous) or self._left <= 0:
             longest = max(1, round(self._how.hold_s * self.control_hz))
             self._left = int(self._rng.integers(1, longest + 1))
-            self._held = self._chosen(rows, self._left)
+            self._held = self._chosen(inputs, self._left)
         self._left -= 1
-        return self._held.reshape((*observation.shape[:-1], self._held.shape[-1]))
+        return self._held
 
-    def _chosen(self, rows: np.ndarray, steps: int) -> np.ndarray:
-        how, count = self._how, len(rows)
-        x, y = self.reader.goal(rows)
-        u, v, r = self.reader.motion(rows)
+    def _chosen(self, inputs: Inputs, steps: int) -> np.ndarray:
+        how, count = self._how, len(inputs.previous)
+        x, y = self.frame.goal(inputs)
+        u, v, r = self.frame.motion(inputs)
         room = how.room * self.robot.limits.geofence
         share = np.minimum(np.hypot(x, y) / room, 1.0) ** 2
         allowed = how.near + np.floor((how.far - how.near) * share)  # candidates, shape (rows,)
         # The same ones for every row, so that a row's answer does not depend on its neighbours.
         candidates = np.repeat(self._drawn(how.far), count, axis=0)
         before = PlanarState(*(np.tile(part, how.far) for part in (-x, -y, 0.0 * x, u, v, r)))
-        safe = np.tile(self.reader.previous(rows), (how.far, 1)).T
+        safe = np.tile(inputs.previous, (how.far, 1)).T
         actuation = actuation_of(self.robot, safe)
         actuation.begin(candidates.T, self._world, None)
         still = (np.zeros(1),) * 3

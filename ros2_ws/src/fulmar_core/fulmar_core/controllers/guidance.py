@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.controllers.seen import Vector
+from fulmar_core.controllers.body_frame import Vector
 
 MOVING = 0.03  # slower than this counts as standing; a few standard deviations of measured speed [m/s]
 

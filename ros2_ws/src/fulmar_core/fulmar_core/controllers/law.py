@@ -1,4 +1,4 @@
-"""What every classical law is made of: gains from a file, a reader of observations, and a name for itself."""
+"""What every classical law is made of: gains, inputs in the body's frame, and a name for itself."""
 
 from __future__ import annotations
 
@@ -11,15 +11,21 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fulmar_core.controllers.around import room_ahead
+from fulmar_core.controllers.body_frame import BodyFrame, Vector
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.guidance import passing_speed
-from fulmar_core.controllers.seen import Reader, Vector
+from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
 
 
 class Law(ABC):
-    """A controller whose commands follow from a few gains."""
+    """A controller whose commands follow from a few gains.
+
+    Attributes:
+        estimator: See `Controller`.
+    """
 
     law: ClassVar[str]  # the end of its gains' file name
     title: ClassVar[str]  # for lists
@@ -45,9 +51,9 @@ class Law(ABC):
         self.name = name or self.law
         self.control_hz = control_hz or robot.timing.control_hz
         self.robot, self.task, self.gains = robot, task, gains
-        self.reader = Reader(robot, task)
-        self.observation_names = self.reader.names
-        if self.reader.crosses_obstacles and not gains.speed_around:
+        self.frame = BodyFrame(robot, task)
+        self.estimator: Suspicion | None = None
+        if self.frame.crosses_obstacles and not gains.speed_around:
             raise ValueError("'speed_around' is missing, which says how fast to go among obstacles.")
         robot.timing.substeps(self.control_hz)  # refuses rates that the physics cannot keep
         self.reset()
@@ -55,42 +61,42 @@ class Law(ABC):
     def reset(self) -> None:  # noqa: B027 - most laws remember nothing
         """Forget what was seen."""
 
-    def act(self, observation: Array) -> Array:
+    def act(self, inputs: Inputs) -> np.ndarray:
         """Choose a command; shapes as in `Controller.act`."""
-        return self.robot.actuators.limited(self.command(np.asarray(observation, dtype=float)))
+        return np.asarray(self.robot.actuators.limited(self.command(inputs)))
 
     @property
     def share_of_speed(self) -> float:
         """How much of the cruising speed may be used [-]."""
-        return float(self.gains.speed_around) if self.reader.crosses_obstacles else 1.0
+        return float(self.gains.speed_around) if self.frame.crosses_obstacles else 1.0
 
     @property
     def near(self) -> float:
         """What counts as being there [m]."""
-        passed = 0.7 * getattr(self.task, "reach", 0.0) if self.reader.passes else 0.0
+        passed = 0.7 * getattr(self.task, "reach", 0.0) if self.frame.passes else 0.0
         return max(float(self.gains.near), passed)
 
-    def room(self, observation: np.ndarray, course: np.ndarray) -> np.ndarray:
+    def room(self, inputs: Inputs, course: np.ndarray) -> np.ndarray:
         """What is free in the direction of travel, infinite where nothing stands about; see `room_ahead`."""
-        if not self.reader.crosses_obstacles:
+        if not self.frame.crosses_obstacles:
             return np.full_like(course, np.inf)
-        return room_ahead(self.reader.obstacles(observation), course)
+        return room_ahead(self.frame.obstacles(inputs), course)
 
-    def last_speed(self, goal: Vector, observation: np.ndarray, *, cruise: np.ndarray | float) -> np.ndarray:
+    def last_speed(self, goal: Vector, inputs: Inputs, *, cruise: np.ndarray | float) -> np.ndarray:
         """Speed at the current target, shape (...,) [m/s]: that of passing it, or none where the robot shall stay.
 
         Args:
             goal: Way to the target, shapes (...,) [m].
-            observation: Says where the next one is.
+            inputs: Hold where the next one is.
             cruise: Speed where the course goes straight on [m/s].
         """
-        if not self.reader.passes:
+        if not self.frame.passes:
             return np.zeros_like(goal[0])
-        leg = self.reader.next_leg(observation)
+        leg = self.frame.next_leg(inputs)
         return passing_speed(goal, leg, cruise=cruise, corner=self.gains.corner)
 
     @abstractmethod
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """The law itself, before the actuators' limits; shapes as in `Controller.act`."""
 
     def metadata(self) -> dict[str, Any]:
@@ -110,7 +116,7 @@ class Law(ABC):
         """What else the commands depend on, as JSON-ready values."""
         water = self.robot.hydrodynamics
         return {
-            "observation_names": self.observation_names,
+            "observation_names": Observer(self.robot, self.task).names,
             "actuators": asdict(self.robot.actuators),
             "body": asdict(self.robot.body),
             "performance": asdict(self.robot.performance),

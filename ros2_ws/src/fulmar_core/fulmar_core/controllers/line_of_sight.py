@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.controllers.body_frame import Vector
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
@@ -22,7 +24,6 @@ from fulmar_core.controllers.guidance import (
 )
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.propeller_allocation import PropellerAllocation
-from fulmar_core.controllers.seen import Vector
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
@@ -79,30 +80,29 @@ class LineOfSight(Law):
         assert isinstance(robot.actuators, Propellers)
         self._allocation = PropellerAllocation(robot.actuators, least=gains.least_thrust)
 
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """Propeller commands; shapes as in `Controller.act`."""
-        u, v, r = self.reader.motion(observation)
-        if self.reader.tracks:
-            eu, _, er = self.reader.velocity_error(observation)
-            speed, turn = u + eu, r + er
+        u, v, r = self.frame.motion(inputs)
+        if self.frame.tracks:
+            speed, _, turn = self.frame.wanted_motion(inputs)
         else:
-            speed, turn = self._guided(observation, u, v)
+            speed, turn = self._guided(inputs, u, v)
         push, moment = self._effort(u, v, r, speed - u, turn - r)
-        return self._allocation.best(push, moment, self.reader.previous(observation))
+        return self._allocation.best(push, moment, inputs.previous)
 
-    def _guided(self, observation: np.ndarray, u: np.ndarray, v: np.ndarray) -> Vector:
+    def _guided(self, inputs: Inputs, u: np.ndarray, v: np.ndarray) -> Vector:
         """Wanted speed [m/s] and turn rate [rad/s]."""
         gains, share = self.gains, self.share_of_speed
-        goal = self.reader.goal(observation)
-        room = self.room(observation, end_that_goes_first(u))
+        goal = self.frame.goal(inputs)
+        room = self.room(inputs, end_that_goes_first(u))
         rho = np.hypot(*goal)
-        if self.reader.heads and gains.astern > 0.0:
-            way = way_to_turn_least(goal, self.reader.turn(observation), u)
+        if self.frame.heads and gains.astern > 0.0:
+            way = way_to_turn_least(goal, self.frame.turn(inputs), u)
         else:
             way = way_to_face(goal, u, backwards=gains.astern > 0.0)
         alpha = bearing(goal, way)
         cruise = np.where(way < 0.0, gains.astern, gains.cruise) * share
-        last = np.zeros_like(rho) if self.reader.heads else self.last_speed(goal, observation, cruise=cruise)
+        last = np.zeros_like(rho) if self.frame.heads else self.last_speed(goal, inputs, cruise=cruise)
         fastest = stopping_speed(
             np.minimum(rho, room), gain=gains.approach * share, deceleration=gains.braking, last=last
         )
@@ -110,7 +110,7 @@ class LineOfSight(Law):
         slip = np.where(way * u > 0.1, np.arctan2(way * v, np.maximum(way * u, 0.1)), 0.0)
         turn = gains.heading * (alpha - gains.sideslip * slip)
         there = (rho < self.near) & (last == 0.0)
-        left = self.reader.turn(observation) if self.reader.heads else np.zeros_like(rho)
+        left = self.frame.turn(inputs) if self.frame.heads else np.zeros_like(rho)
         speed = np.where(there, gains.approach * goal[0], speed)
         turn = np.where(there, gains.heading * left, turn)
         return speed, np.clip(turn, -gains.turn_rate, gains.turn_rate)

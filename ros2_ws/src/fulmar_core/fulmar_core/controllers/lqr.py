@@ -14,19 +14,17 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.controllers.body_frame import Situation, Vector
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
 from fulmar_core.controllers.reach import Reach
 from fulmar_core.controllers.riccati import regulator
-from fulmar_core.controllers.seen import Vector
-from fulmar_core.controllers.situation import Situation, Watch, raw_situation
 from fulmar_core.controllers.valve_allocation import ValveAllocation
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.dynamics.free_body import free_body_step
-from fulmar_core.health.applied import Applied
 from fulmar_core.health.suspicion import Suspicion
-from fulmar_core.health.thruster_health import Health
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -96,7 +94,7 @@ def linear_model(robot: Robot, control_dt: float) -> tuple[np.ndarray, np.ndarra
 
 
 class Lqr(Law):
-    """LQR on a task's observation; holds the heading where the task has one."""
+    """LQR on the estimated or measured state; holds the heading where the task has one."""
 
     law = "lqr"
     title = "LQR"
@@ -114,25 +112,24 @@ class Lqr(Law):
 
         Args:
             robot: A planar robot with thrusters.
-            task: A task whose observation holds the goal in the body frame, and the motion.
+            task: A task of poses, positions or velocities.
             gains: What errors and efforts cost.
             control_hz: Command rate; the robot's own by default [Hz].
             name: Under which it was chosen.
         """
-        self.watch: Watch | None = None
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         if not isinstance(robot.actuators, Thrusters):
             raise ValueError("the LQR allocates valves; this robot has none.")
         self._weights = gains
         dt = 1.0 / self.control_hz
         a, b = linear_model(robot, dt)
-        velocity = (self.reader.tracks and gains.tracking_velocity) or gains.velocity
+        velocity = (self.frame.tracks and gains.tracking_velocity) or gains.velocity
         q = np.array([gains.position] * 2 + [gains.heading] + [velocity] * 2 + [gains.yaw_rate])
-        torque = (self.reader.tracks and gains.tracking_torque) or gains.torque
+        torque = (self.frame.tracks and gains.tracking_torque) or gains.torque
         r = dt * np.diag([gains.force, gains.force, torque])
         # What has no goal is not a state.
         used = (
-            [3, 4, 5] if self.reader.tracks else [0, 1, 2, 3, 4, 5] if self.reader.heads else [0, 1, 3, 4, 5]
+            [3, 4, 5] if self.frame.tracks else [0, 1, 2, 3, 4, 5] if self.frame.heads else [0, 1, 3, 4, 5]
         )
         a, b = a[np.ix_(used, used)], b[used]
         best = regulator(a, b, dt * np.diag(q[used]), r)
@@ -141,9 +138,8 @@ class Lqr(Law):
         allocation = OpeningAllocation if robot.actuators.continuous else ValveAllocation
         self.reach = Reach(robot.actuators)
         # How far from the goal the law asks for 1 m/s [s].
-        self.lead = 1.0 if self.reader.tracks else float(self.gain[0, used.index(3)] / self.gain[0, 0])
-        if gains.observer:
-            self.watch = Watch(robot, self.reader, gains.observer, dt)
+        self.lead = 1.0 if self.frame.tracks else float(self.gain[0, used.index(3)] / self.gain[0, 0])
+        self.estimator = gains.observer
         self.allocation = allocation(robot.actuators, weight=hessian, valve_cost=dt * gains.open_valve)
 
     def reset(self) -> None:
@@ -151,32 +147,15 @@ class Lqr(Law):
         super().reset()
         self._last: np.ndarray | None = None
         self._age_s = 0.0  # of the last choice
-        if self.watch is not None:
-            self.watch.reset()
 
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """Choose valves; shapes as in `Controller.act`."""
-        now = self.watch.look(observation) if self.watch else raw_situation(self.reader, observation)
+        now = self.frame.situation(inputs)
         far = np.minimum(np.hypot(*now.goal) / FAR, 1.0) ** 2
         dearer = (
             far * self._weights.open_valve_far / self.control_hz if self._weights.open_valve_far else None
         )
-        chosen = self._steady(
-            np.asarray(self.allocation.best(self.wanted(observation, now), now.alive, dearer))
-        )
-        if self.watch:
-            self.watch.acts(chosen)
-        return chosen
-
-    def see_applied(self, applied: Applied | None) -> None:
-        """See `ActuatorObserver`."""
-        if self.watch:
-            self.watch.see_applied(applied)
-
-    @property
-    def health(self) -> Health | None:
-        """What the observer believes of valves and push; None without one, or before the first observation."""
-        return self.watch.health if self.watch else None
+        return self._steady(np.asarray(self.allocation.best(self.wanted(inputs, now), now.alive, dearer)))
 
     def _steady(self, command: np.ndarray) -> np.ndarray:
         """What was chosen last, until valves have had the time to open and close."""
@@ -186,15 +165,15 @@ class Lqr(Law):
             self._last, self._age_s = command, 0.0
         return np.asarray(self._last)
 
-    def wanted(self, observation: np.ndarray, now: Situation) -> np.ndarray:
+    def wanted(self, inputs: Inputs, now: Situation) -> np.ndarray:
         """Wrench that the valves should bring up, in the body's frame, shape (..., 3) [N, N, N·m].
 
         Args:
-            observation: Says what is wanted; not looked at where the task is a pose.
+            inputs: Hold further targets, obstacles and wanted velocities.
             now: Where the robot is and what pushes it.
         """
-        wrench = -self.error_state(observation, now) @ self.gain.T
-        if self.reader.tracks:
+        wrench = -self.error_state(inputs, now) @ self.gain.T
+        if self.frame.tracks:
             u, v, r = now.motion
             m = self.robot.body.mass
             wrench = wrench + np.stack(
@@ -202,17 +181,11 @@ class Lqr(Law):
             )  # what keeps u and v in a turn
         return np.asarray(wrench - now.push)
 
-    def error_state(self, observation: np.ndarray, now: Situation) -> np.ndarray:
+    def error_state(self, inputs: Inputs, now: Situation) -> np.ndarray:
         """State minus goal in the body frame, with far errors cut to the limits."""
-        if self.reader.tracks:
-            wanted = [
-                e + m
-                for e, m in zip(
-                    self.reader.velocity_error(observation), self.reader.motion(observation), strict=True
-                )
-            ]
-            return np.asarray(np.stack(now.motion, axis=-1) - np.stack(wanted, axis=-1))
-        to_goal = np.stack(self._aim(observation, now), axis=-1)
+        if self.frame.tracks:
+            return np.asarray(np.stack(now.motion, axis=-1) - inputs.goal.current)
+        to_goal = np.stack(self._aim(inputs, now), axis=-1)
         distance = np.linalg.norm(to_goal, axis=-1, keepdims=True)
         limit = self._weights.position_error_limit * self.share_of_speed
         if self._weights.braking:
@@ -220,23 +193,23 @@ class Lqr(Law):
             fastest = np.sqrt(2.0 * self._weights.braking * brake / self.robot.body.mass * distance)
             limit = np.minimum(limit, self.lead * fastest) + 1e-9
         parts = [-to_goal * (limit / np.maximum(distance, limit))]
-        if self.reader.heads:
+        if self.frame.heads:
             most = np.deg2rad(self._weights.heading_error_limit_deg)
             parts.append(-np.clip(now.turn, -most, most)[..., None])
         parts.append(np.stack(now.motion, axis=-1))
         return np.concatenate(parts, axis=-1)
 
-    def _aim(self, observation: np.ndarray, now: Situation) -> Vector:
+    def _aim(self, inputs: Inputs, now: Situation) -> Vector:
         """Where to go: the goal, beyond a waypoint, or along the way around obstacles, in the body frame [m]."""
         x, y = now.goal
-        if self.reader.crosses_obstacles:
+        if self.frame.crosses_obstacles:
             u, v, _ = now.motion
             course = np.where(np.hypot(u, v) > 0.05, np.arctan2(v, u), np.arctan2(y, x))
-            room = self.room(observation, course)
+            room = self.room(inputs, course)
             shorter = np.minimum(1.0, room / np.maximum(np.hypot(x, y), 1e-6))
             return x * shorter, y * shorter
-        if self.reader.passes:
-            dx, dy = self.reader.next_leg(observation)
+        if self.frame.passes:
+            dx, dy = self.frame.next_leg(inputs)
             far, leg = np.maximum(np.hypot(x, y), 1e-6), np.maximum(np.hypot(dx, dy), 1e-6)
             onward = np.maximum((x * dx + y * dy) / (far * leg), 0.0)
             longer = 1.0 + self._weights.overshoot * onward / far

@@ -39,6 +39,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.riccati import regulator
 from fulmar_core.robot import Robot
@@ -93,10 +94,10 @@ class LqrDrift(Law):
         super().reset()
         self._heading: np.ndarray | None = None
 
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """Choose valves; shapes as in `Controller.act`."""
-        yaw = self._unwound(-self.reader.turn(observation))
-        (x, y), (u, v, rate) = self.reader.goal(observation), self.reader.motion(observation)
+        yaw = self._unwound(-self.frame.turn(inputs))
+        (x, y), (u, v, rate) = self.frame.goal(inputs), self.frame.motion(inputs)
         c, s = np.cos(yaw), np.sin(yaw)
         # Target minus state, in the frame of the target.
         error = np.stack(

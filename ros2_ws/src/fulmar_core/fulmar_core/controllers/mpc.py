@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.controllers.body_frame import Situation
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
-from fulmar_core.controllers.situation import Situation, Watch
 from fulmar_core.controllers.valve_allocation import ValveAllocation
-from fulmar_core.health.applied import Applied
-from fulmar_core.health.thruster_health import Health
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
@@ -64,13 +63,12 @@ class Mpc(Law):
         name: str | None = None,
     ) -> None:
         """Build the model; arguments as of `Law`."""
-        self._watch: Watch | None = None
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
             raise ValueError("the MPC opens and closes valves; this robot has none of that kind.")
         base = LqrWeights(**{field.name: getattr(gains, field.name) for field in fields(LqrWeights)})
         self._base = Lqr(robot, task, base, control_hz=self.control_hz)
-        self._watch, self._gains, self._valves = self._base.watch, gains, robot.actuators
+        self.estimator, self._gains, self._valves = gains.observer, gains, robot.actuators
         self._mass, self._inertia = robot.body.mass, robot.body.inertia[2]
         self._dt = dt = 1.0 / self.control_hz
         steps = robot.timing.substeps(self.control_hz)
@@ -88,28 +86,9 @@ class Mpc(Law):
         self._slope = 2.0 * allocation.weight @ wrench.T
         self._price = dt * gains.gas * self._commands.sum(axis=1)
 
-    def reset(self) -> None:
-        """Forget the past."""
-        super().reset()
-        if self._watch is not None:
-            self._watch.reset()
-
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """Choose valves; shapes as in `Controller.act`."""
-        assert self._watch is not None
-        now = self._watch.look(observation)
-        chosen = self.plan(now)
-        self._watch.acts(chosen)
-        return chosen
-
-    def see_applied(self, applied: Applied | None) -> None:
-        """See `ActuatorObserver`."""
-        self._base.see_applied(applied)
-
-    @property
-    def health(self) -> Health | None:
-        """As of `Lqr`."""
-        return self._base.health
+        return self.plan(self.frame.situation(inputs))
 
     def plan(self, now: Situation) -> np.ndarray:
         """Valves to open now, shape (..., n).

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.controllers.body_frame import Vector
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
@@ -22,7 +24,6 @@ from fulmar_core.controllers.guidance import (
     way_to_face,
 )
 from fulmar_core.controllers.law import Law
-from fulmar_core.controllers.seen import Vector
 
 
 @dataclass(frozen=True)
@@ -57,24 +58,24 @@ class Polar(Law):
     title = "polar law"
     gains: PolarGains
 
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """Speed and turn rate; shapes as in `Controller.act`."""
-        if self.reader.tracks:
-            return self._at_velocity(observation)
-        u, _, _ = self.reader.motion(observation)
-        goal = self.reader.goal(observation)
-        if self.reader.heads:
-            return self._to_pose(goal, self.reader.turn(observation), u)
-        room = self.room(observation, end_that_goes_first(u))
-        last = self.last_speed(goal, observation, cruise=self._drive.max_speed)
+        if self.frame.tracks:
+            return self._at_velocity(inputs)
+        u, _, _ = self.frame.motion(inputs)
+        goal = self.frame.goal(inputs)
+        if self.frame.heads:
+            return self._to_pose(goal, self.frame.turn(inputs), u)
+        room = self.room(inputs, end_that_goes_first(u))
+        last = self.last_speed(goal, inputs, cruise=self._drive.max_speed)
         return self._to_position(goal, u, room, last)
 
-    def _at_velocity(self, observation: np.ndarray) -> np.ndarray:
+    def _at_velocity(self, inputs: Inputs) -> np.ndarray:
         """What is wanted, and a share of what is missing."""
-        u, _, r = self.reader.motion(observation)
-        eu, _, er = self.reader.velocity_error(observation)
+        u, _, r = self.frame.motion(inputs)
+        wanted_u, _, wanted_r = self.frame.wanted_motion(inputs)
         k = 1.0 + self.gains.velocity
-        return np.stack((u + k * eu, r + k * er), axis=-1)
+        return np.stack((u + k * (wanted_u - u), r + k * (wanted_r - r)), axis=-1)
 
     def _to_position(self, goal: Vector, u: np.ndarray, room: np.ndarray, last: np.ndarray) -> np.ndarray:
         top, fastest_turn = self._drive.scale * (self.share_of_speed, 1.0)

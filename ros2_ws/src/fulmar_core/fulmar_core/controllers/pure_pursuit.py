@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.controllers.body_frame import Vector
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.guidance import (
     bearing,
     end_that_goes_first,
@@ -24,7 +26,6 @@ from fulmar_core.controllers.guidance import (
     way_to_face,
 )
 from fulmar_core.controllers.law import Law
-from fulmar_core.controllers.seen import Vector
 
 
 @dataclass(frozen=True)
@@ -57,15 +58,15 @@ class PurePursuit(Law):
     title = "pure pursuit"
     gains: PurePursuitGains
 
-    def command(self, observation: np.ndarray) -> np.ndarray:
+    def command(self, inputs: Inputs) -> np.ndarray:
         """Speed and steering angle; shapes as in `Controller.act`."""
-        u, _, r = self.reader.motion(observation)
-        if self.reader.tracks:
-            eu, _, er = self.reader.velocity_error(observation)
-            return self._at_velocity(u + eu, r + er, u)
-        goal = self.reader.goal(observation)
-        room = self.room(observation, end_that_goes_first(u))
-        last = self.last_speed(goal, observation, cruise=self.gains.cruise)
+        u, _, _ = self.frame.motion(inputs)
+        if self.frame.tracks:
+            speed, _, turn = self.frame.wanted_motion(inputs)
+            return self._at_velocity(speed, turn, u)
+        goal = self.frame.goal(inputs)
+        room = self.room(inputs, end_that_goes_first(u))
+        last = self.last_speed(goal, inputs, cruise=self.gains.cruise)
         return self._pursuit(goal, u, room, last)
 
     def _pursuit(self, goal: Vector, u: np.ndarray, room: np.ndarray, last: np.ndarray) -> np.ndarray:

@@ -42,6 +42,10 @@ class Health:
         np.ndarray
     )  # (...,) whether something keeps the body from moving: then nothing is learned of the others
 
+    def __getitem__(self, index: int) -> Health:
+        """Of one robot out of many."""
+        return Health(*(getattr(self, name)[index] for name in Health.__slots__))
+
 
 class ThrusterHealth:
     """The bank, for one robot or for many at once."""

@@ -11,20 +11,20 @@ from fulmar_core.errors import shortened
 REJECTIONS_TO_LATCH = 3
 
 
-def command_problem(command: np.ndarray, count: int) -> str | None:
-    """What is wrong with a command vector.
+def command_problem(command: np.ndarray, shape: tuple[int, ...]) -> str | None:
+    """What is wrong with the commands of one robot or of many.
 
     Args:
         command: Any array.
-        count: Number of actuators.
+        shape: The one that it must have; actuators along the last axis.
 
     Returns:
         A reason for people, or None if it may be limited and applied.
     """
-    if command.shape != (count,):
-        return f"command has shape {command.shape}, must be ({count},)"
+    if command.shape != shape:
+        return f"command has shape {command.shape}, must be {shape}"
     if not np.isfinite(command).all():
-        return f"command for actuator {int(np.flatnonzero(~np.isfinite(command))[0]) + 1} is not finite"
+        return f"command for actuator {int(np.argwhere(~np.isfinite(command))[0, -1]) + 1} is not finite"
     return None
 
 

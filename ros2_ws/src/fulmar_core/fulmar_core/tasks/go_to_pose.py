@@ -106,7 +106,7 @@ class GoToPose:
         """The goal stays."""
         return goal
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
         old, new = self.errors(before, goal), self.errors(after, goal)
         xp = array_namespace(after.x)

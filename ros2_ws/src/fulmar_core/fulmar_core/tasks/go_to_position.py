@@ -78,7 +78,7 @@ class GoToPosition:
         """The goal stays."""
         return goal
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
         old, new = self.errors(before, goal).position, self.errors(after, goal).position
         return self.reward_weights.of(old, new, after)

@@ -72,16 +72,20 @@ class GoToPositionWithObstacles:
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `TaskProtocol.observe`."""
-        ux, uy, length = _way(state, goal)
-        x, y = to_body(state.yaw, length * ux, length * uy)
+        x, y = self.way_in_body(state, goal)
         fine = fine_terms(x, y, saturation=self.fine_distance)
         return (x, y, *motion_terms(state), *fine, *self.obstacles.observe(state, goal.obstacles))
+
+    def way_in_body(self, state: PlanarState, goal: Goal) -> tuple[Array, Array]:
+        """Direction to take around the obstacles, as long as the whole way, in the body's frame, shapes (...,) [m]."""
+        x, y, length = _way(state, goal)
+        return to_body(state.yaw, length * x, length * y)
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
         """The goal stays."""
         return goal
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
         return self.reward_weights.of(_way(before, goal)[2], _way(after, goal)[2], after)
 

@@ -156,11 +156,11 @@ class PassingTask(ABC):
         done = goal.done + array_namespace(goal.done).astype(reached, goal.done.dtype)
         return Goal(goal.targets, done, goal.obstacles, goal.block)
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
         old, new = self.errors(before, goal).position, self.errors(after, goal).position
         return self.reward_weights.of(
-            old - new, self.reached(goal, after, self.reach), bearing_of(after, goal.current), after
+            old - new, newly_done(goal, ended), bearing_of(after, goal.current), after
         )
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
@@ -170,6 +170,11 @@ class PassingTask(ABC):
     def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
         """Nothing stands about."""
         return None
+
+
+def newly_done(goal: Goal, ended: Goal) -> Array:
+    """Whether a target was done in a control step, shape (...,)."""
+    return ended.done > goal.done
 
 
 def toward(state: PlanarState, target: Array) -> tuple[Array, Array, Array]:

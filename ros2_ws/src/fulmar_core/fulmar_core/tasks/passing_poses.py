@@ -10,7 +10,7 @@ from fulmar_core.arrays import array_namespace
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.passing import PassingTask, WaypointReward, bearing_of, path_terms
+from fulmar_core.tasks.passing import PassingTask, WaypointReward, bearing_of, newly_done, path_terms
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class PosePassingTask(PassingTask):
         errors = self.errors(state, goal)
         return (errors.position < radius) & (array_namespace(state.x).abs(errors.heading) < limit)
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
         xp = array_namespace(after.x)
         w, old, new = self.reward_weights, self.errors(before, goal), self.errors(after, goal)
-        reached = self.reached(goal, after, self.reach)
+        reached = newly_done(goal, ended)
         e, d = xp.abs(new.heading), new.position
         target = goal.current
         progress = _way_to(before, target, old.position) - _way_to(after, target, d)

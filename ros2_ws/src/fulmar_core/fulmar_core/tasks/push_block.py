@@ -128,26 +128,19 @@ class PushBlock:
         x, y, slowed = push(before, after, goal.block[..., 0], goal.block[..., 1], self.block, robot)
         return replace(goal, block=array_namespace(x).stack((x, y), axis=-1)), slowed
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
-        """Reward of how the robot moved in one control step; see `TaskProtocol.reward`."""
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
+        """Reward of one control step: how the robot moved, and how the block did; see `TaskProtocol.reward`."""
         xp = array_namespace(after.x)
         w = self.reward_weights
         far, was_behind = self._stance(before, goal)
         near, is_behind = self._stance(after, goal)
+        old, d = self._way(goal)[2], self._way(ended)[2]
         return (
             w.robot * xp.exp(-near / 0.25)
             + w.approach * (far - near)
             + w.behind * (is_behind - was_behind)
             - w.spin * xp.abs(after.yaw_rate)
-        )
-
-    def block_reward(self, goal: Goal, ended: Goal) -> Array:
-        """Reward of how the block moved in one control step; see `TaskProtocol`."""
-        xp = array_namespace(goal.block)
-        w = self.reward_weights
-        old, d = self._way(goal)[2], self._way(ended)[2]
-        return (
-            w.block * xp.exp(-d / 0.25)
+            + w.block * xp.exp(-d / 0.25)
             + w.block_far * xp.exp(-d / 2.0)
             + w.home * xp.astype(d <= self.tolerance.position, d.dtype)
             + w.push * (old - d)

@@ -13,7 +13,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.passing import PassingTask, WaypointReward, bearing_of, path_terms
+from fulmar_core.tasks.passing import PassingTask, WaypointReward, bearing_of, newly_done, path_terms
 from fulmar_core.tasks.race_track import RaceTrack
 from fulmar_core.tasks.terms import Errors, pose_errors
 
@@ -68,11 +68,12 @@ class RaceGates(PassingTask):
     def _after(self, goal: Goal, state: PlanarState, reached: Array) -> Goal:
         return self.begun(super()._after(goal, state, reached), state)
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
         xp = array_namespace(after.x)
         gate = goal.current
-        forward, backward = crossings(before.x, before.y, after, gate, self.reach)
+        forward = newly_done(goal, ended)
+        backward = crossings(before.x, before.y, after, gate, self.reach)[1]
         left = _way_to(after, gate)
         progress = _way_to(before, gate) - xp.where(forward, xp.zeros_like(left), left)
         plain = self.reward_weights.of(progress, forward, bearing_of(after, gate), after)

@@ -24,7 +24,6 @@ class TaskProtocol(Protocol):
     - `penalty(state, goal, robot) -> Array`: what a state costs a learner beside the reward.
     - `pushed(goal, before, after, robot) -> (Goal, PlanarState)`: where the block is after a step in the core's batch,
       and the robot once the block has held it up; simulators with contacts move the block themselves.
-    - `block_reward(goal, ended) -> Array`: reward of what a step did to the block, beside that of the robot.
     """
 
     name: str
@@ -43,11 +42,18 @@ class TaskProtocol(Protocol):
         ...
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
-        """The goal after a control step: targets may be done, or their time may be over."""
+        """The goal after a measurement: targets may be done, or their time may be over."""
         ...
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
-        """Reward of one control step, shape (...,), for the goal that it began with; actuators cost extra."""
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
+        """Reward of one control step, shape (...,); actuators cost extra.
+
+        Args:
+            before: True state when it began.
+            after: True state when it ended.
+            goal: That it began with.
+            ended: The goal after it: targets may be done, things may have moved.
+        """
         ...
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:

@@ -109,7 +109,7 @@ class TrackVelocities:
         done = xp.astype(clip(done, 0.0, float(last)), goal.done.dtype)
         return Goal(goal.targets, xp.zeros_like(goal.done) + done, goal.obstacles, goal.block)
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal) -> Array:
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `TaskProtocol.reward`."""
         xp = array_namespace(after.x)
         w = self.reward_weights

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import Goal
+from fulmar_core.goal import Goal, goal_in_float64
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
@@ -47,13 +48,16 @@ def drives(robot: Robot, *, count: int, seconds: float, seed: int) -> list[Drive
     simulation = BatchSimulation(
         fine, task, load_scenario("ideal"), worlds=count, seed=seed, control_hz=1.0 / TICK_S
     )
+    loop = ControlLoop(robot, task, law, robots=count)
+    loop.begin(goal_in_float64(simulation.goal))
     states = []
     for tick in range(round(seconds / TICK_S)):
         if tick and tick % round(20.0 / TICK_S) == 0:  # goals are reached by then; what follows is new
-            simulation.goal = _turned_about(simulation.goal)
+            assert loop.goal is not None
+            loop.begin(_turned_about(loop.goal))
         if tick % hold == 0:
-            command = np.asarray(law.act(simulation.observe()))
-        simulation.step(command)
+            command = loop.step(simulation.measured, round(1e9 * tick * TICK_S)).command
+        simulation.move(command)
         t = simulation.truth
         states.append(np.stack((t.x, t.y, t.yaw, t.vx, t.vy, t.yaw_rate), axis=-1))
     rng = np.random.default_rng(seed)

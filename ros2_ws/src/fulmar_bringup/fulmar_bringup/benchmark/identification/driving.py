@@ -11,12 +11,12 @@ import numpy as np
 from fulmar_bringup.benchmark.identification.machines import Leg, Machine
 from fulmar_bringup.benchmark.sample_bag import SampleBag
 from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.disturbances.world import World
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import stack_goals
-from fulmar_core.observation import Observer
 from fulmar_core.planar import PlanarState, at_rest, planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import load_task
@@ -42,7 +42,6 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
     """
     task = load_task(TASK)
     controller = Excite(nominal, task)
-    observer = Observer(nominal, task)
     backend = MujocoBackend(machine.robot)
     episode = draw_episode(nominal, task, load_scenario("nominal"), seed=seed, number=0)
     zero = np.asarray(0.0)
@@ -50,14 +49,15 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
     sample = backend.reset(
         Episode(at_rest(zero, zero, zero), goal, _world(machine, leg, episode.world)), seed=seed
     )
-    goals, command = stack_goals([goal]), nominal.actuators.safe_command
+    loop = ControlLoop(nominal, task, controller)
+    loop.begin(stack_goals([goal]))
     dt, substeps = nominal.timing.physics_dt, nominal.timing.substeps(controller.control_hz)
     with SampleBag(folder, nominal) as bag:
         bag.odometry(sample.measured, 0.0)
         for tick in range(round(duration_s / dt)):
             if tick % substeps == 0:
-                seen = observer(stack_planar([planar_of(sample.measured)]), goals, command[None])
-                command = np.asarray(controller.act(np.asarray(seen)))[0]
+                measured = stack_planar([planar_of(sample.measured)])
+                command = loop.step(measured, round(1e9 * tick * dt)).command[0]
                 bag.applied(command, tick * dt)
             sample = backend.step(command)
             bag.odometry(sample.measured, (tick + 1) * dt)

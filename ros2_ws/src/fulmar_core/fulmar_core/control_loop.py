@@ -1,0 +1,185 @@
+"""One control step from measurement to command, for nodes, re-runs, evaluations and identification alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_core.controllers.controller import Controller, Inputs
+from fulmar_core.goal import Goal
+from fulmar_core.health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
+from fulmar_core.health.applied import Applied, AppliedHistory
+from fulmar_core.observation import Observer, slewed
+from fulmar_core.planar import PlanarState, in_float64
+from fulmar_core.robot import Robot
+from fulmar_core.safety.command_gate import command_problem
+from fulmar_core.tasks import Task, fitted
+
+NEVER_NS = 1 << 62  # no pause is that long
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Outcome of one control step of n robots."""
+
+    observation: np.ndarray  # shape (n, k)
+    action: np.ndarray  # what the controller chose, of whatever shape
+    command: np.ndarray  # the action after every limit; the safe one where it was refused, shape (n, m)
+    refusal: str  # why the action was refused; empty if it was not
+
+
+class ControlLoop:
+    """Advances the goal by what was measured, observes, asks the controller, and limits and gates its command.
+
+    Attributes:
+        goal: Of all robots, leading shape (n,); None before there is one.
+        previous: Command of the step before, after every limit, shape (n, m).
+        answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
+        estimate: Of the controller's actuator estimator at the newest step; None without one.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        controller: Controller,
+        *,
+        robots: int = 1,
+        pause_ns: int = NEVER_NS,
+        applied: AppliedHistory | None = None,
+    ) -> None:
+        """Begin without a goal.
+
+        Args:
+            robot: The robot.
+            task: What it does.
+            controller: Chooses the commands.
+            robots: n, how many of it run side by side.
+            pause_ns: After a longer time without a command the past is forgotten [ns].
+            applied: What the actuators of one robot did, as far as that is known; without it the loop takes commands
+                for what was applied.
+        """
+        self.robot, self.task = robot, fitted(task, robot)
+        self.observer = Observer(robot, self.task)
+        self.dt = robot.timing.substeps(controller.control_hz) * robot.timing.physics_dt
+        self._pause_ns, self._applied = pause_ns, applied
+        self._safe = np.tile(np.asarray(robot.actuators.safe_command, dtype=float), (robots, 1))
+        self.goal: Goal | None = None
+        self._began_ns: int | None = None
+        self.previous, self.answered_ns = self._safe, -1
+        self._estimator = self._estimator_for(controller)
+        self.estimate: ActuatorEstimate | None = None
+        self._estimated_ns = -1
+        self._controller = controller
+
+    @property
+    def controller(self) -> Controller:
+        """The controller that chooses the commands."""
+        return self._controller
+
+    def use(self, controller: Controller) -> None:
+        """Let another controller go on; what is estimated begins anew."""
+        if controller.estimator != self._controller.estimator:
+            self._estimator = self._estimator_for(controller)
+        self._controller = controller
+        self._forget_estimates()
+
+    def begin(self, goal: Goal | None) -> None:
+        """Take a new goal, leading shape (n,), or none; its time begins with the next step."""
+        self.goal, self._began_ns = goal, None
+
+    def reset(self) -> None:
+        """Let controller and estimator forget the past: a new goal or episode, or time or place jumped."""
+        self._controller.reset()
+        self._forget_estimates()
+
+    def step(self, measured: PlanarState, stamp_ns: int) -> Step:
+        """Do one control step; see `inputs` and `act`."""
+        return self.act(self.inputs(measured, stamp_ns))
+
+    def inputs(self, measured: PlanarState, stamp_ns: int) -> Inputs:
+        """Advance the goal by a measurement, and observe.
+
+        Args:
+            measured: State of each robot, shapes (n,).
+            stamp_ns: When it was measured, on the plant's clock [ns].
+
+        Returns:
+            What the controller acts on.
+        """
+        if stamp_ns - self.answered_ns > self._pause_ns:
+            self.previous = self._safe
+            self.reset()
+        state = in_float64(measured)
+        goal = self._advanced(state, stamp_ns)
+        self._estimate(state, stamp_ns)
+        observation = np.asarray(self.observer(state, goal, self.previous), dtype=float)
+        return Inputs(state, goal, observation, self.previous, self.estimate, stamp_ns, self.dt)
+
+    def act(self, inputs: Inputs) -> Step:
+        """Ask the controller, and limit and gate its command, which is the previous one from then on.
+
+        Args:
+            inputs: Of `inputs`.
+
+        Raises:
+            Exception: Whatever the controller raises; the previous command is the safe one then.
+        """
+        self.rest(inputs.stamp_ns)
+        return self.take(inputs, self._controller.act(inputs))
+
+    def take(self, inputs: Inputs, chosen: np.ndarray) -> Step:
+        """Limit and gate an action, chosen from these inputs.
+
+        Args:
+            inputs: Of `inputs`.
+            chosen: See `Controller.act`.
+        """
+        action = np.asarray(chosen, dtype=float)
+        refusal = command_problem(action, self._safe.shape) or ""
+        command = self._safe
+        if not refusal:
+            command = slewed(self.robot.actuators.limited(action), inputs.previous, self.robot, self.dt)
+        self.previous, self.answered_ns = command, inputs.stamp_ns
+        return Step(inputs.observation, action, command, refusal)
+
+    def rest(self, stamp_ns: int) -> None:
+        """Answer a measurement with the safe command, without asking the controller [ns]."""
+        self.previous, self.answered_ns = self._safe, stamp_ns
+
+    def _advanced(self, state: PlanarState, stamp_ns: int) -> Goal:
+        """The goal with those targets done that a measurement reaches."""
+        assert self.goal is not None, "a control step needs a goal"
+        if self._began_ns is None:
+            self._began_ns = stamp_ns
+            begun = getattr(self.task, "begun", None)
+            if begun is not None:
+                self.goal = begun(self.goal, state)
+        else:
+            time_s = np.asarray((stamp_ns - self._began_ns) / 1e9)
+            self.goal = self.task.advance(self.goal, state, time_s)
+        assert self.goal is not None
+        return self.goal
+
+    def _estimator_for(self, controller: Controller) -> ActuatorEstimator | None:
+        return ActuatorEstimator(self.robot, controller.estimator) if controller.estimator is not None else None
+
+    def _forget_estimates(self) -> None:
+        if self._estimator is not None:
+            self._estimator.reset()
+        self.estimate, self._estimated_ns = None, -1
+
+    def _estimate(self, state: PlanarState, stamp_ns: int) -> None:
+        """Update the estimate by what moved the robot since the last one."""
+        if self._estimator is None:
+            return
+        passed_ns = stamp_ns - self._estimated_ns
+        applied: np.ndarray | Applied | None = None
+        passed_s = self.dt
+        if 0 < passed_ns <= self._pause_ns:
+            applied, passed_s = self.previous, 1e-9 * passed_ns
+            if self._applied is not None:
+                applied = self._applied.between(self._estimated_ns, stamp_ns)
+        self.estimate = self._estimator.update(state, applied, passed_s)
+        self._estimated_ns = stamp_ns

@@ -1,0 +1,43 @@
+"""Estimated disturbances as inputs of a network: what pushes the robot, and which valves are dead.
+
+A feed-forward network cannot estimate them by itself, and without them it leans into every push. A network that takes
+them has their names in its passport, behind those of the observation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fulmar_core.controllers.controller import Inputs
+from fulmar_core.health.actuator_estimator import ActuatorEstimate
+from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.thruster_health import can_be_watched
+from fulmar_core.observation import Observer
+from fulmar_core.robot import Robot
+
+PUSH_TERMS = ("push_x_in_body", "push_y_in_body", "push_torque")  # [N, N, N·m]
+# Networks learn on an estimator that takes no body for held and has no valve tried again.
+ESTIMATOR = Suspicion(held=0.0, retry_s=0.0)
+
+
+def disturbance_terms(robot: Robot) -> tuple[str, ...]:
+    """Names of the inputs: the push, and 1 for each valve, or 0 where it is dead; none of robots without valves."""
+    if not can_be_watched(robot):
+        return ()
+    return (*PUSH_TERMS, *(f"{name}_alive" for name in robot.actuators.names))
+
+
+def with_disturbances(observer: Observer, inputs: Inputs) -> np.ndarray:
+    """Observation of the estimated motion, which is less noisy than the measured one, with `disturbance_terms`.
+
+    Args:
+        observer: Of the network's robot and task.
+        inputs: With estimates.
+
+    Returns:
+        Shape (n, k).
+    """
+    estimate = inputs.estimates
+    assert isinstance(estimate, ActuatorEstimate)
+    observation = observer(estimate.state, inputs.goal, inputs.previous)
+    return np.column_stack((observation, estimate.push, estimate.alive))
