@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import BundleError
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_ros.controller_node import ControllerNode
-from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.runtime import run_node
 from policy_server.policy import Policy
 from policy_server.shipped import shipped_policy

@@ -9,9 +9,9 @@ import gymnasium
 import numpy as np
 
 from fulmar_core.controllers.classical import load_classical
+from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr
-from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS
 from fulmar_core.controllers.wrench_choice import WrenchChoice
 from fulmar_core.errors import ConfigError
 from training.vec_env import BatchVecEnv

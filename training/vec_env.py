@@ -208,7 +208,9 @@ class BatchVecEnv(VecEnv):
     def inputs(self) -> Inputs:
         """What a controller without an estimator would act on now."""
         simulation = self.simulation
-        observation, previous = (np.asarray(part, dtype=float) for part in (simulation.observe(), simulation.command))
+        observation, previous = (
+            np.asarray(part, dtype=float) for part in (simulation.observe(), simulation.command)
+        )
         state, goal = in_float64(simulation.measured), goal_in_float64(simulation.goal)
         return Inputs(state, goal, observation, previous, None, 0, simulation.control_dt)
 

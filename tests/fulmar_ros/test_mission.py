@@ -10,12 +10,12 @@ import pytest
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.goal import goal_at
+from fulmar_core.mission import Mission
 from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.goal_messages import obstacles_message
 from fulmar_ros.message_reader import obstacles_of
-from fulmar_ros.mission import Mission
 from tests.states import planar_state
 
 S = 1_000_000_000

@@ -24,12 +24,12 @@ from fulmar_bringup.node_table import (
     run_goals_spec,
 )
 from fulmar_bringup.system import Guards
+from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import (
     COMMAND,
     ODOMETRY,
 )
-from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.estimator_node import EstimatorNodeSettings
 from fulmar_ros.estop_node import EstopSettings
 from fulmar_ros.goal_node import GoalSettings

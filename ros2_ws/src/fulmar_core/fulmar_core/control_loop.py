@@ -11,7 +11,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
 from fulmar_core.health.applied import Applied, AppliedHistory
 from fulmar_core.observation import Observer, slewed
-from fulmar_core.planar import PlanarState, in_float64
+from fulmar_core.planar import COLUMNS, PlanarState, in_float64
 from fulmar_core.robot import Robot
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.tasks import Task, fitted
@@ -163,7 +163,9 @@ class ControlLoop:
         return self.goal
 
     def _estimator_for(self, controller: Controller) -> ActuatorEstimator | None:
-        return ActuatorEstimator(self.robot, controller.estimator) if controller.estimator is not None else None
+        return (
+            ActuatorEstimator(self.robot, controller.estimator) if controller.estimator is not None else None
+        )
 
     def _forget_estimates(self) -> None:
         if self._estimator is not None:
@@ -183,3 +185,12 @@ class ControlLoop:
                 applied = self._applied.between(self._estimated_ns, stamp_ns)
         self.estimate = self._estimator.update(state, applied, passed_s)
         self._estimated_ns = stamp_ns
+
+
+def unknown_inputs(loop: ControlLoop, stamp_ns: int) -> Inputs:
+    """Inputs of one robot whose state and goal are not known: NaN."""
+    unknown = np.full(1, np.nan)
+    state = PlanarState(*(unknown for _ in COLUMNS))
+    goal = Goal(np.full((1, 1, 3), np.nan), np.zeros(1), np.zeros((1, 0, 3)), np.full((1, 2), np.nan))
+    observation = np.full((1, len(loop.observer.names)), np.nan)
+    return Inputs(state, goal, observation, loop.previous, None, stamp_ns, loop.dt)

@@ -138,7 +138,9 @@ def roll_out_in_backends(
                 progress(done + steps)
 
             robot = backends[0].robot
-            drawn = draw_episodes(robot, fitted(task, robot), scenario, seed=seed, numbers=np.asarray(numbers))
+            drawn = draw_episodes(
+                robot, fitted(task, robot), scenario, seed=seed, numbers=np.asarray(numbers)
+            )
             samples = [
                 backend.reset(drawn[i], seed=seed, number=each)
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))

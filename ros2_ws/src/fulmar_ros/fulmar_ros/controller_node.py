@@ -15,33 +15,30 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import tell_course
+from fulmar_core.control_loop import Step
+from fulmar_core.controller_settings import ControllerSettings
+from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
-from fulmar_core.health.applied import report_applied
+from fulmar_core.guarded_loop import GuardedLoop
+from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.beliefs import BeliefReader, Beliefs
-from fulmar_core.health.informer import Informer
-from fulmar_core.health.thruster_health import Health, can_be_watched
-from fulmar_core.observation import slewed
+from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode
-from fulmar_core.safety.command_gate import command_problem
+from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
-from fulmar_ros.actuator_watch import ActuatorWatch
 from fulmar_ros.control_beat import ControlBeat
-from fulmar_ros.controller_inputs import ControllerInputs
-from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.message_reader import measurement_of, stamp_ns
+from fulmar_ros.message_reader import block_of, goal_of, measurement_of, obstacles_of, stamp_ns
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.standby import Standby
 from fulmar_ros.wire_watch import WireWatch
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -77,25 +74,22 @@ class ControllerNode(LifecycleNode):
         self._make_controller, self._request_exit = make_controller, request_exit
         self._speaking = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
-        self.inputs = ControllerInputs(self.robot, self.task, self.settings)
+        self.guard: GuardedLoop | None = None  # while configured
+        self._estop = EstopWatch(required=self.settings.estop)  # a press outlives a new configuration
         self._swap = PolicySwap(
             self._load if learned else None,
-            propose=lambda candidate: self._succession.propose(candidate),
+            propose=lambda candidate: self._guarded.succession.propose(candidate),
             warn=self.get_logger().warning,
         )
         self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
-        self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
-        self._control_ns = round(1e9 / hz)
         self._pause_ns = self.settings.pause_ns(self.robot)
-        self._actuators = ActuatorWatch(self._pause_ns, self.settings.hold_ns(self.robot))
+        self._applied = AppliedHistory(self.settings.hold_ns(self.robot))
         self._belief_reader = BeliefReader(self.robot) if can_be_watched(self.robot) else None
         self._beliefs = Beliefs()
         self._beat = ControlBeat(
             1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
         )
-        self._status = ControllerStatus(
-            self.inputs.mission, self._swap, goals_streamed=self.settings.goals_streamed
-        )
+        self._status = ControllerStatus(self._swap, goals_streamed=self.settings.goals_streamed)
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
@@ -104,19 +98,21 @@ class ControllerNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load, validate and warm up the controller; refuse it if anything is wrong."""
         try:
-            self._succession = line_up(
+            succession = line_up(
                 self._make_controller, self.robot, self.task, self.settings, self.get_logger().error
             )
         except (FulmarError, ImportError) as error:
             self._refusal = str(error)
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
-        self._actuators.forget()
+        self.guard = GuardedLoop(
+            self.robot, self.task, self.settings, succession, self._estop, applied=self._applied
+        )
         self.wires = ControllerWires(
             self,
             self.robot,
             self.task,
-            self.controller,
+            self.guard.loop.observer.names,
             on_odometry=self._on_odometry,
             on_goal=self._on_goal,
             on_obstacles=self._on_obstacles,
@@ -128,17 +124,21 @@ class ControllerNode(LifecycleNode):
             on_bearing=self._on_bearing if self.settings.has_bearing(self.robot) else None,
             lockstep=self.settings.lockstep,
         )
-        self.wires.publish_metadata(self._succession.current.metadata)
+        self.wires.publish_metadata(succession.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._tell_idle_status)
-        self.inputs.set(configured=True, latched_fault="")
         return DONE
 
     @property
     def controller(self) -> Controller:
-        """Whose turn it is."""
-        return self._succession.current.controller
+        """The controller that acts."""
+        return self._guarded.loop.controller
+
+    @property
+    def _guarded(self) -> GuardedLoop:
+        assert self.guard is not None, "the node is not configured"
+        return self.guard
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to answer, from fresh measurements on; not while the controller still hangs from the last time."""
@@ -146,7 +146,7 @@ class ControllerNode(LifecycleNode):
             self._refusal = "the controller still hangs in the step that it was in when it was deactivated"
             self.get_logger().error(f"not activated: {self._refusal}")
             return REFUSED
-        self.inputs.activate()
+        self._guarded.activate()
         self._beat.renew()
         settle_memory()
         if not self.settings.lockstep:
@@ -168,81 +168,80 @@ class ControllerNode(LifecycleNode):
 
     def stop(self) -> None:
         """Last words before the process ends: the safe command, several times, and the figures of the run."""
-        if self.inputs.flags.configured:
+        if self.guard is not None:
             self._fall_silent()
             self._status.repeat()
-            self._tell_status(self.inputs.decide())
+            self._tell_status()
 
     def _fall_silent(self) -> None:
-        self.inputs.set(activated=False)
+        self._guarded.set(activated=False)
         self._beat.halt()
-        newest = self.inputs.newest
+        newest = self._guarded.newest
         with self._speaking:
             for _ in range(SAFE_REPEATS):
                 self.wires.publish_safe(newest.stamp_ns if newest else 0)
         self.wires.flush()
 
     def _dismantle(self) -> None:
-        if self.inputs.flags.configured:
+        if self.guard is not None:
             self._fall_silent()
-            self.inputs.set(configured=False)
+            self.guard = None
             self.destroy_timer(self._status_timer)
             self.wires.destroy(self)
 
     def _on_estop(self, message: Bool) -> None:
-        self.inputs.hear_estop(message)
-        self._tell_status(self.inputs.decide())
+        self._estop.hear(bool(message.data), time.monotonic_ns())
+        self._tell_status()
 
     def _on_estop_released(self, _message: String) -> None:
-        self.inputs.release_estop()
-        self._tell_status(self.inputs.decide())
+        self._estop.release(time.monotonic_ns())
+        self._tell_status()
 
     def _on_swap(self, message: String) -> None:
         self._swap.ask(message.data)
-        self._tell_status(self.inputs.decide())  # at once: who asked repeats it until then
+        self._tell_status()  # at once: an operator repeats the request until then
 
     def _load(self, folder: str) -> Standby:
-        return load_other(
-            self._make_controller, self.robot, self.task, self.settings, folder, like=self.controller
-        )
-
-    def _take_turns(self) -> None:
-        """Between two control steps: let a new policy take over, and say so."""
-        if self._succession.turn():
-            self._swap.took_over()
-            self._announce()
+        return load_other(self._make_controller, self.robot, self.task, self.settings, folder)
 
     def _announce(self) -> None:
-        """Say who controls now; what is known of the actuators begins anew."""
-        self._actuators.forget()
-        self.wires.publish_metadata(self._succession.current.metadata)
+        """Publish the identity of the controller that acts from now on."""
+        self.wires.publish_metadata(self._guarded.succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
-        if problem := self.inputs.take_goal(message):
+        goal, problem = goal_of(message)
+        if goal is not None:
+            problem = self._guarded.take_goal(goal, stamp_ns(message.header.stamp), time.monotonic_ns())
+        if problem:
             self.get_logger().warning(f"goal refused: {problem}")
-        self._tell_status(self.inputs.decide())
+        self._tell_status()
         self._go_on()
 
     def _on_obstacles(self, message: MarkerArray) -> None:
-        if problem := self.inputs.take_obstacles(message):
+        discs, problem = obstacles_of(message)
+        if discs is None:
             self.get_logger().warning(f"obstacles refused: {problem}")
             return
-        self._tell_status(self.inputs.decide())
+        stamp = stamp_ns(message.markers[0].header.stamp) if message.markers else 0
+        self._guarded.take_obstacles(discs, stamp)
+        self._tell_status()
 
     def _on_block(self, message: PoseStamped) -> None:
-        if problem := self.inputs.take_block(message):
+        place, problem = block_of(message)
+        if place is None:
             self.get_logger().warning(f"place of the block refused: {problem}")
             return
+        self._guarded.take_block(place, stamp_ns(message.header.stamp))
         self._go_on()
 
     def _on_applied(self, message: JointState) -> None:
         if tuple(message.name) == self.robot.actuators.names and len(message.effort) == len(message.name):
-            self._actuators.history.add(stamp_ns(message.header.stamp), np.array(message.effort))
+            self._applied.add(stamp_ns(message.header.stamp), np.array(message.effort))
         self._go_on()
 
     def _on_bearing(self, message: Bool) -> None:
-        self.inputs.take_bearing(bool(message.data))
-        self._tell_status(self.inputs.decide())
+        self._guarded.take_bearing(bool(message.data))
+        self._tell_status()
         self._go_on()
 
     def _go_on(self) -> None:
@@ -263,10 +262,11 @@ class ControllerNode(LifecycleNode):
         if self.settings.lockstep and self._lacks_something_of(measurement.stamp_ns, again=again):
             self._late = message
             return
-        if self.settings.lockstep and measurement.stamp_ns == self._answered_ns:
-            self.wires.publish_command(self._answer, self._answered_ns)  # the answer got lost
+        loop = self._guarded.loop
+        if self.settings.lockstep and measurement.stamp_ns == loop.answered_ns:
+            self.wires.publish_command(loop.previous[0], loop.answered_ns)  # the answer got lost
             return
-        usable = self.inputs.take(measurement)
+        usable = self._guarded.take(measurement, time.monotonic_ns())
         if self.settings.lockstep:
             self._control(measurement)
             return
@@ -276,52 +276,53 @@ class ControllerNode(LifecycleNode):
 
     def _lacks_something_of(self, stamp: int, *, again: bool) -> bool:
         """Whether something is on its way in lock step that belongs to a measurement."""
-        if self.inputs.mission.lacks_something_of(stamp) or not self.inputs.bearing_known:
+        guard, answered_ns = self._guarded, self._guarded.loop.answered_ns
+        if guard.mission.lacks_something_of(stamp) or not guard.bearing_known:
             return True
-        if again or self._belief_reader is None or not self._actuators.lacks(stamp, self._answered_ns):
+        if again or self.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
             return False
-        return self.wires.state_published()
+        return self._applied.newest_ns < answered_ns and self.wires.state_published()
 
     def _step(self) -> None:
         """One beat of the clock."""
         limit = self.settings.overruns_to_stop
         if limit and self._beat.deadlines.late_in_a_row >= limit:
-            self.inputs.set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
+            self._guarded.set(latched_fault=f"{limit} beats in a row came late: this computer is too slow")
         self.wires.forget_command()
-        self._control(self.inputs.newest)
+        self._control(self._guarded.newest)
 
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
-        self._take_turns()
+        guard = self._guarded
+        if guard.turn():
+            self._swap.took_over()
+            self._announce()
         stamp = measurement.stamp_ns if measurement else 0
-        command, action = self.robot.actuators.safe_command, None
+        command, step = self.robot.actuators.safe_command, None
         try:
-            with self.inputs.lock:
-                decision = self.inputs.arbitrate()
-                self._begin_anew()
-                observation = self._observe(measurement) if decision.may_act and measurement else None
-            informer = self._succession.current.informer
-            health = self._watch(measurement, informer) if informer.listens else None
-            if observation is not None:
-                command, action, problem = self._act(observation)
+            decision, inputs = guard.begin_step(measurement, time.monotonic_ns())
+            if inputs is not None:
+                step = self._act(inputs)
+                command = step.command[0]
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
             self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
             return
-        speaks = action is not None or decision.mode is not Mode.IDLE
+        speaks = step is not None or decision.mode is not Mode.IDLE
         if speaks and not self._speak(partial(self.wires.publish_command, command, stamp)):
             return
-        self._answered_ns, self._answer = stamp, command
         self._status.steps += 1
-        if observation is not None and action is not None:
-            self.wires.publish_reasoning(observation, action, stamp)
-            self._judge(problem)
-            self.inputs.acted += 1
-        if not informer.listens:  # only for others: the command does not wait for it
-            health = self._watch(measurement, informer)
-        if health is not None and self.wires.health_wanted:
-            self.wires.publish_actuators_health(health.effectiveness, stamp)
-        self._note_beliefs(health)
+        if step is not None:
+            self.wires.publish_reasoning(step.observation[0], step.action.ravel(), stamp)
+            self._publish_estimate(stamp)
+            if guard.note(step.refusal):
+                self._announce()
         self._tell_status(decision)
+
+    def _act(self, inputs: Inputs) -> Step:
+        began = time.perf_counter_ns()
+        step = self._guarded.act(inputs)
+        self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
+        return step
 
     def _speak(self, publish: Callable[[], None]) -> bool:
         """Publish a command, and say so, if commands may still go out.
@@ -329,95 +330,52 @@ class ControllerNode(LifecycleNode):
         What a controller that hung comes up with after all must not follow the safe command of the end.
         """
         with self._speaking:
-            if self.inputs.flags.activated:
+            activated = self._guarded.flags.activated
+            if activated:
                 publish()
-            return self.inputs.flags.activated
+            return activated
 
-    def _begin_anew(self) -> None:
-        """Let the controller forget what was before a new goal or a jump; call with the lock held."""
-        jumped, anew = self.inputs.news()
-        if jumped:
-            self._actuators.forget()  # no motion of the body was behind it
-        if jumped or anew:
-            self.controller.reset()
-
-    def _watch(self, measurement: Measurement | None, informer: Informer) -> Health | None:
-        if measurement is None:
-            return None
-        return self._actuators.see(measurement, informer, wanted=self.wires.health_wanted)
-
-    def _note_beliefs(self, health: Health | None) -> None:
-        """Keep what is believed of valves and push: by the controller's own observer, else by ours."""
-        believed = getattr(self.controller, "health", None) or health
-        if self._belief_reader is not None and believed is not None:
-            self._beliefs = self._belief_reader.read(believed)
-
-    def _observe(self, measurement: Measurement) -> np.ndarray:
-        """What the controller sees of a measurement; targets that are reached give way to the next."""
-        if measurement.stamp_ns - self._answered_ns > self._pause_ns:
-            self._answer = self.robot.actuators.safe_command
-            self.controller.reset()
-        mission = self.inputs.mission
-        mission.hear_of(self.controller)
-        observation = mission.observe(measurement.state, measurement.stamp_ns, self._answer)
-        assert mission.goal is not None
-        tell_course(self.controller, mission.goal)
-        report_applied(self.controller, self._actuators.since_observation(measurement.stamp_ns))
-        return observation
-
-    def _act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:
-        """The command, the controller's action that it is made of, and why it is the safe one instead."""
-        began = time.perf_counter_ns()
-        action = np.asarray(self.controller.act(observation), dtype=float)
-        problem = command_problem(action, len(self.robot.actuators.names))
-        command = self.robot.actuators.safe_command
-        if not problem:
-            wanted = self.robot.actuators.limited(action)
-            command = slewed(wanted, self._answer, self.robot, self._control_ns / 1e9)
-        self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
-        return command, action, problem
-
-    def _judge(self, problem: str | None) -> None:
-        """Count refused actions: several in a row are the fallback's turn, or a fault."""
-        before = self._succession.current
-        fault = self._succession.judge(problem)
-        if fault:
-            self.inputs.set(latched_fault=fault)
-        elif self._succession.current is not before:
-            self._announce()
+    def _publish_estimate(self, stamp: int) -> None:
+        """Publish the estimate of valves and push that the controller received, and keep what is a warning of it."""
+        estimate = self._guarded.loop.estimate
+        if estimate is None or self._belief_reader is None:
+            return
+        health = estimate.health[0]
+        self._beliefs = self._belief_reader.read(health)
+        if self.wires.health_wanted:
+            self.wires.publish_actuators_health(health.effectiveness, stamp)
 
     def _give_up(self, reason: str, stamp: int) -> None:
         """Command what is safe; let the fallback go on, or, where there is none, latch a fault and end the process."""
-        self._answered_ns, self._answer = stamp, self.robot.actuators.safe_command
-        if not self._speak(partial(self.wires.publish_command, self._answer, stamp)):
+        self._guarded.loop.rest(stamp)
+        if not self._speak(partial(self.wires.publish_command, self.robot.actuators.safe_command, stamp)):
             return
-        if self._succession.fall_back(reason):
+        if self._guarded.fall_back(reason):
             self.get_logger().error(reason)
             self._announce()
         else:
             self._fail(reason)
-        self._tell_status(self.inputs.decide())
+        self._tell_status()
 
     def _fail(self, reason: str) -> None:
         """Latch a fault and end the process; its last words are what is safe."""
         self.get_logger().error(reason)
-        self.inputs.set(latched_fault=reason)
+        self._guarded.set(latched_fault=reason)
         self._request_exit(FAILED)
 
     def _tell_idle_status(self) -> None:
-        """Where no control step does it."""
+        """Publish the status where no control step does it."""
         self._status.wire_problems = self._wire_watch.look()
-        if self.settings.lockstep or not self.inputs.flags.activated or self.inputs.flags.latched_fault:
-            self._tell_status(self.inputs.decide())
+        flags = self._guarded.flags
+        if self.settings.lockstep or not flags.activated or flags.latched_fault:
+            self._tell_status()
 
-    def _tell_status(self, decision: Decision) -> None:
+    def _tell_status(self, decision: Decision | None = None) -> None:
+        guard = self._guarded
         self._status.tell(
             self.wires.health,
-            decision,
-            self._succession,
+            decision or guard.decide(time.monotonic_ns()),
+            guard,
             self._beat.deadlines,
-            epoch=self.inputs.epoch,
-            last_input_ns=self.inputs.flags.last_input_ns,
-            refusal=self.inputs.refusal,
             beliefs=self._beliefs,
         )

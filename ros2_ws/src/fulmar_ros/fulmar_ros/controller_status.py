@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import time
 
+from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.beliefs import Beliefs
 from fulmar_core.safety.arbiter import Decision, Mode
-from fulmar_core.safety.succession import Succession
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
-from fulmar_ros.controller_inputs import Refusal
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.health import Health
-from fulmar_ros.mission import Mission
 from fulmar_ros.policy_swap import PolicySwap
-from fulmar_ros.standby import Standby
 
 PERIOD_S = 0.4  # at least 2 Hz
 
@@ -27,9 +24,9 @@ class ControllerStatus:
         wire_problems: Publishers from which nothing arrives, in words.
     """
 
-    def __init__(self, mission: Mission, swap: PolicySwap, *, goals_streamed: bool) -> None:
-        """Tell of a mission and of changes of policies; goals that are streamed are no news each."""
-        self._mission, self._swap, self._goals_streamed = mission, swap, goals_streamed
+    def __init__(self, swap: PolicySwap, *, goals_streamed: bool) -> None:
+        """Report changes of policies too; goals that are streamed are no news each."""
+        self._swap, self._goals_streamed = swap, goals_streamed
         self.steps = 0
         self.inference_ms = Spread()
         self.wire_problems: list[str] = []
@@ -44,12 +41,9 @@ class ControllerStatus:
         self,
         health: Health,
         decision: Decision,
-        succession: Succession[Standby],
+        guard: GuardedLoop,
         deadlines: Deadlines,
         *,
-        epoch: int,
-        last_input_ns: int | None,
-        refusal: Refusal,
         beliefs: Beliefs,
     ) -> None:
         """Publish, if it is time to.
@@ -57,14 +51,12 @@ class ControllerStatus:
         Args:
             health: Where to.
             decision: Of the arbiter, for now.
-            succession: Who controls.
+            guard: Has the controller, its inputs and its goal.
             deadlines: The beat.
-            epoch: Jumps of the measurements so far.
-            last_input_ns: When the newest measurement came, on the steady clock [ns].
-            refusal: Of the newest goal.
             beliefs: Of the actuators, where they are a warning.
         """
-        mission, standby = self._mission, succession.current
+        mission, succession, refusal = guard.mission, guard.succession, guard.refusal
+        standby, last_input_ns = succession.current, guard.flags.last_input_ns
         changed = (
             decision.mode,
             decision.reason.split(" (")[0][:24],
@@ -98,7 +90,7 @@ class ControllerStatus:
             "believed_dead": ", ".join(beliefs.dead),
             "beliefs": "; ".join(beliefs.words),
             "swap_requests": str(self._swap.requests),
-            "epoch": str(epoch),
+            "epoch": str(guard.epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
             "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),
             "goal_refused": refusal.reason,

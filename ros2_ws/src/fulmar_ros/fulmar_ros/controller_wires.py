@@ -15,7 +15,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.controllers.controller import Controller
 from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task, sees_obstacles
@@ -58,7 +57,7 @@ class ControllerWires:
         node: LifecycleNode,
         robot: Robot,
         task: Task,
-        controller: Controller,
+        observation_names: tuple[str, ...],
         *,
         on_odometry: Callable[[Odometry], None],
         on_goal: Callable[[GoalMessage], None],
@@ -77,7 +76,7 @@ class ControllerWires:
             node: Owner of the endpoints.
             robot: The robot.
             task: Says on which topic goals come.
-            controller: Says what its observation holds.
+            observation_names: Of the terms that the controller observes.
             on_odometry: Told every odometry message.
             on_goal: Told every goal.
             on_obstacles: Told all obstacles whenever they change.
@@ -118,7 +117,7 @@ class ControllerWires:
         self._newest: TwistStamped | JointState | None = None
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_health = VectorWriter(robot.actuators.names)
-        self._write_observation = VectorWriter(controller.observation_names, "position")
+        self._write_observation = VectorWriter(observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
         released = subscriber_qos(ESTOP_RELEASED, reliable=True)
         self._node = node

@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.errors import FulmarError
 from fulmar_core.robot import Robot
 from fulmar_core.safety.succession import Succession
+from fulmar_core.standby import Standby, ready
 from fulmar_core.tasks import Task
-from fulmar_ros.controller_settings import ControllerSettings
-from fulmar_ros.standby import Standby, ready
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 
@@ -45,7 +45,7 @@ def line_up(
             raise
         complain(f"falling back to {settings.fallback}: {error}")
         return Succession(None, fallback, refused=str(error))
-    return Succession(ready(controller, robot), fallback)
+    return Succession(ready(controller, robot, task), fallback)
 
 
 def load_other(
@@ -54,18 +54,13 @@ def load_other(
     task: Task,
     settings: ControllerSettings,
     folder: str,
-    *,
-    like: Controller,
 ) -> Standby:
-    """Another policy, ready to take over from `like`; the other arguments as of `line_up`.
+    """Another policy, ready to take over; the other arguments as of `line_up`.
 
     Raises:
         FulmarError: It cannot take the place of the one that runs.
     """
-    controller = make_controller(robot, task, dataclasses.replace(settings, policy=folder))
-    if controller.observation_names != like.observation_names:
-        raise ConfigError("it sees something else than the controller that runs")
-    return ready(controller, robot)
+    return ready(make_controller(robot, task, dataclasses.replace(settings, policy=folder)), robot, task)
 
 
 def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby | None:
@@ -74,4 +69,4 @@ def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby
         return None
     law = None if name == "classical" else name
     controller = load_classical(robot, task, control_hz=settings.control_rate(robot), law=law)
-    return ready(controller, robot, said={"fallback": True})
+    return ready(controller, robot, task, said={"fallback": True})

@@ -22,6 +22,7 @@ from fulmar_bringup.bags.guarded import begins_with_its_run, changes_of, limits_
 from fulmar_bringup.bags.plain_twist import answers_within, plain_commands
 from fulmar_bringup.bags.told import ABSENT, Told
 from fulmar_bringup.planning import PoseTuple
+from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.robot import Robot, load_robot
@@ -37,7 +38,6 @@ from fulmar_core.topics import (
     command_wire,
     goal_wires,
 )
-from fulmar_ros.controller_settings import ControllerSettings
 from fulmar_ros.message_reader import goal_of, obstacles_of
 
 NS = 1_000_000_000

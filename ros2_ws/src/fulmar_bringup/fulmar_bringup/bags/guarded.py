@@ -105,10 +105,15 @@ def changes_of(bag: Bag) -> tuple[Told, ...]:
 
 
 class RecordedEstop:
-    """The e-stop as the controller heard it: at one instant, not yet and already, by the slack of the record."""
+    """The e-stop as the controller received it: at one instant, not yet and already, by the slack of the record.
+
+    Attributes:
+        recorded: Whether the controller acted in the record, at the time of the next call; this decides while a press
+            or a release was on its way.
+    """
 
     def __init__(self, presses: tuple[Told, ...], *, required: bool) -> None:
-        """Begin without having heard anything.
+        """Begin without having received anything.
 
         Args:
             presses: From `presses_of`.
@@ -119,24 +124,22 @@ class RecordedEstop:
         """
         if required and not presses:
             raise BagError("the run was guarded by an e-stop, of which the bag holds nothing.")
-        self._presses = presses
         self._late, self._early = (_Ear(presses, required, offset) for offset in (-SLACK_NS, SLACK_NS))
+        self._stops = False
+        self.recorded = False
 
-    def reason(self, log_ns: int, *, acted: bool) -> str:
-        """Why nothing may move at a time of the record; empty if it may.
+    @property
+    def heard(self) -> bool:
+        """Whether it was received, and stopped everything without a doubt, at the time of the last call."""
+        return self._stops and self._late.watch.heard and self._early.watch.heard
 
-        Args:
-            log_ns: The time; not before the one of the last call [ns].
-            acted: What the record says, which decides while a press or a release was on its way.
-        """
-        late, early = self._late.reason(log_ns), self._early.reason(log_ns)
+    def reason(self, now_ns: int) -> str:
+        """Why nothing may move at a time of the record, not before the one of the last call [ns]; empty if it may."""
+        late, early = self._late.reason(now_ns), self._early.reason(now_ns)
+        self._stops = bool(late) and bool(early)
         if bool(late) == bool(early):
             return early
-        return "" if acted else late or early
-
-    def holds(self, log_ns: int) -> bool:
-        """Whether it was heard, and stopped everything without a doubt, at a time of the record [ns]."""
-        return all(ear.reason(log_ns) and ear.watch.heard for ear in (self._late, self._early))
+        return "" if self.recorded else late or early
 
 
 class _Ear:

@@ -9,7 +9,7 @@ from typing import Any
 
 from fulmar_bringup.benchmark.closed_loops import Command
 from fulmar_bringup.faults.two_hosts import ACROSS, Quality, two_hosts
-from fulmar_ros.controller_settings import MOST_COPIES
+from fulmar_core.controller_settings import MOST_COPIES
 
 
 @dataclass(frozen=True)

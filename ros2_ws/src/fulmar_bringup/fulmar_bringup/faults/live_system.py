@@ -32,6 +32,7 @@ from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
 from fulmar_bringup.supervisor import Supervisor, supervisor
+from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import Robot, Rolling, load_robot
 from fulmar_core.safety.watchdog import default_timeout
@@ -45,7 +46,6 @@ from fulmar_core.topics import (
     Wire,
     command_wire,
 )
-from fulmar_ros.controller_settings import MOST_COPIES
 from fulmar_ros.runtime import spinning
 from hardware_drivers.settings import load_hardware
 

@@ -29,8 +29,12 @@ class Situation:
     goal: Vector  # way to the current target; zeros where velocities are the goal
     turn: np.ndarray  # wanted heading minus heading, 0 where a task has none [rad]
     motion: Twist
-    push: np.ndarray  # force and torque from outside, zeros where nothing is estimated, shape (n, 3) [N, N, N·m]
-    alive: np.ndarray | None  # 1, or 0 for a valve that should stay closed, shape (n, m); None without an estimate
+    push: (
+        np.ndarray
+    )  # force and torque from outside, zeros where nothing is estimated, shape (n, 3) [N, N, N·m]
+    alive: (
+        np.ndarray | None
+    )  # 1, or 0 for a valve that should stay closed, shape (n, m); None without an estimate
 
 
 class BodyFrame:

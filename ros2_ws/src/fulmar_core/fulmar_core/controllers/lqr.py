@@ -128,9 +128,7 @@ class Lqr(Law):
         torque = (self.frame.tracks and gains.tracking_torque) or gains.torque
         r = dt * np.diag([gains.force, gains.force, torque])
         # What has no goal is not a state.
-        used = (
-            [3, 4, 5] if self.frame.tracks else [0, 1, 2, 3, 4, 5] if self.frame.heads else [0, 1, 3, 4, 5]
-        )
+        used = [3, 4, 5] if self.frame.tracks else [0, 1, 2, 3, 4, 5] if self.frame.heads else [0, 1, 3, 4, 5]
         a, b = a[np.ix_(used, used)], b[used]
         best = regulator(a, b, dt * np.diag(q[used]), r)
         self.cost_to_go, self.gain = best.cost_to_go, best.gain

@@ -192,7 +192,9 @@ class ActuatorGuard:
             problem = f"command has {len(values)} values, must have {count}"
         else:
             command = np.asarray(values, dtype=float)
-            problem = name_problem(names, self._actuators.names) or command_problem(command, (count,)) or problem
+            problem = (
+                name_problem(names, self._actuators.names) or command_problem(command, (count,)) or problem
+            )
         if problem:
             self.rejected += 1
             self.last_rejection = problem

@@ -1,0 +1,296 @@
+"""The control loop of one robot behind its guards: goals, e-stop, air bearing, area and odometry decide when it acts."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from fulmar_core.control_loop import ControlLoop, Step
+from fulmar_core.controller_settings import ControllerSettings
+from fulmar_core.controllers.controller import Inputs
+from fulmar_core.goal import Goal
+from fulmar_core.health.applied import AppliedHistory
+from fulmar_core.mission import Mission
+from fulmar_core.planar import planar_of
+from fulmar_core.robot import Robot
+from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
+from fulmar_core.safety.area import outside
+from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.safety.succession import Succession
+from fulmar_core.standby import Standby
+from fulmar_core.tasks import Task
+
+ENDED = "the e-stop stopped this goal"
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A goal that does not count."""
+
+    stamp_ns: int = 0
+    reason: str = ""  # of the e-stop; empty if the newest goal counts
+
+
+class Estop(Protocol):
+    """What is known of the e-stop; see `EstopWatch`."""
+
+    @property
+    def heard(self) -> bool:
+        """Whether it was ever received."""
+        ...
+
+    def reason(self, now_ns: int) -> str:
+        """Why nothing may move; empty if it may."""
+        ...
+
+
+class GuardedLoop:
+    """Takes what is received for one robot, decides whether its controller may act, and does control steps.
+
+    Messages and control steps may come from different threads; a controller acts without the lock that they share.
+    Times `now_ns` are those of one steady clock. What `take_...` returns says why something was not taken, and is empty
+    if it was; of odometry, `take` says whether it was.
+
+    Attributes:
+        loop: Advances the goal, observes, and limits commands.
+        mission: Goal, obstacles and block.
+        succession: The controller that acts, and its fallback.
+        newest: The newest usable measurement since the activation.
+        acted: Control steps with a command of the controller's own since the activation.
+        refusal: Why the newest goal does not count, if the e-stop refused it or took it away.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        settings: ControllerSettings,
+        succession: Succession[Standby],
+        estop: Estop,
+        *,
+        gate: InputGate | None = None,
+        applied: AppliedHistory | None = None,
+    ) -> None:
+        """Know nothing yet.
+
+        Args:
+            robot: The robot.
+            task: What it does.
+            settings: Limits and wires.
+            succession: Has the controller.
+            estop: Is asked before every step.
+            gate: Of the measurements; that of the settings by default.
+            applied: What the actuators did, as far as that is known.
+        """
+        self._lock = threading.Lock()
+        self.succession = succession
+        self.loop = ControlLoop(
+            robot, task, succession.current.controller, pause_ns=settings.pause_ns(robot), applied=applied
+        )
+        self.mission = Mission(self.loop, streamed=settings.goals_streamed)
+        self.newest: Measurement | None = None
+        self.acted = 0
+        self.refusal = Refusal()
+        self._settings, self._estop = settings, estop
+        self._control_ns = round(1e9 / settings.control_rate(robot))
+        self._flags = replace(settings.flags(robot), configured=True)
+        self._bearing: bool | None = None if settings.has_bearing(robot) else True  # None: not received yet
+        self._gate = gate or settings.input_gate(robot)
+        self._newest_epoch = self._acted_epoch = 0  # of the newest measurement, and of the last control step
+        self._anew = (
+            False  # another goal came; the controller, which may be acting now, forgets at the next step
+        )
+
+    @property
+    def flags(self) -> Flags:
+        """What the arbiter decides by, as of now."""
+        return self._flags
+
+    @property
+    def epoch(self) -> int:
+        """Jumps of the measurements so far."""
+        return self._gate.epoch
+
+    @property
+    def bearing_known(self) -> bool:
+        """Whether the state of the air bearing has come, or there is none."""
+        return self._bearing is not None
+
+    def set(self, **changes: object) -> None:
+        """Change flags by their names."""
+        with self._lock:
+            self._change(**changes)
+
+    def activate(self) -> None:
+        """Wait for fresh measurements."""
+        with self._lock:
+            self.newest, self.acted = None, 0
+            self._gate.forget()
+            self._change(activated=True, last_input_ns=None, input_problem="", outside="")
+
+    def decide(self, now_ns: int) -> Decision:
+        """Whether the controller may act now."""
+        with self._lock:
+            return self._arbitrate(now_ns)
+
+    def take_bearing(self, on: bool) -> None:
+        """Take the state of the air bearing; once it is on again, what controllers remember is of no use."""
+        with self._lock:
+            self._anew = self._anew or (on and self._bearing is False)
+            self._bearing = on
+            self._change(bearing_off=not on)
+
+    def take_goal(self, goal: Goal, stamp_ns: int, now_ns: int) -> str:
+        """Take a goal; none while a heard e-stop holds."""
+        with self._lock:
+            stopped = self._estop.reason(now_ns)
+            if self._estop.heard and stopped:
+                self.refusal = Refusal(stamp_ns, stopped)
+                self.mission.refuse(goal, stamp_ns)
+                return f"{stopped}. Give a new goal once the e-stop is released."
+            if self.mission.is_void(goal, stamp_ns):
+                if not self.mission.goal_stamp_ns:
+                    self.refusal = Refusal(stamp_ns, ENDED)
+                return f"{ENDED}. Publish it with a new stamp."
+            self.refusal = Refusal()
+            if self.mission.give(goal, stamp_ns):
+                self._anew = True
+                if not self._settings.goals_streamed:
+                    # A new goal after a look at the robot: one that was outside its area may go on, if it is back.
+                    self._change(outside=self._outside())
+            self._follow_mission()
+            if self._settings.lockstep:
+                self._gate.forget()
+        return ""
+
+    def take_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
+        """Take all obstacles that there are, shape (m, 3), in place of those known so far."""
+        with self._lock:
+            self.mission.see_obstacles(discs, stamp_ns)
+            self._follow_mission()
+
+    def take_block(self, place: np.ndarray, stamp_ns: int) -> None:
+        """Take the place of the block, shape (2,) [m]."""
+        with self._lock:
+            self.mission.see_block(place, stamp_ns)
+            self._follow_mission()
+
+    def take(self, measurement: Measurement, now_ns: int) -> bool:
+        """Take odometry.
+
+        Returns:
+            Whether it is usable; if not, `decide` says why.
+        """
+        with self._lock:
+            problem = self._gate.problem(measurement) or ""
+            if problem:
+                self._change(input_problem=problem)
+                return False
+            self.newest, self._newest_epoch = measurement, self._gate.epoch
+            self.mission.turn_to(measurement.stamp_ns)
+            self._follow_mission(
+                last_input_ns=now_ns, input_problem="", outside=self._flags.outside or self._outside()
+            )
+        return True
+
+    def turn(self) -> bool:
+        """Let a controller that was proposed take over, between two control steps; whether one has."""
+        if not self.succession.turn():
+            return False
+        self.loop.use(self.succession.current.controller)
+        return True
+
+    def begin_step(self, measurement: Measurement | None, now_ns: int) -> tuple[Decision, Inputs | None]:
+        """Begin a control step on a measurement: decide, and observe if the controller may act.
+
+        Returns:
+            The decision, and the inputs for `act`; None for a step that is answered by the safe command.
+        """
+        with self._lock:
+            decision = self._arbitrate(now_ns)
+            self._begin_anew()
+            if decision.may_act and measurement is not None:
+                return decision, self._inputs(measurement)
+        self.loop.rest(measurement.stamp_ns if measurement is not None else 0)
+        return decision, None
+
+    def observe(self, measurement: Measurement) -> Inputs:
+        """Observe for a controller that acts whatever the guards say, as one did in a record."""
+        with self._lock:
+            self._begin_anew()
+            return self._inputs(measurement)
+
+    def act(self, inputs: Inputs) -> Step:
+        """Let the controller act; see `ControlLoop.act`."""
+        step = self.loop.act(inputs)
+        self.acted += 1
+        return step
+
+    def note(self, refusal: str) -> bool:
+        """Count refused actions: several in a row are the fallback's turn, or latch a fault.
+
+        Args:
+            refusal: Of the step; empty if its action was not refused.
+
+        Returns:
+            Whether the fallback acts from now on.
+        """
+        before = self.succession.current
+        fault = self.succession.judge(refusal or None)
+        if fault:
+            self.set(latched_fault=fault)
+        return self._follow_succession(before)
+
+    def fall_back(self, reason: str) -> bool:
+        """Let the fallback go on in place of a controller that raised; false if there is none."""
+        before = self.succession.current
+        self.succession.fall_back(reason)
+        return self._follow_succession(before)
+
+    def _begin_anew(self) -> None:
+        """Let the controller forget what was before a new goal or a jump."""
+        if self._newest_epoch != self._acted_epoch or self._anew:
+            self._acted_epoch, self._anew = self._newest_epoch, False
+            self.loop.reset()
+
+    def _inputs(self, measurement: Measurement) -> Inputs:
+        return self.loop.inputs(planar_of(measurement.state)[None], measurement.stamp_ns)
+
+    def _follow_succession(self, before: Standby) -> bool:
+        changed = self.succession.current is not before
+        if changed:
+            self.loop.use(self.succession.current.controller)
+        return changed
+
+    def _arbitrate(self, now_ns: int) -> Decision:
+        """An e-stop takes the goal away: after it, nothing moves by itself."""
+        stopped = self._estop.reason(now_ns)
+        if stopped and self._estop.heard:
+            if self.mission.goal_stamp_ns:
+                self.refusal = Refusal(self.mission.goal_stamp_ns, stopped)
+            self.mission.drop()
+            self._follow_mission()
+            self._change(outside=self._outside())
+        self._change(estop=stopped, active_s=self.acted * self._control_ns / 1e9)
+        return arbitrate(self._flags, now_ns)
+
+    def _follow_mission(self, **changes: object) -> None:
+        """Let the flags say what the mission lacks, and how far its goal is away."""
+        distance = float("inf")
+        if self.newest is not None:
+            distance = self.mission.distance(planar_of(self.newest.state)[None])
+        lacking = self.mission.lacking
+        self._change(has_goal=not lacking, lacking=lacking, goal_distance=distance, **changes)
+
+    def _outside(self) -> str:
+        """How the robot is outside its area right now; empty if it is not, or if its place is unknown."""
+        if self.newest is None:
+            return ""
+        x, y = self.newest.state.position_in_world[:2].tolist()
+        return outside(x, y, self._settings.area)
+
+    def _change(self, **changes: object) -> None:
+        self._flags = replace(self._flags, **changes)  # type: ignore[arg-type]

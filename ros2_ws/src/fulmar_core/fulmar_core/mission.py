@@ -1,0 +1,176 @@
+"""What one robot was asked to do: goal, obstacles and block, as they were received."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from fulmar_core.control_loop import ControlLoop
+from fulmar_core.geofence import distance_from_goal
+from fulmar_core.goal import Goal, stack_goals
+from fulmar_core.planar import PlanarState
+from fulmar_core.schedule import Schedule
+from fulmar_core.tasks import sees_obstacles
+from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.push_block import PushBlock
+
+GOALS_REMEMBERED = 200  # stamps of goals; publishers repeat at most the last 100
+BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
+
+GoalKey = tuple[int, int]  # stamp [ns] and hash of the targets
+
+
+class Mission:
+    """Keeps what was received, and the goal of a control loop in step with it. Not thread-safe.
+
+    Attributes:
+        goal_stamp_ns: Of the newest goal; 0 without one [ns].
+        obstacles_stamp_ns: Of the newest obstacles [ns].
+    """
+
+    def __init__(self, loop: ControlLoop, *, streamed: bool = False) -> None:
+        """Begin without a goal.
+
+        Args:
+            loop: Of one robot; gets a goal as soon as everything is known that its task needs.
+            streamed: Goals come with each odometry, stamped as it is, mostly the same again.
+        """
+        self._loop, self._task, self._streamed = loop, loop.task, streamed
+        self._given_goal: Goal | None = None  # as it came, without a batch axis
+        # Velocities may come ahead of their time; a place counts from when it comes, whatever clock stamped it.
+        timed = self._task.goal_topic == "goal_velocity"
+        self._schedule: Schedule[Goal] | None = Schedule() if timed else None
+        self._obstacles: np.ndarray | None = None if sees_obstacles(self._task) else np.zeros((0, 3))
+        self._pushes = isinstance(self._task, PushBlock)
+        self._block: np.ndarray | None = None
+        self._block_stamp_ns = 0
+        self._given: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # since the last drop
+        self._void: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # refused, or dropped
+        self.goal_stamp_ns = 0
+        self.obstacles_stamp_ns = 0
+
+    @property
+    def lacking(self) -> str:
+        """What the task needs and has not come; empty if everything is known."""
+        parts = {"goal": self._given_goal, "obstacles": self._obstacles}
+        if self._pushes:
+            parts["place of the block"] = self._block
+        return next((name for name, part in parts.items() if part is None), "")
+
+    @property
+    def done(self) -> int:
+        """Targets reached since the goal was given."""
+        return 0 if self._loop.goal is None else int(self._loop.goal.done[0])
+
+    def give(self, goal: Goal, stamp_ns: int) -> bool:
+        """Take a new goal; its time begins with the next step, or, of a velocity, when its stamp says.
+
+        Returns:
+            Whether something new begins: not so for a goal that is streamed again, or repeated with the same stamp for
+            a subscriber that came late, and for velocities, which go on from one to the next.
+        """
+        if not self._streamed and stamp_ns:
+            key = _key(goal, stamp_ns)
+            if key in self._given:
+                return False
+            self._given.append(key)
+        self.goal_stamp_ns = stamp_ns
+        if self._schedule is not None:
+            self._schedule.give(goal, stamp_ns)
+            return False
+        same = self._given_goal is not None and np.array_equal(self._given_goal.targets, goal.targets)
+        if self._streamed and same:
+            return False
+        self._take(goal)
+        return True
+
+    def drop(self) -> None:
+        """Forget the goal, as after an emergency stop: what moves then is asked for anew, see `is_void`."""
+        self._void.extend(self._given)
+        self._given.clear()
+        self._take(None)
+        if not self._streamed:  # where they are, it says which state need not wait
+            self.goal_stamp_ns = 0
+        if self._schedule is not None:
+            self._schedule = Schedule()
+
+    def is_void(self, goal: Goal, stamp_ns: int) -> bool:
+        """Whether this very goal was refused or dropped: a repetition of it starts nothing.
+
+        One with the stamp 0 is always new [ns].
+        """
+        return bool(stamp_ns) and _key(goal, stamp_ns) in self._void
+
+    def refuse(self, goal: Goal, stamp_ns: int) -> None:
+        """Note that a goal came and does not count, neither now nor repeated [ns]."""
+        if self._streamed:
+            self.goal_stamp_ns = stamp_ns  # the state of this time need not wait for it
+        elif stamp_ns:
+            self._void.append(_key(goal, stamp_ns))
+
+    def turn_to(self, stamp_ns: int) -> None:
+        """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""
+        if self._schedule is not None:
+            due = self._schedule.at(stamp_ns)
+            if due is not self._given_goal:
+                self._take(due, anew=self._given_goal is None or due is None)
+        if self._pushes and self._block is not None and stamp_ns - self._block_stamp_ns > BLOCK_LASTS_NS:
+            self._block = None
+            self._loop.goal = None
+
+    def see_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
+        """Take obstacles, shape (m, 3), instead of those known so far."""
+        self._obstacles, self.obstacles_stamp_ns = discs, stamp_ns
+        self._refresh()
+
+    def see_block(self, place: np.ndarray, stamp_ns: int) -> None:
+        """Take the place of the block, shape (2,) [m]."""
+        self._block, self._block_stamp_ns = place, stamp_ns
+        self._refresh()
+
+    def lacks_something_of(self, stamp_ns: int) -> bool:
+        """Whether the block, or a streamed goal, of this stamp is still to come."""
+        block = self._pushes and self._block_stamp_ns != stamp_ns
+        return block or (self._streamed and self.goal_stamp_ns != stamp_ns)
+
+    def distance(self, state: PlanarState) -> float:
+        """From a state, shapes (1,), to the current target [m]; 0 where the task has none, infinite before one is known.
+
+        Args:
+            state: Measured.
+        """
+        if self._loop.goal is None:
+            return math.inf
+        distance = distance_from_goal(self._task, state, self._loop.goal)
+        return 0.0 if distance is None else float(distance[0])
+
+    def _take(self, goal: Goal | None, *, anew: bool = True) -> None:
+        """Let another goal count, from its first target on; its time begins now unless it goes on from one before."""
+        self._given_goal = goal
+        if anew:
+            self._loop.begin(None)
+        else:
+            self._loop.goal = None
+        self._refresh()
+
+    def _refresh(self) -> None:
+        """Give the loop its goal among what stands about now, as far along as it has come."""
+        goal, obstacles = self._given_goal, self._obstacles
+        block = self._block if self._pushes else np.zeros(2)
+        if goal is None or obstacles is None or block is None:
+            return
+        before = self._loop.goal
+        done = goal.done if before is None else before.done[0]
+        if not self._pushes:
+            block = goal.block if before is None else before.block[0]
+        batched = stack_goals([replace(goal, done=np.asarray(done), obstacles=obstacles, block=block)])
+        if isinstance(self._task, GoToPositionWithObstacles):
+            batched = self._task.surveyed(batched, self._loop.robot)
+        self._loop.goal = batched
+
+
+def _key(goal: Goal, stamp_ns: int) -> GoalKey:
+    return stamp_ns, hash(np.asarray(goal.targets, dtype=float).tobytes())
