@@ -1,7 +1,7 @@
 """What a learner is told beside its observations: the truth, as late as an estimator would know it.
 
-The estimator itself (`fulmar_core.health.actuator_estimator`) costs as much as the physics; it is used wherever a network is
-judged or deployed.
+The estimator itself (`fulmar_core.health.actuator_estimator`) costs as much as the physics; it is used wherever a
+network is evaluated or deployed.
 """
 
 from __future__ import annotations

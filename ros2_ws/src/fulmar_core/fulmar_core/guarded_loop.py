@@ -1,4 +1,4 @@
-"""The control loop of one robot behind its guards: goals, e-stop, air bearing, area and odometry decide when it acts."""
+"""The control loop of one robot behind its guards, which decide from what is received whether it acts."""
 
 from __future__ import annotations
 

@@ -137,10 +137,10 @@ class Mission:
         return block or (self._streamed and self.goal_stamp_ns != stamp_ns)
 
     def distance(self, state: PlanarState) -> float:
-        """From a state, shapes (1,), to the current target [m]; 0 where the task has none, infinite before one is known.
+        """Distance from the current target [m]; 0 where the task has none, infinite before one is known.
 
         Args:
-            state: Measured.
+            state: Measured, shapes (1,).
         """
         if self._loop.goal is None:
             return math.inf

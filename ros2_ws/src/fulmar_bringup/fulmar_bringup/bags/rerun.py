@@ -205,10 +205,12 @@ class _Rerun:
     def _inputs_as_recorded(self, step: int, measurement: Measurement | None) -> Inputs:
         """What a controller acts on that was asked in the record, whatever its guards would say now."""
         loop, stamp = self._guard.loop, int(self._course.stamp_ns[step])
-        known = measurement is not None and loop.goal is not None
-        if self._source == "odometry" and not known:
+        if measurement is not None and loop.goal is not None:
+            inputs = self._guard.observe(measurement)
+        elif self._source == "odometry":
             raise self._goalless()
-        inputs = self._guard.observe(measurement) if known else unknown_inputs(loop, stamp)
+        else:
+            inputs = unknown_inputs(loop, stamp)
         if self._source == "observations":
             inputs = replace(
                 inputs, observation=np.asarray(self._course.observations[step], dtype=float)[None]

@@ -53,7 +53,7 @@ class BodyFrame:
         self.passes = isinstance(task, PassingTask)
         self.heads = isinstance(task, GoToPose) or (isinstance(task, PassingTask) and task.heads)
         self._around = task if isinstance(task, GoToPositionWithObstacles) else None
-        self._clearance = task.obstacles.clearance(robot) if self._around else 0.0
+        self._clearance = self._around.obstacles.clearance(robot) if self._around else 0.0
 
     @property
     def crosses_obstacles(self) -> bool:
