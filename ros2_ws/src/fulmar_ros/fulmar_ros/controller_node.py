@@ -16,7 +16,6 @@ from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.health.applied import report_applied
@@ -358,10 +357,7 @@ class ControllerNode(LifecycleNode):
             self._answer = self.robot.actuators.safe_command
             self.controller.reset()
         mission = self.inputs.mission
-        mission.hear_of(self.controller)
         observation = mission.observe(measurement.state, measurement.stamp_ns, self._answer)
-        assert mission.goal is not None
-        tell_course(self.controller, mission.goal)
         report_applied(self.controller, self._actuators.since_observation(measurement.stamp_ns))
         return observation
 

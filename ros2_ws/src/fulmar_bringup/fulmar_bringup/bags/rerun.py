@@ -15,7 +15,6 @@ from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.guarded import RecordedEstop
 from fulmar_bringup.bags.told import ABSENT
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import BagError, FulmarError, RunFailed
 from fulmar_core.health.applied import Applied, AppliedHistory, report_applied
 from fulmar_core.health.informer import Informer
@@ -181,7 +180,6 @@ class _Rerun:
             try:
                 self._inform(step)
                 if acted[step]:
-                    self._tell_course()
                     report_applied(self._controller, self._applied(self._observed_ns, stamp))
                     self._observed_ns = stamp
                     actions[step] = self._act(shown[step])
@@ -260,7 +258,6 @@ class _Rerun:
         if not self._mission.complete:
             raise self._goalless()
         sample = int(self._course.sample[step])
-        self._mission.hear_of(self._controller)
         return self._mission.observe(self._states[sample], int(self._course.stamp_ns[step]), self._answer)
 
     def _goalless(self) -> BagError:
@@ -294,11 +291,6 @@ class _Rerun:
             self._states_fed += 1
             self._history.add(int(states.stamp_ns[index]), states.values[index])
         return self._history.between(begin_ns, end_ns)
-
-    def _tell_course(self) -> None:
-        """Tell the controller the whole course, if it wants to know and there is one."""
-        if self._mission.goal is not None:
-            tell_course(self._controller, self._mission.goal)
 
     def _act(self, observation: np.ndarray) -> np.ndarray:
         action = np.asarray(self._controller.act(observation), dtype=float)
