@@ -67,7 +67,7 @@ def test_a_changed_action_is_told_with_its_field_and_step(monkeypatch):
 
 def test_a_changed_limit_of_commands_is_told(monkeypatch):
     actuators = load_robot("floating_platform").actuators
-    monkeypatch.setattr(type(actuators), "limited", lambda self, command: np.zeros(len(self.names)))
+    monkeypatch.setattr(type(actuators), "limited", lambda self, command: np.zeros_like(command))
     first = first_difference(check_reference(PLATFORM))
     assert first.field == "command"
 
