@@ -9,10 +9,16 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+import onnxruntime
 import pytest
 
+from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, disturbance_terms
 from fulmar_core.errors import BundleError
+from fulmar_core.goal import goal_at
+from fulmar_core.health.actuator_estimator import ActuatorEstimate
+from fulmar_core.health.thruster_health import Health
 from fulmar_core.observation import Observer
+from fulmar_core.planar import COLUMNS, at_rest
 from fulmar_core.policy_bundle import (
     FORMAT,
     GOLDEN,
@@ -28,6 +34,8 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
 from policy_server.shipped import policies_directory, shipped_policies, shipped_policy
+from tests.inputs import inputs_at
+from tests.policy_server.observed import inputs_seeing
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
 ROLLING, ROLLING_TASK = load_robot("turtlebot2"), load_task("go_to_position")
@@ -149,7 +157,8 @@ def remembering(tmp_path):
 def test_the_shipped_bundle_is_accepted():
     policy = load(SHIPPED)
     assert policy.control_hz == ROBOT.timing.control_hz
-    assert policy.observation_names == TASK.observation_names
+    assert policy.passport.observation_names == TASK.observation_names
+    assert policy.estimator is None
 
 
 def test_the_shipped_bundle_is_found_by_robot_and_task_and_no_other_is():
@@ -164,18 +173,15 @@ def test_no_shipped_bundle_names_a_folder_of_the_machine_it_was_made_on():
         assert not any(place in text for place in (str(CHECKOUT).encode(), b"/home/", b"site-packages"))
 
 
-def test_commands_are_zeros_and_ones_for_one_observation_and_for_many():
-    policy, seen = load(SHIPPED), read_golden(SHIPPED).observations
-    many = policy.act(seen)
-    assert many.shape == (len(seen), 8)
-    assert set(np.unique(many)) <= {0.0, 1.0}
-    assert policy.act(seen[0]).shape == (8,)
-    np.testing.assert_array_equal([policy.act(row) for row in seen], many)
-
-
-def test_float64_observations_are_taken_too():
-    seen = read_golden(SHIPPED).observations
-    np.testing.assert_array_equal(load(SHIPPED).act(seen.astype(float)), load(SHIPPED).act(seen))
+def test_commands_are_zeros_and_ones_for_one_robot_and_for_many():
+    policy, golden = load(SHIPPED), read_golden(SHIPPED)
+    many = policy.act(inputs_seeing(golden.observations))
+    assert many.shape == (len(golden.observations), 8)
+    assert set(np.unique(many)) == {0.0, 1.0}
+    np.testing.assert_array_equal(many, golden.commands)
+    alone = [policy.act(inputs_seeing(row)) for row in golden.observations]
+    assert alone[0].shape == (1, 8)
+    np.testing.assert_array_equal(np.concatenate(alone), many)
 
 
 def test_the_metadata_is_the_passport():
@@ -187,7 +193,55 @@ def test_the_metadata_is_the_passport():
 def test_a_network_made_by_hand_is_as_good_as_an_exported_one(folder):
     network, golden = linear_network()
     reseal(folder, network=network, golden=golden)
-    np.testing.assert_array_equal(load(folder).act(golden.observations), golden.commands)
+    np.testing.assert_array_equal(load(folder).act(inputs_seeing(golden.observations)), golden.commands)
+
+
+@pytest.fixture
+def disturbed(folder):
+    """A bundle of a network whose passport names estimated disturbances behind the observation."""
+    names = TASK.observation_names + disturbance_terms(ROBOT)
+    network, golden = linear_network(inputs=len(names))
+    reseal(folder, network=network, golden=golden, observation_names=names)
+    return folder
+
+
+def test_a_network_whose_passport_names_disturbances_acts_on_the_estimate(disturbed):
+    policy, session = load(disturbed), onnxruntime.InferenceSession(disturbed / NETWORK)
+    assert policy.estimator == ESTIMATOR
+    moved = at_rest(np.array([0.3, -0.2]), np.array([0.1, 0.0]), np.array([0.5, 2.0]))
+    push, alive = np.array([[0.2, 0.0, -0.1], [0.0, 0.4, 0.0]]), np.ones((2, 8))
+    alive[1, 3] = 0.0
+    motion = np.stack([getattr(moved, name) for name in COLUMNS], axis=-1)
+    health = Health(alive, alive, motion, push, np.zeros(2, dtype=bool))
+    given = inputs_at(
+        ROBOT,
+        TASK,
+        at_rest(np.zeros(2), np.zeros(2), np.zeros(2)),
+        goal_at((1.0, 1.0, 0.0)),
+        estimates=ActuatorEstimate(moved, push, alive, health),
+    )
+    observed = Observer(ROBOT, TASK)(moved, given.goal, given.previous)
+    row = np.column_stack((observed, push, alive)).astype(np.float32)
+    (expected,) = session.run(["command"], {"observation": row})
+    np.testing.assert_array_equal(policy.act(given), expected)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (
+            TASK.observation_names + disturbance_terms(ROBOT)[:-1] + ("mystery",),
+            "observation 21 is 'mystery'",
+        ),
+        (
+            TASK.observation_names + tuple(f"mystery_{i}" for i in range(11)),
+            "21 observation names, 10 are needed",
+        ),
+    ],
+)
+def test_further_inputs_of_other_names_are_refused_whatever_their_number(disturbed, names, words):
+    reseal(disturbed, observation_names=names)
+    assert words in refusal(disturbed)
 
 
 @pytest.mark.parametrize("name", [NETWORK, GOLDEN, PASSPORT])
@@ -318,24 +372,24 @@ def test_a_continuous_policy_commands_in_the_units_of_the_actuators(remembering)
     golden = read_golden(remembering)
     policy = Policy(remembering, ROLLING, ROLLING_TASK)
     for _ in range(6):
-        command = policy.act(golden.observations)
+        command = policy.act(inputs_seeing(golden.observations))
     np.testing.assert_allclose(command, np.tile(ROLLING.actuators.scale, (4, 1)), rtol=1e-6)
 
 
 def test_memory_is_carried_from_one_command_to_the_next_and_forgotten_on_reset(remembering):
     policy = Policy(remembering, ROLLING, ROLLING_TASK)
-    seen, speed = np.zeros(len(policy.observation_names)), ROLLING.actuators.scale[0]
-    told = [float(policy.act(seen)[0]) for _ in range(3)]
+    seen, speed = inputs_seeing(np.zeros(len(policy.passport.observation_names))), ROLLING.actuators.scale[0]
+    carried = [float(policy.act(seen)[0, 0]) for _ in range(3)]
     policy.reset()
-    assert [*told, float(policy.act(seen)[0])] == pytest.approx([0.0, 0.25 * speed, 0.5 * speed, 0.0])
+    assert [*carried, float(policy.act(seen)[0, 0])] == pytest.approx([0.0, 0.25 * speed, 0.5 * speed, 0.0])
 
 
 def test_every_row_of_a_batch_has_a_memory_of_its_own(remembering):
     policy = Policy(remembering, ROLLING, ROLLING_TASK)
-    seen = np.zeros((3, len(policy.observation_names)))
-    policy.act(seen)
-    assert policy.act(seen).shape == (3, 2)
-    assert (policy.act(seen[:2]) == 0.0).all()  # another batch is another story
+    seen = np.zeros((3, len(policy.passport.observation_names)))
+    policy.act(inputs_seeing(seen))
+    assert policy.act(inputs_seeing(seen)).shape == (3, 2)
+    assert (policy.act(inputs_seeing(seen[:2])) == 0.0).all()  # another batch is another story
 
 
 @pytest.mark.parametrize(
@@ -381,6 +435,7 @@ def test_what_was_verified_is_what_runs_though_the_files_are_exchanged_afterward
     policy = load(folder, trusted=tmp_path / "lab.pem")
     assert load(folder).passport != signed.passport  # they were exchanged
     assert policy.passport == signed.passport
-    np.testing.assert_array_equal(policy.act(golden.observations), signed.act(golden.observations))
+    given = inputs_seeing(golden.observations)
+    np.testing.assert_array_equal(policy.act(given), signed.act(given))
     with pytest.raises(BundleError, match="not signed"):
         load(folder, trusted=tmp_path / "lab.pem")
