@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,21 +63,15 @@ def inputs_of(simulation: BatchSimulation) -> Inputs:
 
 def some_of(inputs: Inputs, index: Any) -> Inputs:
     """Inputs of some of the robots; an index that keeps the axis."""
-    assert inputs.estimates is None
-    parts = (inputs.state[index], inputs.goal[index], inputs.observation[index], inputs.previous[index])
-    return Inputs(*parts, None, inputs.stamp_ns, inputs.dt)
-
-
-def inputs_seeing(observations: Any) -> Inputs:
-    """Inputs of which only the observation is known, shape (n, k) or (k,): enough for a network without estimates."""
-    rows = np.atleast_2d(np.asarray(observations, dtype=float))
-    unknown = np.full(len(rows), np.nan)
-    goal = Goal(
-        unknown[:, None, None].repeat(3, axis=-1),
-        unknown,
-        np.zeros((len(rows), 0, 3)),
-        np.zeros((len(rows), 2)),
+    e = inputs.estimates
+    estimates = (
+        ActuatorEstimate(e.state[index], e.push[index], e.alive[index], e.health[index]) if e else None
     )
-    return Inputs(
-        PlanarState(*(unknown for _ in COLUMNS)), goal, rows, np.zeros((len(rows), 0)), None, 0, np.nan
+    return replace(
+        inputs,
+        state=inputs.state[index],
+        goal=inputs.goal[index],
+        observation=inputs.observation[index],
+        previous=inputs.previous[index],
+        estimates=estimates,
     )

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import copy
 import json
+from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 import pytest
 
 from fulmar_bringup.system import CONTROLLERS
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import LAWS
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.observation import Observer
+from fulmar_core.goal import goal_in_float64
+from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.paths import config_names
+from fulmar_core.planar import at_rest
 from fulmar_core.policy_bundle import read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from policy_server.shipped import shipped_policies
+from tests.inputs import some_of
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 TASKS = {name: load_task(name) for name in config_names("tasks")}
@@ -56,24 +62,35 @@ def case(request):
     return name, robot, task, controller
 
 
-@pytest.fixture
+def measured(robot, task, controller, simulation, *, steps=0):
+    """Inputs of robots that have moved about for some steps."""
+    loop = ControlLoop(robot, task, controller, robots=simulation.worlds)
+    loop.begin(goal_in_float64(simulation.goal))
+    loop.reset()
+    rng, size = np.random.default_rng(1), loop.previous.shape
+    for number in range(steps):
+        inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
+        simulation.move(loop.take(inputs, robot.actuators.scale * rng.uniform(-1.0, 1.0, size)).command)
+        if simulation.block is not None:
+            loop.goal = replace(loop.goal, block=np.asarray(simulation.block, dtype=float))
+    return loop.inputs(simulation.measured, round(1e9 * steps * loop.dt))
+
+
+@pytest.fixture(scope="module")
 def seen(case):
-    """Observations of robots that have moved about for a while."""
-    _, robot, task, _ = case
+    """Inputs of robots that have moved about for a while."""
+    _, robot, task, controller = case
     simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=WORLDS, seed=12)
-    rng, size = np.random.default_rng(1), (WORLDS, len(robot.actuators.names))
-    for _ in range(10):
-        simulation.step(robot.actuators.scale * rng.uniform(-1.0, 1.0, size))
-    return simulation.observe()
+    return measured(robot, task, controller, simulation, steps=10)
 
 
-def answers(controller, rows):
-    """What a controller that remembers nothing says to each of some observations."""
-    told = []
-    for row in rows:
+def answers(controller, inputs):
+    """Command for each robot by itself, of a controller that remembers nothing."""
+    commands = []
+    for i in range(len(inputs.previous)):
         controller.reset()
-        told.append(controller.act(row))
-    return told
+        commands.append(controller.act(some_of(inputs, slice(i, i + 1)))[0])
+    return commands
 
 
 def test_every_controller_and_every_robot_is_under_this_contract():
@@ -82,21 +99,20 @@ def test_every_controller_and_every_robot_is_under_this_contract():
     assert ("floating_platform", "go_to_pose") in LEARNED
 
 
-def test_it_takes_what_the_robot_sees_at_its_task(case):
-    name, robot, task, controller = case
+def test_it_has_its_name_its_rate_and_asks_for_an_estimator_or_none(case):
+    name, robot, _, controller = case
     assert controller.name == name
-    assert controller.observation_names == Observer(robot, task).names
     assert controller.control_hz == robot.timing.control_hz
+    assert controller.estimator is None or isinstance(controller.estimator, Suspicion)
 
 
-def test_one_observation_gives_one_command_and_a_batch_gives_a_batch(case, seen):
+def test_each_robot_gets_the_command_that_it_would_get_alone(case, seen):
     _, robot, _, controller = case
     controller.reset()
     many = controller.act(seen)
     count = len(robot.actuators.names)
-    assert np.shape(many) == (WORLDS, count)
-    assert np.shape(controller.act(seen[0])) == (count,)
-    assert np.shape(controller.act(seen[:1])) == (1, count)
+    assert many.shape == (WORLDS, count)
+    assert controller.act(some_of(seen, slice(0, 1))).shape == (1, count)
     np.testing.assert_allclose(answers(controller, seen), many, rtol=1e-5, atol=1e-5)
 
 
@@ -113,24 +129,42 @@ def test_commands_are_finite_and_already_what_the_hardware_can_do(case, seen):
 
 
 def test_it_answers_a_robot_at_rest_where_it_shall_be(case):
-    controller = case[3]
+    _, robot, task, controller = case
+    simulation = BatchSimulation(robot, task, load_scenario("ideal"), worlds=1, seed=1)
+    goal = simulation.goal
+    target = np.asarray(goal.targets[:, 0], dtype=float)
+    if task.goal_topic == "goal_velocity":
+        targets, place = 0.0 * target, 0.0 * target
+    else:
+        targets, place = target, target
+    goal = replace(goal, targets=targets[:, None], block=targets[:, :2])
+    simulation.put(at_rest(*place.T), goal, simulation.command)
     controller.reset()
-    assert np.isfinite(controller.act(np.zeros(len(controller.observation_names)))).all()
+    assert np.isfinite(controller.act(measured(robot, task, controller, simulation))).all()
 
 
 def test_it_remembers_nothing_that_a_reset_would_not_clear(case, seen):
     controller = case[3]
     controller.reset()
     first = controller.act(seen)
-    controller.act(seen[::-1])
+    controller.act(some_of(seen, slice(None, None, -1)))
     controller.reset()
     np.testing.assert_array_equal(controller.act(seen), first)
 
 
-def test_it_leaves_its_input_alone(case, seen):
-    kept = seen.copy()
+def test_it_leaves_its_inputs_alone(case, seen):
+    kept = numbers_of(copy.deepcopy(seen))
     case[3].act(seen)
-    np.testing.assert_array_equal(seen, kept)
+    for name, value in numbers_of(seen).items():
+        np.testing.assert_array_equal(value, kept[name], err_msg=name)
+
+
+def numbers_of(value, name=""):
+    """Every array of some inputs by its name."""
+    if is_dataclass(value):
+        parts = [numbers_of(getattr(value, each.name), f"{name}.{each.name}") for each in fields(value)]
+        return {key: array for part in parts for key, array in part.items()}
+    return {name: value}
 
 
 def test_its_metadata_is_json_and_names_who_and_what_with_a_hash(case):

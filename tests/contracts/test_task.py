@@ -97,19 +97,19 @@ def test_at_its_target_itself_everything_is_finite(task, robot):
     state = PlanarState(x, y, yaw, x * 0.0, x * 0.0, x * 0.0)
     goal = Goal(goal.targets, goal.done, goal.obstacles, goal.targets[:, 0, :2])
     assert all(np.isfinite(term).all() for term in task.observe(state, goal))
-    assert np.isfinite(task.reward(state, state, goal)).all()
+    assert np.isfinite(task.reward(state, state, goal, goal)).all()
 
 
 def everything(task, robot, before, after, goal):
     """Every number that a task makes of two states and a goal."""
     errors = task.errors(after, goal)
-    values = [*task.observe(after, goal), task.reward(before, after, goal)]
+    ended = task.advance(goal, after, np.asarray(20.0) if after.x.ndim == 0 else after.x * 0.0 + 20.0)
+    values = [*task.observe(after, goal), task.reward(before, after, goal, ended)]
     values += [
         error
         for error in (errors.position, errors.heading, errors.velocity, errors.yaw_rate)
         if error is not None
     ]
-    ended = task.advance(goal, after, np.asarray(20.0) if after.x.ndim == 0 else after.x * 0.0 + 20.0)
     values += [getattr(ended, name) for name in Goal.__slots__]
     values += [ended.current]
     for name in ("penalty", "collides"):
@@ -117,7 +117,7 @@ def everything(task, robot, before, after, goal):
         values += [] if extra is None else [extra]
     if isinstance(task, PushBlock):
         moved, slowed = task.pushed(goal, before, after, robot)
-        values += [moved.block, slowed.vx, slowed.vy, task.block_reward(goal, moved)]
+        values += [moved.block, slowed.vx, slowed.vy, task.reward(before, slowed, goal, moved)]
     return values
 
 
@@ -152,7 +152,7 @@ def test_fifty_random_steps_stay_finite_with_worlds_that_begin_anew(task, robot)
         before, goal = simulation.truth, simulation.goal
         simulation.step(rng.uniform(-1.5, 1.5, simulation.command.shape) * robot.actuators.scale)
         assert np.isfinite(simulation.observe()).all()
-        assert np.isfinite(task.reward(before, simulation.truth, goal)).all()
+        assert np.isfinite(task.reward(before, simulation.truth, goal, simulation.goal)).all()
         if step % 10 == 9:
             simulation.reset(rng.integers(0, 20, 3))
 
