@@ -22,12 +22,7 @@ setup(
     package_data={NAME: ["policies/**/*"]},
     entry_points={
         "console_scripts": [
-            "policy_node = policy_server.policy_node:main",
-            "lqr_node = policy_server.lqr_node:main",
-            "mpc_node = policy_server.mpc_node:main",
-            "lqr_drift_node = policy_server.lqr_drift_node:main",
-            "excite_node = policy_server.excite_node:main",
-            "classical_node = policy_server.classical_node:main",
+            "controller_node = policy_server.controller_node:main",
         ]
     },
 )

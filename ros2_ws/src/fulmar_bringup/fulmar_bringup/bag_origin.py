@@ -8,13 +8,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fulmar_bringup.system import CONTROLLERS, System
+from fulmar_bringup.system import System
 from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_path
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
 from fulmar_ros.provenance import fulmar_version, git_revision
+from policy_server.controllers import controller_entry
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def _of_controller(plan: RunPlan) -> dict[str, Path]:
     """The passport of a policy, which has the hash of its weights; the gains of a law."""
     if plan.controller == "excite":
         return {}
-    if not CONTROLLERS[plan.controller].runs_bundle:
+    if not controller_entry(plan.controller).runs_bundle:
         law = None if plan.controller == "classical" else plan.controller
         return {"controller.yaml": gains_path(load_robot(plan.robot), law)}
     folder = Path(plan.policy) if plan.policy else shipped_policy(plan.robot, plan.task)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fulmar_bringup.system import CONTROLLERS, default_hardware
+from fulmar_bringup.system import default_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from policy_server.controllers import CONTROLLERS
 from policy_server.shipped import shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"

@@ -52,10 +52,11 @@ class Trial:
 
     def controller(self) -> Controller:
         """The controller, made anew."""
-        from fulmar_bringup.system import CONTROLLERS
+        from policy_server.controllers import Choice, load_controller
 
         plan = self.plan
-        return CONTROLLERS[plan.controller].load(self.robot, self.task, plan.control_hz, plan.policy)
+        choice = Choice(plan.control_hz, plan.policy)
+        return load_controller(plan.controller, self.robot, self.task, choice)
 
     def drawn(self, numbers: np.ndarray) -> Episode:
         """What the episodes of some numbers begin with."""

@@ -12,7 +12,6 @@ from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
 from fulmar_bringup.system import (
-    CONTROLLERS,
     NONE,
     Guards,
     check_names,
@@ -27,6 +26,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
 from hardware_drivers.settings import load_hardware
+from policy_server.controllers import controller_entry
 
 Parameter = bool | int | float | str | list[float] | list[int] | list[str]
 
@@ -82,8 +82,8 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         plan: What to run.
         subscribers: Subscriptions of the command to wait for, in lock step.
     """
-    executable = CONTROLLERS[plan.controller].node
     parameters: dict[str, Parameter] = {
+        "controller": plan.controller,
         "robot": plan.robot,
         "task": plan.task,
         "control_hz": plan.control_hz,
@@ -93,7 +93,7 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "wait_for_subscribers": subscribers,
     }
     guards = plan.guards
-    if CONTROLLERS[plan.controller].runs_bundle:
+    if controller_entry(plan.controller).runs_bundle:
         texts = {
             "policy": plan.policy,
             "fallback": guards.fallback or "",
@@ -116,8 +116,8 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
     return NodeSpec(
         "controller",
         "policy_server",
-        executable,
-        f"policy_server.{executable}",
+        "controller_node",
+        "policy_server.controller_node",
         f"/{plan.robot}",
         parameters,
         network=plan.controller_network,

@@ -16,8 +16,6 @@ from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, 
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.remapping import read_remappings
 from fulmar_bringup.system import (
-    CONTROLLERS,
-    FALLBACKS,
     Guards,
     check_names,
     default_control_hz,
@@ -41,6 +39,7 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from hardware_drivers.settings import UNARMED, MavlinkBoat, load_hardware
+from policy_server.controllers import FALLBACKS, controller_entry
 from policy_server.shipped import shipped_policies, shipped_policy
 
 PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
@@ -256,7 +255,7 @@ def _checked_guards(
         raise UnknownNameError("fallback", fallback, FALLBACKS)
     guards = replace(usual, **asked)
     if guards.fallback:
-        CONTROLLERS[guards.fallback].check(robot, task)
+        controller_entry(guards.fallback).check(robot, task)
     if guards.estimator:
         load_estimator(guards.estimator)
         if lockstep:
@@ -385,7 +384,7 @@ def chosen_policy(
         ConfigError: A bundle was given to a controller that runs none.
         BundleError: None is shipped, or the bundle is damaged or made for something else.
     """
-    if CONTROLLERS[controller].runs_bundle:
+    if controller_entry(controller).runs_bundle:
         try:
             return checked_policy(policy, robot, task, control_hz)
         except BundleError:

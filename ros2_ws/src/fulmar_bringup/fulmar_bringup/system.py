@@ -2,112 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from fulmar_core.config import load_config
-from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
-from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
-from fulmar_core.controllers.excite import Excite
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.robot import load_robot
 from fulmar_core.safety.area import NO_AREA, check_area
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks import load_task
 from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
+from policy_server.controllers import FALLBACKS, controller_entry
 
-
-def _load_policy(robot: Robot, task: Task, control_hz: float, policy: str) -> Controller:
-    from policy_server.policy import Policy
-
-    return Policy(Path(policy), robot, task, control_hz=control_hz)
-
-
-def _load_lqr(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
-    return load_lqr(robot, task, control_hz=control_hz)
-
-
-def _load_mpc(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
-    return load_classical(robot, task, control_hz=control_hz, law="mpc")
-
-
-def _load_lqr_drift(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
-    return load_classical(robot, task, control_hz=control_hz, law="lqr_drift")
-
-
-def _load_classical(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
-    return load_classical(robot, task, control_hz=control_hz)
-
-
-def _load_excite(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
-    return Excite(robot, task, control_hz=control_hz)
-
-
-def _check_lqr(robot: Robot, task: Task) -> None:
-    check_pair(robot, task, law="lqr")
-
-
-def _check_mpc(robot: Robot, task: Task) -> None:
-    check_pair(robot, task, law="mpc")
-
-
-def _check_lqr_drift(robot: Robot, task: Task) -> None:
-    check_pair(robot, task, law="lqr_drift")
-
-
-def _check_excite(robot: Robot, task: Task) -> None:
-    if task.kind not in EXCITE_TASKS:
-        raise ConfigError(
-            f"controller 'excite' stays around one place, '{task.name}' has none. "
-            f"Use --task with one of: {', '.join(EXCITE_TASKS)}."
-        )
-
-
-def _any_pair(robot: Robot, task: Task) -> None:
-    """A bundle says itself what it was made for."""
-
-
-@dataclass(frozen=True)
-class ControllerEntry:
-    """One line of the table of controllers."""
-
-    title: str
-    node: str  # script and module in policy_server
-    load: Callable[[Robot, Task, float, str], Controller]  # with the command rate and the folder of a bundle
-    check: Callable[[Robot, Task], None]  # refuses a robot and a task that it has nothing for
-    needs: tuple[str, ...] = ()  # modules that an extra brings
-    strives: bool = True  # whether it means to meet the goal
-    runs_bundle: bool = False  # whether a learned policy drives
-
-
-_LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
-CONTROLLERS = {
-    "policy": ControllerEntry(
-        "a learned policy bundle",
-        "policy_node",
-        _load_policy,
-        _any_pair,
-        ("onnxruntime",),
-        runs_bundle=True,
-    ),
-    "lqr": ControllerEntry(
-        "linear-quadratic regulator with valve allocation", "lqr_node", _load_lqr, _check_lqr
-    ),
-    "mpc": ControllerEntry(
-        "predictive control that tries combinations of valves", "mpc_node", _load_mpc, _check_mpc
-    ),
-    "lqr_drift": ControllerEntry(
-        "the published LQR of DRIFT, to compare with", "lqr_drift_node", _load_lqr_drift, _check_lqr_drift
-    ),
-    "classical": ControllerEntry(
-        f"the law of the robot's family: {_LAWS}", "classical_node", _load_classical, check_pair
-    ),
-    "excite": ControllerEntry(Excite.title, "excite_node", _load_excite, _check_excite, strives=False),
-}
-FALLBACKS = tuple(name for name, entry in CONTROLLERS.items() if not entry.runs_bundle)
 SIMULATED = ("mujoco", "mock")
 BACKENDS = (*SIMULATED, "hardware")
 
@@ -182,7 +88,7 @@ def modules_of(
     simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
     driven = load_hardware(hardware).needs if hardware else ()
     estimated = ("filterpy",) if guards.estimator else ()
-    return (*CONTROLLERS[controller].needs, *simulated, *driven, *estimated)
+    return (*controller_entry(controller).needs, *simulated, *driven, *estimated)
 
 
 def system_of(controller: str, backend: str) -> System | None:
@@ -198,9 +104,7 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
         ConfigError: On the first wrong one.
     """
     the_robot, the_task = load_robot(robot), load_task(task)
-    if controller not in CONTROLLERS:
-        raise UnknownNameError("controller", controller, CONTROLLERS)
-    CONTROLLERS[controller].check(the_robot, the_task)
+    controller_entry(controller).check(the_robot, the_task)
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
     if backend == "hardware":

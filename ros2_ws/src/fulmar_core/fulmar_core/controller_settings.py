@@ -12,6 +12,7 @@ from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
 
 MOST_COPIES = 3
+POLICY = "policy"  # the controller that runs a bundle, which another one may follow while the node runs
 # Of a plant whose states of the actuators may come late or get lost, before nothing is learned
 MISSED_TICKS = 5
 
@@ -20,6 +21,7 @@ MISSED_TICKS = 5
 class ControllerSettings:
     """ROS parameters of a controller node."""
 
+    controller: str = POLICY  # a name of `fulmar list controllers`
     robot: str = "floating_platform"
     task: str = "go_to_pose"
     policy: str = ""  # folder of the bundle, for policies

@@ -16,7 +16,7 @@ from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.control_loop import Step
-from fulmar_core.controller_settings import ControllerSettings
+from fulmar_core.controller_settings import POLICY, ControllerSettings
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
@@ -54,7 +54,6 @@ class ControllerNode(LifecycleNode):
         request_exit: RequestExit,
         *,
         cli_args: list[str] | None = None,
-        learned: bool = False,
     ) -> None:
         """Read the parameters and, unless told otherwise, start.
 
@@ -62,7 +61,6 @@ class ControllerNode(LifecycleNode):
             make_controller: Loads the controller; called at configuration.
             request_exit: Ends the process.
             cli_args: ROS arguments of this node alone, where it shares a process.
-            learned: Whether `make_controller` loads a policy, which another may follow while the node runs.
 
         Raises:
             FulmarError: If a parameter, a configuration file or a policy is wrong.
@@ -77,7 +75,7 @@ class ControllerNode(LifecycleNode):
         self.guard: GuardedLoop | None = None  # while configured
         self._estop = EstopWatch(required=self.settings.estop)  # a press outlives a new configuration
         self._swap = PolicySwap(
-            self._load if learned else None,
+            self._load if self.settings.controller == POLICY else None,
             propose=lambda candidate: self._guarded.succession.propose(candidate),
             warn=self.get_logger().warning,
         )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.rerun import Answers, rerun
-from fulmar_bringup.system import CONTROLLERS
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
+from policy_server.controllers import Choice, controller_entry, load_controller
 
 
 def answers_of(
@@ -30,10 +30,10 @@ def answers_of(
     hz = course.settings.control_rate(course.robot)
 
     def load(bundle: str) -> Controller:
-        return CONTROLLERS[name].load(course.robot, course.task, hz, bundle)
+        return load_controller(name, course.robot, course.task, Choice(hz, bundle))
 
     law, fallback = course.settings.fallback, None
-    if CONTROLLERS[name].runs_bundle and law:  # nothing else has one in the node
+    if controller_entry(name).runs_bundle and law:  # nothing else has one in the node
         law_of = None if law == "classical" else law
         fallback = load_classical(course.robot, course.task, control_hz=hz, law=law_of)
     loaded = load(folder)

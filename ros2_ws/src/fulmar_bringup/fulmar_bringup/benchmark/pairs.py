@@ -90,13 +90,14 @@ def with_law(robot: str, task: str, name: str) -> Pair:
     Args:
         robot: Name of the robot.
         task: Name of the task.
-        name: Of the controller, one of `system.CONTROLLERS`.
+        name: Of the controller, one of `policy_server.controllers.CONTROLLERS`.
     """
-    from fulmar_bringup.system import CONTROLLERS
+    from policy_server.controllers import Choice, load_controller
 
     the_robot, the_task = load_robot(robot), load_task(task)
     try:
-        controller = CONTROLLERS[name].load(the_robot, the_task, the_robot.timing.control_hz, "")
+        choice = Choice(the_robot.timing.control_hz)
+        controller = load_controller(name, the_robot, the_task, choice)
     except ConfigError as error:
         return Pair(robot, task, "classical", reason=str(error))
     told = controller.metadata()

@@ -175,15 +175,13 @@ def _check_effect(source: str, through: str, *, foreign: bool, options: dict[str
 def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | None) -> tuple[str, str]:
     """Name of the controller and folder of its bundle, empty where it has none."""
     from fulmar_bringup.bags.course import policy_folder
-    from fulmar_bringup.system import CONTROLLERS
+    from policy_server.controllers import controller_entry
     from policy_server.shipped import shipped_policy
 
     name = controller or ("policy" if policy else (bag.info or {}).get("controller"))
     if not isinstance(name, str):
         raise ConfigError(f"{bag.path}: the bag does not say which controller drove. Give --controller.")
-    if name not in CONTROLLERS:
-        raise UnknownNameError("controller", name, CONTROLLERS)
-    if not CONTROLLERS[name].runs_bundle:
+    if not controller_entry(name).runs_bundle:
         if policy is not None:
             raise ConfigError(
                 f"--policy is for --controller policy, not for '{name}'. Leave one of them out."

@@ -82,7 +82,7 @@ def drift(
     from fulmar_bringup.commands.benchmark_roboran import chosen
     from fulmar_bringup.evaluation import WAYS
     from fulmar_bringup.extras import require
-    from fulmar_bringup.system import CONTROLLERS
+    from policy_server.controllers import CONTROLLERS
 
     if through not in WAYS:
         raise UnknownNameError("way", through, WAYS)

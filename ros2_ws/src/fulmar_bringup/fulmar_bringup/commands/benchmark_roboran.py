@@ -83,15 +83,15 @@ def roboran(
     from fulmar_bringup.benchmark.thesis import ROBOTS, TASKS
     from fulmar_bringup.benchmark.unit import Unit
     from fulmar_bringup.extras import require
-    from fulmar_bringup.system import CONTROLLERS
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.paths import config_names
+    from policy_server.controllers import controller_entry
 
     load_scenario(scenario)
     ways = chosen(through, "way", tuple(EPISODES))
     kinds = chosen(controllers, "kind of controller", KINDS)
     for kind in kinds:
-        require(*CONTROLLERS[kind].needs)
+        require(*controller_entry(kind).needs)
     if "mujoco" in ways or "ros" in ways:
         require("mujoco")
     if report:

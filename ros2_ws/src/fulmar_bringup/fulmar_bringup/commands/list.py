@@ -67,7 +67,7 @@ def _show(found: dict[str, dict[str, str]]) -> None:
 
 def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     """Names of one family, and what loads one of them and gives its title."""
-    from fulmar_bringup.system import CONTROLLERS, load_system
+    from fulmar_bringup.system import load_system
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.estimation.settings import load_estimator
     from fulmar_core.goal_files import load_goals
@@ -75,6 +75,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from hardware_drivers.settings import load_hardware
+    from policy_server.controllers import CONTROLLERS
     from policy_server.shipped import policies_directory, shipped_policies
 
     if family == "policies":

@@ -201,8 +201,9 @@ def run(
     from fulmar_bringup.extras import require
     from fulmar_bringup.goal_plan import default_task as task_of_goals
     from fulmar_bringup.planning import plan_run
-    from fulmar_bringup.system import CONTROLLERS, modules_of
+    from fulmar_bringup.system import modules_of
     from fulmar_core.calibration import use_calibration
+    from policy_server.controllers import controller_entry
 
     use_calibration(calibration, robot)
     place = read_goal(goal)
@@ -253,7 +254,7 @@ def run(
         output.print(verdict(outcome.summary))
     if outcome.failure:
         console.print(f"run failed: {outcome.failure}", markup=False)
-    aimless = not CONTROLLERS[controller].strives and not outcome.failure
+    aimless = not controller_entry(controller).strives and not outcome.failure
     raise typer.Exit(DONE if aimless else outcome.exit_code)
 
 
@@ -299,11 +300,11 @@ def told_figure(summary: dict[str, Any], name: str) -> str:
 
 def verdict(summary: dict[str, Any]) -> str:
     """One run in a few lines."""
-    from fulmar_bringup.system import CONTROLLERS
+    from policy_server.controllers import controller_entry
 
     if summary["success"] is None:
         return f"{summary['controller']}: no fault, so the ring of the recorder was not written; no verdict on the goal"
-    if CONTROLLERS[summary["controller"]].strives:
+    if controller_entry(summary["controller"]).strives:
         reached = "goal met" if summary["success"] else "goal missed"
         if summary["success"] and summary["time_to_target_s"] is not None:
             reached += f" after {summary['time_to_target_s']:.1f} s"

@@ -1,0 +1,122 @@
+"""The table of controllers: each by its name, with how it is loaded and what it is for. No ROS.
+
+Another controller is one file in `fulmar_core/controllers`, one YAML with its gains, and one line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from fulmar_core.controllers.classical import LAWS, check_pair, load_classical
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
+from fulmar_core.controllers.excite import Excite
+from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+from policy_server.shipped import shipped_policy
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a controller is loaded with, beside robot and task."""
+
+    control_hz: float  # command rate [Hz]
+    policy: str = ""  # folder of a bundle; empty: the shipped one
+    trusted_keys: str = ""  # file or folder of public keys, one of which must have signed the bundle
+
+
+@dataclass(frozen=True)
+class ControllerEntry:
+    """One line of the table."""
+
+    title: str
+    load: Callable[[Robot, Task, Choice], Controller]
+    check: Callable[[Robot, Task], None]  # raises ConfigError for a pair that it has nothing for
+    needs: tuple[str, ...] = ()  # modules that an extra brings
+    strives: bool = True  # whether it means to meet the goal
+    runs_bundle: bool = False  # whether a learned policy drives
+    may_follow: bool = False  # whether it may take over from a policy that is refused
+
+
+def _load_policy(robot: Robot, task: Task, choice: Choice) -> Controller:
+    from policy_server.policy import Policy
+
+    folder = Path(choice.policy) if choice.policy else shipped_policy(robot.name, task.name)
+    if folder is None:
+        raise BundleError(
+            f"no policy is shipped for '{robot.name}' and '{task.name}'. Set the parameter 'policy'."
+        )
+    trusted = Path(choice.trusted_keys) if choice.trusted_keys else None
+    return Policy(folder, robot, task, control_hz=choice.control_hz, trusted=trusted)
+
+
+def _any_pair(robot: Robot, task: Task) -> None:
+    """A bundle says itself what it was made for."""
+
+
+def _load_law(law: str | None, robot: Robot, task: Task, choice: Choice) -> Controller:
+    return load_classical(robot, task, control_hz=choice.control_hz, law=law)
+
+
+def _check_law(law: str | None, robot: Robot, task: Task) -> None:
+    check_pair(robot, task, law=law)
+
+
+def _law(title: str, law: str | None) -> ControllerEntry:
+    return ControllerEntry(title, partial(_load_law, law), partial(_check_law, law), may_follow=True)
+
+
+def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
+    return Excite(robot, task, control_hz=choice.control_hz)
+
+
+def _check_excite(robot: Robot, task: Task) -> None:
+    if task.kind not in EXCITE_TASKS:
+        raise ConfigError(
+            f"controller 'excite' stays around one place, '{task.name}' has none. "
+            f"Use --task with one of: {', '.join(EXCITE_TASKS)}."
+        )
+
+
+_LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
+CONTROLLERS = {
+    "policy": ControllerEntry(
+        "a learned policy bundle", _load_policy, _any_pair, ("onnxruntime",), runs_bundle=True
+    ),
+    "lqr": _law("linear-quadratic regulator with valve allocation", "lqr"),
+    "mpc": _law("predictive control that tries combinations of valves", "mpc"),
+    "lqr_drift": _law("the published LQR of DRIFT, to compare with", "lqr_drift"),
+    "classical": _law(f"the law of the robot's family: {_LAWS}", None),
+    "excite": ControllerEntry(Excite.title, _load_excite, _check_excite, strives=False),
+}
+FALLBACKS = tuple(name for name, entry in CONTROLLERS.items() if entry.may_follow)
+
+
+def controller_entry(name: str) -> ControllerEntry:
+    """The line of a controller.
+
+    Raises:
+        UnknownNameError: There is none of this name.
+    """
+    if name not in CONTROLLERS:
+        raise UnknownNameError("controller", name, CONTROLLERS)
+    return CONTROLLERS[name]
+
+
+def load_controller(name: str, robot: Robot, task: Task, choice: Choice) -> Controller:
+    """Load a controller by its name.
+
+    Args:
+        name: Of the table.
+        robot: The robot.
+        task: What it does.
+        choice: Rate and bundle.
+
+    Raises:
+        FulmarError: There is none of this name, or it cannot control this robot at this task.
+    """
+    return controller_entry(name).load(robot, task, choice)
