@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from fulmar_core.controllers.told import PUSH_TERMS, told_terms
+from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS, disturbance_terms
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.goal import Goal
 from fulmar_core.observation import Observer
@@ -123,6 +123,6 @@ def test_the_robots_with_terms_of_their_own_are_named(page):
     }
     assert set(re.findall(r"`(\w+)`", table["`previous_` and the actuator's name"][2])) == with_memory
     robot = load_robot("floating_platform")
-    assert told_terms(robot) == (*PUSH_TERMS, *(f"{valve}_alive" for valve in robot.actuators.names))
+    assert disturbance_terms(robot) == (*PUSH_TERMS, *(f"{valve}_alive" for valve in robot.actuators.names))
     for term in PUSH_TERMS:
         assert any(f"`{term}`" in first for first in table), term

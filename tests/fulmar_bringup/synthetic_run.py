@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import Goal, goal_at
-from fulmar_core.observation import Observer
+from fulmar_core.goal import Goal, goal_at, goal_in_float64
 from fulmar_core.planar import PlanarState, at_rest, rigid_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rotation import from_yaw, rotate_inverse
@@ -88,7 +88,8 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
     bag.text("controller/metadata", json.dumps(controller.metadata()))
     jitter = np.random.default_rng([plan.seed, len(plan.controller)])
     substeps = round(1.0 / (plan.control_hz * TICK_S))
-    safe, observer = robot.actuators.safe_command, Observer(robot, task)
+    safe, loop = robot.actuators.safe_command, ControlLoop(robot, task, controller)
+    loop.begin(goal_in_float64(simulation.goal))
     command, heard_s, closed, trips, steps = safe, -np.inf, False, 0, 0
     given = float(simulation.goal.done[0])
     for tick in range(round(min(plan.duration_s, plan.gone_after_s) / TICK_S) + 1):
@@ -102,8 +103,9 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
         if task.name == "push_block":
             bag.block(simulation.goal[0].block, time_s, now_ns)
         if tick % substeps == 0 and not plan.silence_s[0] <= time_s < plan.silence_s[1]:
-            seen = observer(simulation.measured, simulation.goal, command[None])
-            command = np.asarray(controller.act(np.asarray(seen)))[0]
+            if simulation.block is not None:
+                loop.goal = replace(loop.goal, block=simulation.block)
+            command = loop.step(simulation.measured, round(time_s * NS)).command[0]
             heard_s, steps = time_s, steps + 1
             late_ns = LATENCY_NS + int(jitter.gamma(2.0, 300_000))
             bag.command(command, time_s, now_ns + late_ns)

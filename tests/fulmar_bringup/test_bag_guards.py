@@ -17,6 +17,7 @@ from fulmar_bringup.bags.guarded import number_of
 from fulmar_bringup.bags.live_node import rerun_through_node
 from fulmar_bringup.bags.rerun import Answers, rerun
 from fulmar_core.controllers.classical import load_classical
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP, Wire
 from fulmar_ros.bag_types import type_store
@@ -74,12 +75,14 @@ def test_a_ring_says_that_the_run_time_is_not_judged(bag):
     assert any("max_run_time" in warning for warning in course.warnings)
 
 
-def test_outside_its_area_a_robot_is_not_led(bag):
+def test_a_robot_that_left_its_area_moves_no_more_without_a_new_goal_as_in_the_node(bag):
     course = course_of(bag)
     x = course.odometry.pose[course.sample, 0]
     limit = float(np.median(x))
     _, answers = again(guarded(bag, area=[limit, 1e6, -1e6, 1e6]))
-    np.testing.assert_array_equal(answers.acted, x >= limit)
+    inside = x >= limit
+    assert inside[np.argmin(inside) :].any()  # it would have come back
+    np.testing.assert_array_equal(answers.acted, np.logical_and.accumulate(inside))
     assert any("outside its area" in reason for reason in answers.reasons)
 
 
@@ -134,20 +137,20 @@ def test_an_estop_that_the_bag_lacks_is_a_reason_to_refuse(bag):
 class Refused:
     """Says what no actuator can do, from some step on."""
 
-    name, control_hz = "refused", 5.0
+    name, control_hz, estimator = "refused", 5.0, None
 
     def __init__(self, course: Course, *, after: int, raises: bool = False) -> None:
-        self.observation_names, self._left, self._raises = course.observation_names, after, raises
-        self._count = len(course.robot.actuators.names)
+        self._left, self._raises = after, raises
+        self._shape = (1, len(course.robot.actuators.names))
 
     def reset(self) -> None:
         pass
 
-    def act(self, observation: np.ndarray) -> np.ndarray:
+    def act(self, inputs: Inputs) -> np.ndarray:
         self._left -= 1
         if self._left < 0 and self._raises:
             raise ValueError("no idea")
-        return np.full(self._count, np.nan if self._left < 0 else 0.0)
+        return np.full(self._shape, np.nan if self._left < 0 else 0.0)
 
 
 def test_three_refused_commands_let_the_fallback_take_over(bag):

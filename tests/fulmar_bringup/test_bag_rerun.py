@@ -162,14 +162,14 @@ def test_a_controller_forgets_at_a_pause_as_in_the_node():
     seen = []
 
     class Forgetful:
-        name, control_hz, observation_names = "forgetful", 5.0, course.observation_names
+        name, control_hz, estimator = "forgetful", 5.0, None
 
         def reset(self):
             seen.append("reset")
 
-        def act(self, observation):
+        def act(self, inputs):
             seen.append("act")
-            return course.robot.actuators.safe_command
+            return course.robot.actuators.safe_command[None]
 
     later = course.stamp_ns + np.where(np.arange(len(course)) >= 40, 3_000_000_000, 0)
     rerun(replace(course, stamp_ns=later), Forgetful())

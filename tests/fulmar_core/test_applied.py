@@ -1,19 +1,17 @@
-"""What the actuators did between two measurements, and what an estimator makes of it."""
+"""What the actuators did between two measurements, and what a bank of filters makes of it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from fulmar_core.controllers.classical import load_classical
-from fulmar_core.health.applied import Applied, AppliedHistory, report_applied
+from fulmar_core.health.applied import Applied, AppliedHistory
 from fulmar_core.health.thruster_health import ThrusterHealth
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
 
 MS = 1_000_000
-ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
+ROBOT = load_robot("floating_platform")
 CLOSED, FIRST, SECOND = np.zeros(8), np.eye(8)[0], np.eye(8)[1]
 
 
@@ -98,22 +96,3 @@ def test_where_it_is_not_known_what_was_applied_nothing_is_learned():
         believed = health.see(state(), None, 0.2)
     assert believed.effectiveness.min() > 0.9
     assert not believed.push.any()
-
-
-def test_the_lqr_learns_from_what_was_applied_and_not_from_what_it_commanded():
-    """A robot that stands with closed valves while the LQR commands; else its observer believes in a push."""
-    push = {}
-    for reported in (False, True):
-        lqr = load_classical(ROBOT, TASK, control_hz=5.0, law="lqr")
-        lqr.reset()
-        observation = np.zeros(len(lqr.observation_names))
-        column = dict(zip(lqr.observation_names, range(len(observation)), strict=True))
-        observation[column["cos_heading_error"]] = 1.0
-        observation[column["goal_x_in_body"]] = observation[column["goal_distance"]] = 1.0
-        for _ in range(6):
-            if reported:
-                report_applied(lqr, Applied(CLOSED[None], np.array([0.2])))
-            assert lqr.act(observation).any()
-        push[reported] = np.hypot(*lqr.health.push[:2])
-    assert push[True] < 0.01
-    assert push[False] > 0.3

@@ -19,17 +19,17 @@ class Eager:
     """Commands that depend on what is seen, for any robot."""
 
     name = "eager"
+    estimator = None
 
     def __init__(self, robot, task):
         self.control_hz = robot.timing.control_hz
-        self.observation_names = task.observation_names
         self._robot = robot
 
     def reset(self):
         pass
 
-    def act(self, observation):
-        seen = np.cumsum(np.sin(7.0 * np.asarray(observation)), axis=-1)
+    def act(self, inputs):
+        seen = np.cumsum(np.sin(7.0 * inputs.observation), axis=-1)
         return seen[..., : len(self._robot.actuators.names)] * self._robot.actuators.scale
 
     def metadata(self):

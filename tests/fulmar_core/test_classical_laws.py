@@ -15,12 +15,12 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_at
 from fulmar_core.metrics import successes
-from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
+from tests.inputs import inputs_at
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 TASKS = {name: load_task(name) for name in config_names("tasks")}
@@ -40,9 +40,8 @@ def at(x=0.0, y=0.0, yaw=0.0, vx=0.0, vy=0.0, yaw_rate=0.0):
 
 def command(robot, task, state, *targets, previous=None):
     """What the law commands, in actuator units."""
-    before = robot.actuators.safe_command if previous is None else np.asarray(previous)
-    seen = Observer(robot, task)(state, goal_at(*targets), before)
-    return load_classical(robot, task).act(seen)
+    inputs = inputs_at(robot, task, state, goal_at(*targets), previous=previous)
+    return load_classical(robot, task).act(inputs)[0]
 
 
 @pytest.mark.parametrize(("robot", "task"), PAIRS, ids=lambda value: value.name)

@@ -11,6 +11,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from tests.inputs import inputs_of
 
 TASK = load_task("go_to_position")
 
@@ -21,7 +22,7 @@ def commands_of(name, *, seconds=90.0, worlds=4):
     controller = Excite(robot, TASK)
     commands, far = [], 0.0
     for _ in range(round(seconds * controller.control_hz)):
-        simulation.step(np.asarray(controller.act(np.asarray(simulation.observe()))))
+        simulation.step(controller.act(inputs_of(simulation)))
         commands.append(simulation.command[0])
         goal = simulation.goal.current
         far = max(

@@ -78,7 +78,10 @@ def test_where_the_block_went_counts_and_where_it_is_may_be_outside():
     stayed, _ = judged(PUSH, 3.0, goal=start)
     pushed, over = judged(PUSH, 3.0, goal=start, ended=moved)
     assert not over
-    gain = float((PUSH.block_reward(start, moved) - PUSH.block_reward(start, start))[0])
+    weights = PUSH.reward_weights
+    nearness = weights.block * (np.exp(-1.9 / 0.25) - np.exp(-2.0 / 0.25))
+    far_off = weights.block_far * (np.exp(-1.9 / 2.0) - np.exp(-2.0 / 2.0))
+    gain = nearness + far_off + weights.push * 0.1
     assert pushed - stayed == pytest.approx(gain)
     far = goal_at(block=(BASE.limits.geofence + 0.1, 0.0))
     assert judged(PUSH, 3.0, goal=start, ended=far)[1]

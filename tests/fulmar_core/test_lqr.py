@@ -11,18 +11,17 @@ from fulmar_core.actuators.thrusters import Nozzle
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import load_lqr
 from fulmar_core.controllers.lqr import Lqr, LqrWeights, linear_model
-from fulmar_core.controllers.situation import raw_situation
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_at
 from fulmar_core.metrics import episode_metrics, successes
-from fulmar_core.observation import Observer
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from tests.inputs import inputs_at, inputs_of
 
 ROBOT, POSE, POSITION = load_robot("floating_platform"), load_task("go_to_pose"), load_task("go_to_position")
 SPEED = load_task("track_velocities")
@@ -34,7 +33,7 @@ def at(x=0.0, y=0.0, yaw=0.0, vx=0.0, vy=0.0, yaw_rate=0.0):
 
 
 def seen(task, state, *target):
-    return Observer(ROBOT, task)(state, goal_at(target or (0.0, 0.0, 0.0)), np.zeros(8))
+    return inputs_at(ROBOT, task, state, goal_at(target or (0.0, 0.0, 0.0)))
 
 
 @pytest.mark.parametrize("hz", [50.0, 5.0])
@@ -71,7 +70,7 @@ def gain_by_probing(lqr, task):
     class Spy:
         def best(self, wrench, alive, dearer):
             wanted.append(wrench)
-            return np.zeros(8)
+            return np.zeros((1, 8))
 
     lqr.allocation = Spy()
     h = 1e-3  # far below every limit
@@ -79,7 +78,7 @@ def gain_by_probing(lqr, task):
     for index in USED[task.name]:
         lqr.reset()
         lqr.act(seen(task, at(**{names[index]: h})))
-    return -np.stack(wanted, axis=1) / h
+    return -np.concatenate(wanted).T / h
 
 
 def test_errors_push_back_towards_the_goal():
@@ -96,8 +95,8 @@ def test_errors_beyond_the_limit_count_as_the_limit():
 
 
 def error(state, weights=WEIGHTS, push=(0.0, 0.0, 0.0)):
-    lqr, observation = Lqr(ROBOT, POSE, weights), seen(POSE, state)
-    return lqr.error_state(observation, replace(raw_situation(lqr.reader, observation), push=np.array(push)))
+    lqr, inputs = Lqr(ROBOT, POSE, weights), seen(POSE, state)
+    return lqr.error_state(inputs, replace(lqr.frame.situation(inputs), push=np.array([push])))[0]
 
 
 def test_who_is_pushed_towards_the_goal_goes_there_more_slowly():
@@ -119,13 +118,13 @@ def test_at_the_wanted_velocity_in_a_turn_it_asks_for_what_bends_the_way():
     class Spy:
         def best(self, wrench, alive, dearer):
             wanted.append(wrench)
-            return np.zeros(8)
+            return np.zeros((1, 8))
 
     lqr = load_lqr(ROBOT, SPEED)
     lqr.allocation = Spy()
     lqr.act(seen(SPEED, at(vx=0.3, vy=-0.1, yaw_rate=0.4), 0.3, -0.1, 0.4))
     m = ROBOT.body.mass
-    np.testing.assert_allclose(wanted[0], [m * 0.4 * 0.1, m * 0.4 * 0.3, 0.0], atol=1e-12)
+    np.testing.assert_allclose(wanted[0], [[m * 0.4 * 0.1, m * 0.4 * 0.3, 0.0]], atol=1e-12)
 
 
 def test_going_to_a_position_ignores_the_heading():
@@ -178,7 +177,7 @@ def test_it_leaves_valves_as_they_are_until_they_have_had_their_time():
     simulation = BatchSimulation(ROBOT, POSE, load_scenario("nominal"), worlds=8, seed=1, control_hz=50.0)
     commands = []
     for _ in range(40):
-        commands.append(lqr.act(simulation.observe()))
+        commands.append(lqr.act(inputs_of(simulation)))
         simulation.step(commands[-1])
     changes = np.any(np.diff(np.array(commands), axis=0) != 0.0, axis=2)
     assert changes.any()

@@ -10,11 +10,14 @@ import pytest
 from fulmar_core.config import load_config
 from fulmar_core.controllers.mpc import Mpc, MpcGains
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.goal import goal_at
 from fulmar_core.metrics import episode_metrics
 from fulmar_core.paths import config_path
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
+from tests.inputs import inputs_at, some_of
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 GAINS = load_config(MpcGains, config_path("controllers", "floating_platform_mpc"))
@@ -40,11 +43,13 @@ def test_dearer_gas_is_saved():
 
 def test_one_robot_is_steered_as_in_a_batch():
     law = Mpc(ROBOT, TASK, GAINS)
-    rows = np.random.default_rng(1).uniform(-1.0, 1.0, (6, len(TASK.observation_names)))
-    many = law.act(rows)
-    for row, expected in zip(rows, many, strict=True):
+    states = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 6))
+    inputs = inputs_at(ROBOT, TASK, PlanarState(*states), goal_at((0.0, 0.0, 0.0)))
+    many = law.act(inputs)
+    assert len({command.tobytes() for command in many}) > 1
+    for i, expected in enumerate(many):
         law.reset()
-        np.testing.assert_array_equal(law.act(row), expected)
+        np.testing.assert_array_equal(law.act(some_of(inputs, [i]))[0], expected)
 
 
 def test_gains_that_lead_nowhere_are_refused():

@@ -38,6 +38,11 @@ def body(x=0.0, y=0.0, yaw=0.0, vx=0.0, vy=0.0, yaw_rate=0.0):
     return PlanarState(*(np.array([float(value)]) for value in (x, y, yaw, vx, vy, yaw_rate)))
 
 
+def reward(task, before, after, goal):
+    """Reward of one control step whose end is measured without error."""
+    return float(task.reward(before, after, goal, task.advance(goal, after, np.zeros(1)))[0])
+
+
 def square(done=0.0, place=(-1.0, 0.0)):
     return Goal(np.array([SQUARE]), np.array([done]), np.zeros((1, 0, 3)), np.array([place]))
 
@@ -178,7 +183,7 @@ def test_between_controller_and_post_is_a_margin_that_only_judges_count():
 
 
 def gate_reward(before, after):
-    return float(GATES.reward(body(*before), body(*after), square())[0])
+    return reward(GATES, body(*before), body(*after), square(place=before[:2]))
 
 
 def test_passing_a_gate_pays_and_passing_it_in_reverse_costs():
@@ -198,26 +203,36 @@ def test_behind_a_gate_the_way_to_it_leads_around():
 
 @EACH
 def test_coming_nearer_pays_and_reaching_pays_more(task):
-    def reward(a, b):
-        return float(task.reward(body(a), body(b), square(place=(a, 0.0)))[0])
+    def going(a, b):
+        return reward(task, body(a), body(b), square(place=(a, 0.0)))
 
-    assert reward(-1.0, -0.9) > reward(-1.0, -1.0) > reward(-1.0, -1.1)
+    assert going(-1.0, -0.9) > going(-1.0, -1.0) > going(-1.0, -1.1)
     last = 0.05 if task is GATES else -0.1
-    assert reward(-0.2, last) > reward(-0.4, -0.3) + 0.5 * task.reward_weights.reached
+    assert going(-0.2, last) > going(-0.4, -0.3) + 0.5 * task.reward_weights.reached
+
+
+@EACH
+def test_reaching_pays_when_it_is_measured_and_not_before(task):
+    """A learner's goal advances by odometry, which may see a target reached later or sooner than the truth."""
+    goal, before, after = square(place=(-0.2, 0.0)), body(-0.2), body(0.05)
+    seen = task.advance(goal, after, np.zeros(1))
+    paid, unpaid = (float(task.reward(before, after, goal, ended)[0]) for ended in (seen, goal))
+    assert seen.done.tolist() == [1.0]
+    assert paid > unpaid + 0.5 * task.reward_weights.reached
 
 
 @WITH_HEADINGS
 def test_looking_the_right_way_pays_near_a_pose(name):
-    def reward(yaw):
-        return float(TASKS[name].reward(body(-0.3, 0.0, 0.4), body(-0.3, 0.0, yaw), square())[0])
+    def turning(yaw):
+        return reward(TASKS[name], body(-0.3, 0.0, 0.4), body(-0.3, 0.0, yaw), square())
 
-    assert reward(0.2) > reward(0.4) > reward(0.6)
+    assert turning(0.2) > turning(0.4) > turning(0.6)
 
 
 @WITH_HEADINGS
 def test_coming_in_along_the_heading_pays_and_being_in_front_of_a_pose_is_farther_than_behind_it(name):
     def progress(a, b):
-        return float(TASKS[name].reward(body(*a), body(*b), square())[0])
+        return reward(TASKS[name], body(*a), body(*b), square())
 
     # Nothing but the way differs: both look ahead, and both stand 1 m off.
     assert (

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fulmar_core import policy_bundle
+from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.errors import BundleError
 from fulmar_core.policy_bundle import (
     FORMAT,
@@ -22,6 +23,7 @@ from fulmar_core.policy_bundle import (
     check_fit,
     read_golden,
     read_passport,
+    takes_disturbances,
     write_bundle,
 )
 from fulmar_core.robot import load_robot
@@ -247,6 +249,44 @@ def test_a_passport_made_for_something_else_is_refused(change, words):
     with pytest.raises(BundleError) as caught:
         check_fit(replace(BLANK, **change), ROBOT, TASK, 5.0, where="here")
     assert words in str(caught.value)
+
+
+NAMES, TERMS = TASK.observation_names, disturbance_terms(ROBOT)
+
+
+def test_disturbances_that_a_passport_names_behind_the_observation_are_taken():
+    passport = replace(BLANK, observation_names=NAMES + TERMS)
+    check_fit(passport, ROBOT, TASK, 5.0, where="here")
+    assert takes_disturbances(passport.observation_names, ROBOT)
+    assert not takes_disturbances(BLANK.observation_names, ROBOT)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (
+            NAMES + TERMS[:-1],
+            f"has {len(NAMES + TERMS) - 1} observation names, {len(NAMES + TERMS)} are needed",
+        ),
+        (NAMES + TERMS[::-1], f"observation {len(NAMES) + 1} is '{TERMS[-1]}', it must be '{TERMS[0]}'"),
+        (TERMS + NAMES, f"observation 1 is '{TERMS[0]}', it must be '{NAMES[0]}'"),
+        # As many inputs as there would be with disturbances, by other names: never recognised by their number.
+        (
+            NAMES + tuple(f"other_{i}" for i in range(len(TERMS))),
+            f"has {len(NAMES + TERMS)} observation names, {len(NAMES)} are needed",
+        ),
+    ],
+)
+def test_a_passport_with_other_inputs_than_observation_and_disturbances_is_refused(names, words):
+    with pytest.raises(BundleError) as caught:
+        check_fit(replace(BLANK, observation_names=names), ROBOT, TASK, 5.0, where="here")
+    assert words in str(caught.value)
+
+
+def test_a_robot_without_valves_has_no_disturbances_to_name():
+    boat = load_robot("kingfisher")
+    assert disturbance_terms(boat) == ()
+    assert not takes_disturbances((*NAMES, "push_torque"), boat)
 
 
 @pytest.mark.parametrize(

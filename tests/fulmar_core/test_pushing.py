@@ -206,15 +206,16 @@ def at(block, place=(0.0, 0.0)):
 
 
 def test_pushing_the_block_home_pays_and_pushing_it_away_costs():
+    robot = body(2.0)
     home, nearer, there, away = (
-        float(TASK.block_reward(at((1.0, 0.0)), at((x, 0.0)))) for x in (0.05, 0.9, 1.0, 1.1)
+        float(TASK.reward(robot, robot, at((1.0, 0.0)), at((x, 0.0)))[0]) for x in (0.05, 0.9, 1.0, 1.1)
     )
     assert home > nearer > there > away
 
 
 def test_going_behind_the_block_pays_more_than_going_in_front_of_it():
     goal, start = at((1.0, 0.0)), body(1.0, 1.0)
-    behind, ahead = (float(TASK.reward(start, body(x, 1.0), goal)[0]) for x in (1.2, 0.8))
+    behind, ahead = (float(TASK.reward(start, body(x, 1.0), goal, goal)[0]) for x in (1.2, 0.8))
     assert behind > ahead
 
 

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
+from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
@@ -27,19 +28,19 @@ class Habit:
     """A controller without skill: the same smooth function of what it sees, every time."""
 
     name = "habit"
+    estimator = None
 
     def __init__(self, robot, task, *, boldness=0.3):
-        self.observation_names = Observer(robot, task).names
         self.control_hz = robot.timing.control_hz
         self._scale = robot.actuators.scale
-        shape = (len(self.observation_names), len(self._scale))
+        shape = (len(Observer(robot, task).names), len(self._scale))
         self._weights = np.random.default_rng(8).normal(size=shape) * boldness
 
     def reset(self):
         pass
 
-    def act(self, observation):
-        return np.tanh(observation @ self._weights) * self._scale
+    def act(self, inputs):
+        return np.tanh(inputs.observation @ self._weights) * self._scale
 
 
 class Counted(MockBackend):
@@ -72,9 +73,9 @@ class Still(Habit):
     def reset(self):
         self.seen = []
 
-    def act(self, observation):
-        self.seen.append(observation)
-        return np.zeros((len(observation), len(self._scale)))
+    def act(self, inputs):
+        self.seen.append(inputs.observation)
+        return np.zeros_like(inputs.previous)
 
 
 @pytest.mark.parametrize("through", ["batch", "backends"])
@@ -91,6 +92,49 @@ def test_a_waypoint_is_reached_as_near_as_the_robot_can_tell(through):
     distance = np.array(controller.seen)[..., task.observation_names.index("goal_distance")]
     np.testing.assert_allclose(distance[0], near[0], atol=1e-3)
     assert np.all(distance[-1] > 0.5), "the next one is shown"
+
+
+class Restless:
+    """Opens one valve after the other, and keeps the estimates that it gets."""
+
+    name, control_hz, estimator = "restless", 5.0, Suspicion(retry_s=0.0)
+
+    def reset(self):
+        self.estimates = []
+
+    def act(self, inputs):
+        self.estimates.append(inputs.estimates)
+        return np.tile(np.eye(8)[len(self.estimates) % 8], (len(inputs.previous), 1))
+
+
+@pytest.fixture(scope="module")
+def estimates():
+    """What a controller gets estimated of platforms with one lost valve, in the batch and in backends."""
+    controller, found = Restless(), {}
+    task = replace(load_task("drift_go_to_pose"), episode_s=8.0)
+    given = {"task": task, "scenario": load_scenario("drift_one_lost"), "episodes": 4, "seed": 3}
+    for through in ("batch", "backends"):
+        if through == "batch":
+            roll_out_in_batch(controller, ROBOT, **given)
+        else:
+            roll_out_in_backends(controller, lambda: MockBackend(ROBOT), **given)
+        found[through] = controller.estimates
+    return found
+
+
+@pytest.mark.parametrize("through", ["batch", "backends"])
+def test_a_controller_with_an_estimator_gets_its_estimate_at_every_step(estimates, through):
+    found = estimates[through]
+    assert len(found) == 40
+    assert found[0].push.shape == (4, 3)
+    np.testing.assert_array_equal(found[0].alive, np.ones((4, 8)))
+    np.testing.assert_array_equal(8 - found[-1].alive.sum(axis=1), 1)  # one is lost
+
+
+def test_estimates_are_alike_in_the_batch_and_in_backends(estimates):
+    batch, backends = estimates["batch"][-1], estimates["backends"][-1]
+    np.testing.assert_array_equal(batch.alive, backends.alive)
+    np.testing.assert_allclose(batch.push, backends.push, atol=0.02)
 
 
 @pytest.mark.parametrize("way_to_fail", [{}, {"fail_at_step": 3}, {"fail_at_number": 2}], ids=str)

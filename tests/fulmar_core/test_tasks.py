@@ -95,7 +95,9 @@ def test_heading_errors_go_the_short_way_around():
 @BOTH
 def test_coming_nearer_is_worth_more_than_going_away(task):
     start, goal = body(1.0, yaw=0.3), goal_at((0.0, 0.0, 0.3))
-    assert task.reward(start, body(0.9, yaw=0.3), goal) > task.reward(start, body(1.1, yaw=0.3), goal)
+    assert task.reward(start, body(0.9, yaw=0.3), goal, goal) > task.reward(
+        start, body(1.1, yaw=0.3), goal, goal
+    )
 
 
 @BOTH
@@ -103,14 +105,15 @@ def test_coming_nearer_is_worth_more_than_going_away(task):
 @given(x=st.floats(0.15, 5.0), yaw=radians)
 def test_resting_at_the_goal_is_worth_more_than_resting_anywhere_else(task, x, yaw):
     goal, home, away = goal_at((0.0, 0.0, 0.0)), body(), body(x, 0.0, yaw)
-    assert task.reward(home, home, goal) > task.reward(away, away, goal)
+    assert task.reward(home, home, goal, goal) > task.reward(away, away, goal, goal)
 
 
 def test_turning_to_the_goal_s_heading_pays_in_the_pose_task_alone():
     start, goal = body(0.05, yaw=0.5), goal_at((0.0, 0.0, 0.0))
     turned = body(0.05, yaw=0.3)
     gains = [
-        float(task.reward(start, turned, goal) - task.reward(start, start, goal)) for task in (POSE, POSITION)
+        float(task.reward(start, turned, goal, goal) - task.reward(start, start, goal, goal))
+        for task in (POSE, POSITION)
     ]
     assert gains[0] > 0.05
     assert gains[1] == 0.0
@@ -138,7 +141,9 @@ def test_a_magnified_term_that_could_not_saturate_is_refused():
 
 def test_spinning_costs_in_the_position_task():
     goal = goal_at((0.0, 0.0, 0.0))
-    loss = POSITION.reward(body(), body(), goal) - POSITION.reward(body(), body(yaw_rate=-2.0), goal)
+    loss = POSITION.reward(body(), body(), goal, goal) - POSITION.reward(
+        body(), body(yaw_rate=-2.0), goal, goal
+    )
     assert float(loss) == pytest.approx(2.0 * POSITION.reward_weights.spin, abs=1e-12)
 
 

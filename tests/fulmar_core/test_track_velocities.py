@@ -91,9 +91,9 @@ def test_errors_are_wanted_minus_true_in_the_body_s_frame():
 
 def test_moving_as_wanted_is_worth_more_than_anything_else():
     wanted = goal((0.3, 0.1, 0.2))
-    best = TASK.reward(moving(0, 0, 0), moving(0.3, 0.1, 0.2), wanted)
+    best = TASK.reward(moving(0, 0, 0), moving(0.3, 0.1, 0.2), wanted, wanted)
     for other in ((0.2, 0.1, 0.2), (0.3, 0.0, 0.2), (0.3, 0.1, 0.0), (0.0, 0.0, 0.0)):
-        assert best > TASK.reward(moving(0, 0, 0), moving(*other), wanted)
+        assert best > TASK.reward(moving(0, 0, 0), moving(*other), wanted, wanted)
 
 
 def test_targets_that_turn_keep_their_speed_and_turn_no_faster_than_the_task_says():

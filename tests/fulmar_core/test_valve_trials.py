@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.disturbances.scenario import Push, Scenario
+from fulmar_core.goal import goal_in_float64
 from fulmar_core.health.valve_trials import LONGEST_S, OPENINGS_S, ValveTrials
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
@@ -65,15 +67,17 @@ def test_a_valve_that_works_again_is_believed_again_by_the_lqr():
         if not retries:
             gains = replace(lqr._weights, observer=replace(lqr._weights.observer, retry_s=0.0))
             lqr = type(lqr)(robot, task, gains, control_hz=5.0)
-        lqr.reset()
+        loop = ControlLoop(robot, task, lqr, robots=worlds)
+        loop.begin(goal_in_float64(simulation.goal))
+        loop.reset()
         everywhere = np.arange(worlds)
         sick = everywhere % 8
         lost = np.zeros(worlds, dtype=bool)
         for step in range(300):
             simulation.world.alive[sick, everywhere] = float(step >= 75)
-            simulation.step(lqr.act(simulation.observe()))
+            simulation.move(loop.step(simulation.measured, round(1e9 * step * loop.dt)).command)
             if step == 75:
-                lost = lqr.health.effectiveness[everywhere, sick] < 0.1
+                lost = loop.estimate.health.effectiveness[everywhere, sick] < 0.1
         assert lost.sum() >= 8
-        recovered[retries] = np.mean(lqr.health.effectiveness[everywhere, sick][lost] > 0.9)
+        recovered[retries] = np.mean(loop.estimate.health.effectiveness[everywhere, sick][lost] > 0.9)
     assert recovered[True] > 0.8 > 0.5 > recovered[False]

@@ -1,4 +1,4 @@
-"""What a controller node has been told to do, and how far it has come."""
+"""Goals, obstacles and blocks as a controller receives them, and how far its loop has come."""
 
 from __future__ import annotations
 
@@ -7,28 +7,50 @@ import math
 import numpy as np
 import pytest
 
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.mission import Mission
 from fulmar_core.observation import Observer
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.goal_messages import obstacles_message
 from fulmar_ros.message_reader import obstacles_of
-from tests.states import planar_state
 
 S = 1_000_000_000
 ROBOT = load_robot("turtlebot2")
-STILL = np.zeros(2)
+
+
+class Idle:
+    """Stands still."""
+
+    name, control_hz, estimator = "idle", ROBOT.timing.control_hz, None
+
+    def reset(self): ...
+
+    def act(self, inputs):
+        return np.zeros_like(inputs.previous)
+
+
+class Followed(Mission):
+    """A mission, with the control loop that follows its goal."""
+
+    def __init__(self, task, **how):
+        self.loop = ControlLoop(ROBOT, task, Idle())
+        super().__init__(self.loop, **how)
+
+    def observe(self, state, stamp_ns):
+        return self.loop.inputs(state, stamp_ns).observation[0]
 
 
 def mission(task, **how):
-    return Mission(ROBOT, load_task(task), **how)
+    return Followed(load_task(task), **how)
 
 
-def at(x, y=0.0):
-    return planar_state(x, y, 0.0)
+def at(x, y=0.0, yaw=0.0):
+    return at_rest(*(np.array([value], dtype=float) for value in (x, y, yaw)))
 
 
 def test_a_mission_lacks_its_goal_first_then_what_stands_about():
@@ -37,7 +59,7 @@ def test_a_mission_lacks_its_goal_first_then_what_stands_about():
     told.give(goal_at((1.0, 0.0, 0.0)), 1)
     assert told.lacking == "obstacles"
     told.see_obstacles(np.array([[0.5, 0.0, 0.1]]), 2)
-    assert told.complete
+    assert not told.lacking
 
 
 @pytest.mark.parametrize("number", range(3))
@@ -49,8 +71,8 @@ def test_obstacles_and_goal_from_the_wires_are_observed_as_those_of_the_batch(nu
     told.give(goal_at((*episode.goal.current[:2], 0.0)), 1)
     told.see_obstacles(discs, 7)
     start = episode.start
-    seen = told.observe(planar_state(start.x, start.y, start.yaw), S, STILL)
-    expected = Observer(ROBOT, task)(start, episode.goal, STILL)
+    seen = told.observe(at(start.x, start.y, start.yaw), S)
+    expected = Observer(ROBOT, task)(start, episode.goal, np.zeros(2))
     assert len(discs) > 1
     np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
 
@@ -58,8 +80,8 @@ def test_obstacles_and_goal_from_the_wires_are_observed_as_those_of_the_batch(nu
 def test_a_waypoint_is_reached_as_near_as_the_robot_can_tell():
     told, reach = mission("go_through_positions"), load_task("go_through_positions").reach
     told.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), 1)
-    told.observe(at(1.0), S, STILL)
-    told.observe(at(reach + 0.02), 2 * S, STILL)
+    told.observe(at(1.0), S)
+    told.observe(at(reach + 0.02), 2 * S)
     assert told.done == 1
 
 
@@ -68,7 +90,7 @@ def test_the_block_of_each_state_is_waited_for():
     told.give(goal_at((1.0, 0.0, 0.0)), 1)
     assert told.lacking == "place of the block"
     told.see_block(np.array([0.5, 0.0]), 3 * S)
-    assert told.complete
+    assert not told.lacking
     assert told.lacks_something_of(4 * S)
     assert not told.lacks_something_of(3 * S)
 
@@ -87,11 +109,11 @@ def test_a_block_that_nobody_has_seen_for_long_is_lacking_until_it_is_seen_again
     told.give(goal_at((1.0, 0.0, 0.0)), 1)
     told.see_block(np.array([0.5, 0.0]), 3 * S)
     told.turn_to(4 * S)
-    assert told.complete
+    assert not told.lacking
     told.turn_to(4 * S + 1)
     assert told.lacking == "place of the block"
     told.see_block(np.array([0.5, 0.0]), 5 * S)
-    assert told.complete
+    assert not told.lacking
 
 
 def test_waypoints_give_way_when_the_robot_is_at_them():
@@ -99,7 +121,7 @@ def test_waypoints_give_way_when_the_robot_is_at_them():
     told.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), 1)
     assert told.distance(at(1.0)) == pytest.approx(1.0)
     for step, x in enumerate((1.0, 0.5, 0.05)):
-        told.observe(at(x), step * S, STILL)
+        told.observe(at(x), step * S)
     assert told.done == 1
     assert told.distance(at(0.05)) == pytest.approx(2.95)
 
@@ -112,7 +134,7 @@ def test_gates_are_passed_by_the_way_between_two_observations(begins_at):
     told.give(goal_at(*((x, 0.0, 0.0) for x in gates)), 1)
     passed = []
     for i, x in enumerate(np.arange(begins_at, begins_at + 5.0, 0.2)):
-        told.observe(at(x, 0.1), (i + 1) * S, STILL)
+        told.observe(at(x, 0.1), (i + 1) * S)
         passed.append((x, told.done))
     assert [done for _, done in passed] == [sum(x >= gate for gate in gates) for x, _ in passed]
 
@@ -121,7 +143,7 @@ def test_a_gate_behind_the_robot_is_not_passed_by_where_it_was_before_the_goal()
     told = mission("race_gates")
     told.give(goal_at((0.2, 0.0, 0.0), (3.0, 0.0, 0.0)), 1)
     for i, x in enumerate((0.4, 0.6)):
-        told.observe(at(x), (i + 1) * S, STILL)
+        told.observe(at(x), (i + 1) * S)
     assert told.done == 0
 
 
@@ -131,7 +153,7 @@ def test_a_new_goal_begins_anew_and_a_streamed_one_only_where_it_differs():
         told = mission("go_through_positions", streamed=streamed)
         assert told.give(course, 1)
         for step in range(2):
-            told.observe(at(0.0), step * S, STILL)
+            told.observe(at(0.0), step * S)
         assert told.give(course, 2) is not streamed
         assert told.done == done
         assert told.give(goal_at((9.0, 0.0, 0.0)), 3)
@@ -143,7 +165,7 @@ def test_a_goal_that_is_repeated_with_its_stamp_changes_nothing():
     told = mission("go_through_positions")
     assert told.give(course, 1)
     for step in range(2):
-        told.observe(at(0.0), step * S, STILL)
+        told.observe(at(0.0), step * S)
     assert not told.give(course, 1)
     assert told.done == 1
     assert told.give(goal_at((9.0, 0.0, 0.0)), 2)
@@ -160,7 +182,7 @@ def test_a_velocity_that_is_repeated_does_not_end_those_that_follow_it():
     told.turn_to(2 * S)
     told.give(goal_at((0.1, 0.0, 0.0)), 1 * S)
     told.turn_to(3 * S)
-    assert float(told.observe(at(0.0), 3 * S, STILL)[0]) == pytest.approx(0.2)
+    assert float(told.observe(at(0.0), 3 * S)[0]) == pytest.approx(0.2)
 
 
 def test_a_goal_that_was_dropped_or_refused_is_void_until_it_comes_with_a_new_stamp():
@@ -191,11 +213,11 @@ def test_velocities_begin_when_their_stamps_say():
     told = mission("track_velocities")
     for second in (1, 3):
         assert not told.give(goal_at((0.1 * second, 0.0, 0.0)), second * S)
-    assert not told.complete
+    assert told.lacking
     seen = []
     for second in (1, 2, 3):
         told.turn_to(second * S)
-        seen.append(float(told.observe(at(0.0), second * S, STILL)[0]))
+        seen.append(float(told.observe(at(0.0), second * S)[0]))
     assert seen == pytest.approx([0.1, 0.1, 0.3])
     assert told.distance(at(100.0)) == 0.0
 

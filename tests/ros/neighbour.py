@@ -15,6 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from visualization_msgs.msg import MarkerArray
 
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.topics import (
@@ -34,6 +35,7 @@ from tests.states import planar_state
 
 ROBOT = "floating_platform"
 NAMESPACE = f"/{ROBOT}"
+AHEAD = 4.0  # where the neighbour's goals are [m]
 
 
 class Neighbour:
@@ -109,7 +111,7 @@ class Neighbour:
 
     def repeat_goal(self) -> None:
         """The newest goal once more, with its stamp."""
-        self.goal_publisher.publish(goal_message(goal_at((4.0, 0.0, 0.0)), "goal_pose", self._goals))
+        self.goal_publisher.publish(goal_message(goal_at((AHEAD, 0.0, 0.0)), "goal_pose", self._goals))
 
     def odometry(
         self, stamp_ns: int, spoil: Callable[[Odometry], None] = lambda _message: None, x: float = 0.0
@@ -126,6 +128,11 @@ def until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"
         time.sleep(0.01)
+
+
+def asked_by_neighbour(inputs: Inputs) -> bool:
+    """Whether a controller acts on the goal of `Neighbour.give_goal`, and not on that of its warm-up."""
+    return bool(inputs.goal.current[0, 0] == AHEAD)
 
 
 def open_valves(robot: Robot) -> list[float]:

@@ -12,9 +12,7 @@ from sensor_msgs.msg import JointState
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.health.informer import Informer
 from fulmar_core.robot import load_robot
-from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ACTUATORS_HEALTH, COMMAND
 from fulmar_ros.controller_node import ControllerNode
@@ -38,9 +36,9 @@ def told(bag: Path, topic: str) -> list[JointState]:
 
 
 def test_a_valve_that_stays_closed_is_in_the_bag_of_its_run(ros_domain: RosDomain, tmp_path: Path) -> None:
-    """The recorder listens, so the controller's node says what it believes at every step."""
+    """The recorder subscribes, so the node publishes the estimate that its controller uses at every step."""
     scenario, seed = "drift_two_lost", 3
-    asked = ("floating_platform", "--controller", "policy", "--scenario", scenario, "--seed", str(seed))
+    asked = ("floating_platform", "--controller", "lqr", "--scenario", scenario, "--seed", str(seed))
     done = fulmar(
         "run", *asked, "--lockstep", "--duration", "20", "--record", "bag", env=ros_domain.env, cwd=tmp_path
     )
@@ -61,32 +59,36 @@ def test_a_valve_that_stays_closed_is_in_the_bag_of_its_run(ros_domain: RosDomai
 
 
 @pytest.mark.real_time
-def test_a_command_does_not_wait_for_a_health_that_only_a_recorder_wants(
+def test_an_estimate_is_published_once_somebody_subscribes_and_no_command_waits_for_it(
     stream: Stream, controller: ControllerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else recording would make the control loop slower."""
-    answered = []
-
-    def see(measurement: Measurement, _informer: Informer, *, wanted: bool) -> None:
-        answered.append(wanted and controller._answered_ns == measurement.stamp_ns)
-
-    monkeypatch.setattr(controller._actuators, "see", see)
-    stream.neighbour.node.create_subscription(
-        JointState, ACTUATORS_HEALTH.name, lambda _message: None, subscriber_qos(ACTUATORS_HEALTH)
+    published: list[tuple[str, int]] = []
+    publish_command, publish_health = (
+        controller.wires.publish_command,
+        controller.wires.publish_actuators_health,
     )
-    until(lambda: controller.wires.health_wanted)
-    answered.clear()
-    until(lambda: len(answered) > 5)
-    assert all(answered[1:])
 
+    def command(values: np.ndarray, stamp: int) -> None:
+        publish_command(values, stamp)
+        published.append(("command", stamp))
 
-@pytest.mark.real_time
-def test_where_nobody_listens_nothing_is_reckoned(stream: Stream, controller: ControllerNode) -> None:
-    """And from the first listener on, it is."""
-    assert not controller.wires.health_wanted
-    heard: list[JointState] = []
+    def health(values: np.ndarray, stamp: int) -> None:
+        published.append(("health", stamp))
+        publish_health(values, stamp)
+
+    monkeypatch.setattr(controller.wires, "publish_command", command)
+    monkeypatch.setattr(controller.wires, "publish_actuators_health", health)
+    until(lambda: len(published) > 5)
+    assert {what for what, _ in published} == {"command"}
+    received: list[JointState] = []
     stream.neighbour.node.create_subscription(
-        JointState, ACTUATORS_HEALTH.name, heard.append, subscriber_qos(ACTUATORS_HEALTH)
+        JointState, ACTUATORS_HEALTH.name, received.append, subscriber_qos(ACTUATORS_HEALTH)
     )
-    until(lambda: len(heard) > 5)
-    assert np.asarray(heard[0].effort) == pytest.approx(0.98, abs=0.01)
+    until(lambda: len(received) > 5)
+    assert np.asarray(received[0].effort) == pytest.approx(0.98, abs=0.01)
+    order = list(published)
+    begins = order.index(next(each for each in order if each[0] == "health"))
+    for before, after in zip(order[begins - 1 :], order[begins:], strict=False):
+        if after[0] == "health":
+            assert before == ("command", after[1])

@@ -16,6 +16,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 
 from fulmar_core.controller_settings import ControllerSettings
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import Lqr
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot
@@ -41,7 +42,7 @@ from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
-from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
+from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, asked_by_neighbour, until
 
 pytestmark = pytest.mark.real_time
 
@@ -153,7 +154,7 @@ def test_a_place_that_jumps_is_told_and_the_controller_begins_anew(neighbour: Ne
         odometry.spoil = jump
         until(lambda: told(neighbour, "epoch") == "1")
         until(lambda: len(resets) == begun + 1)
-        until(lambda: node.inputs.mission.complete and neighbour.commands[-1].any())
+        until(lambda: not node.guard.mission.lacking and neighbour.commands[-1].any())
 
 
 def test_a_stamp_that_goes_back_is_refused(stream: Stream) -> None:
@@ -188,10 +189,10 @@ def test_a_controller_that_raises_commands_what_is_safe_and_ends(
 ) -> None:
     """The robot does not wait for the watchdog."""
 
-    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
-        if np.any(observation):
+    def act(self: Lqr, inputs: Inputs) -> np.ndarray:
+        if asked_by_neighbour(inputs):
             raise ZeroDivisionError("no gain today")
-        return Lqr.act(self, observation)
+        return Lqr.act(self, inputs)
 
     codes: list[int] = []
     with running(lqr_that(act=act), codes), measured(neighbour):
@@ -246,9 +247,9 @@ def test_a_run_that_has_acted_for_as_long_as_it_may_stops(neighbour: Neighbour) 
 
 
 def test_beats_that_all_come_late_are_a_fault(neighbour: Neighbour) -> None:
-    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
-        time.sleep(0.05 if np.any(observation) else 0.0)
-        return Lqr.act(self, observation)
+    def act(self: Lqr, inputs: Inputs) -> np.ndarray:
+        time.sleep(0.05 if asked_by_neighbour(inputs) else 0.0)
+        return Lqr.act(self, inputs)
 
     with running(lqr_that(act=act), [], "overruns_to_stop:=5"), measured(neighbour):
         neighbour.give_goal()
@@ -346,8 +347,8 @@ def test_what_a_controller_that_hung_comes_up_with_does_not_follow_the_safe_comm
     monkeypatch.setattr(control_beat, "PATIENCE_S", 0.2)
     hangs, release, over = threading.Event(), threading.Event(), threading.Event()
 
-    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
-        command = Lqr.act(self, observation)
+    def act(self: Lqr, inputs: Inputs) -> np.ndarray:
+        command = Lqr.act(self, inputs)
         if hangs.is_set():
             release.wait()
             over.set()
@@ -372,11 +373,11 @@ def test_a_goal_that_comes_while_the_controller_acts_does_not_take_its_memory_aw
 ) -> None:
     acting = threading.Event()
 
-    def act(self: Lqr, observation: np.ndarray) -> np.ndarray:
+    def act(self: Lqr, inputs: Inputs) -> np.ndarray:
         acting.set()
         time.sleep(0.01)
         acting.clear()
-        return Lqr.act(self, observation)
+        return Lqr.act(self, inputs)
 
     def reset(self: Lqr) -> None:
         resets.append(acting.is_set())

@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bringup.supervisor import Supervisor
 from fulmar_core.backend import Sample
-from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.observation import Observer
@@ -42,24 +42,23 @@ ROBOTS, TASKS = config_names("robots"), config_names("tasks")
 class Wanderer:
     """Does something that depends on all that it sees and is told, and on what it has seen; reaches nothing."""
 
-    name = "wanderer"
+    name, estimator = "wanderer", None
 
     def __init__(self, robot: Robot, task: Task) -> None:
-        self.observation_names = Observer(robot, task).names
         self.control_hz = robot.timing.control_hz
         rng = np.random.default_rng(1)
         self._scale = robot.actuators.scale * (0.4 if isinstance(robot.actuators, Rolling) else 1.0)
-        shape = (len(self.observation_names), len(robot.actuators.names))
+        shape = (len(Observer(robot, task).names), len(robot.actuators.names))
         self._weights = rng.normal(0.0, 0.4, shape)
         self._seen = 0
 
     def reset(self) -> None:
         self._seen = 0
 
-    def act(self, observation: np.ndarray) -> np.ndarray:
+    def act(self, inputs: Inputs) -> np.ndarray:
         self._seen += 1
         wave = 0.2 * np.sin(0.3 * self._seen)
-        return self._scale * np.tanh(np.clip(observation, -2.0, 2.0) @ self._weights + wave)
+        return self._scale * np.tanh(np.clip(inputs.observation, -2.0, 2.0) @ self._weights + wave)
 
     def metadata(self) -> dict[str, Any]:
         return {"controller": self.name, "sha256": ""}

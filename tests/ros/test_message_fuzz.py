@@ -199,7 +199,7 @@ def test_a_controller_commands_nothing_but_finite_values_within_its_limits(
                 controller._on_swap(String(data=message))
             else:
                 controller._on_goal(message)
-            controller._control(controller.inputs.newest)
+            controller._control(controller.guard.newest)
     finally:
         controller.wires.publish_command = publish  # type: ignore[method-assign]
     for command in commands:

@@ -15,6 +15,7 @@ from std_msgs.msg import String
 
 from fulmar_bringup.robot_operator import Operator
 from fulmar_core.bundle_signature import make_keys, sign_bundle
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.errors import FulmarError, RunFailed
 from fulmar_core.topics import METADATA, SWAP
 from fulmar_ros.controller_node import ControllerNode
@@ -23,7 +24,7 @@ from fulmar_ros.runtime import spinning
 from policy_server.policy import Policy
 from policy_server.policy_node import make_policy
 from policy_server.shipped import policies_directory
-from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, until
+from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, asked_by_neighbour, until
 
 pytestmark = pytest.mark.real_time
 
@@ -105,9 +106,9 @@ def test_a_policy_whose_commands_are_refused_several_times_is_replaced(
 ) -> None:
     good = Policy.act
 
-    def act(self: Policy, observation: np.ndarray) -> np.ndarray:
-        command = good(self, observation)
-        return np.full_like(command, np.nan) if np.any(observation) else command
+    def act(self: Policy, inputs: Inputs) -> np.ndarray:
+        command = good(self, inputs)
+        return np.full_like(command, np.nan) if asked_by_neighbour(inputs) else command
 
     monkeypatch.setattr(Policy, "act", act)
     start(policy=SHIPPED, fallback="lqr")

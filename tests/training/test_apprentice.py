@@ -114,7 +114,19 @@ def test_where_actions_are_commands_the_teacher_gives_those_of_its_law(robot):
     env = BatchVecEnv(the_robot, task, load_scenario("nominal"), worlds=4, seed=3)
     seen = env.reset()
     commanded = the_robot.actuators.limited(teacher_of(env).actions(seen) * the_robot.actuators.scale)
-    np.testing.assert_allclose(commanded, law_of(the_robot, task).act(seen.astype(float)), atol=1e-6)
+    np.testing.assert_allclose(commanded, law_of(the_robot, task).act(env.inputs()), atol=1e-6)
+
+
+def test_a_teacher_of_mirrored_worlds_asks_for_what_its_law_commands():
+    robot, task = load_robot("kingfisher"), load_task("go_to_position")
+    env = BatchVecEnv(robot, task, load_scenario("nominal"), worlds=16, seed=3, mirror="sides")
+    seen = env.reset()
+    actions = teacher_of(env).actions(seen)
+    commands = robot.actuators.limited(env.answered(actions) * robot.actuators.scale)
+    expected = law_of(robot, task).act(env.inputs())
+    np.testing.assert_allclose(commands, expected, atol=1e-6)
+    plain = robot.actuators.limited(actions * robot.actuators.scale)
+    assert 0 < np.sum(np.abs(plain - expected).max(axis=1) > 0.01) < 16  # some are mirrored
 
 
 def law_of(robot, task):

@@ -13,6 +13,7 @@ from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
+from tests.policy_server.observed import inputs_seeing
 from training.deploy import deployed_network
 from training.export import export
 from training.learners import build_learner, callbacks_of
@@ -70,7 +71,9 @@ def test_commands_are_the_deterministic_actions_in_the_units_of_the_actuators(le
             env.normalize_obs(seen), state=state, episode_start=begins, deterministic=True
         )
         begins = np.zeros(ROWS, dtype=bool)
-        np.testing.assert_allclose(controller.act(seen), actions * ROBOT.actuators.scale, atol=2e-5)
+        np.testing.assert_allclose(
+            controller.act(inputs_seeing(seen)), actions * ROBOT.actuators.scale, atol=2e-5
+        )
     assert np.ptp(actions) > 0.0
 
 
@@ -88,12 +91,12 @@ def test_only_a_recurrent_policy_has_memory_and_it_forgets_on_reset(learners):
     plans = {name: deployed_network(*made, ROBOT.actuators.scale).plan for name, made in learners.items()}
     assert {name: plan.memory for name, plan in plans.items() if plan.memory} == {"recurrent_ppo": 12}
     network = deployed_network(*learners["recurrent_ppo"], ROBOT.actuators.scale)
-    controller, seen = NetworkController(network, ROBOT, TASK, 10.0), sights(1)[0]
+    controller, seen = NetworkController(network, ROBOT, TASK, 10.0), inputs_seeing(sights(1)[0])
     first, second = controller.act(seen), controller.act(seen)
     assert not np.array_equal(first, second)
     controller.reset()
     np.testing.assert_array_equal(controller.act(seen), first)
-    assert controller.act(seen[0]).shape == (2,)
+    assert controller.act(inputs_seeing(sights(1)[0, 0])).shape == (1, 2)
 
 
 @pytest.mark.parametrize("name", ["recurrent_ppo", "sac"])
@@ -108,9 +111,9 @@ def test_a_bundle_commands_what_the_network_does_from_the_first_command_to_the_l
     assert (passport.action, passport.memory) == ("continuous", network.plan.memory)
     assert passport.command_scale == tuple(ROBOT.actuators.scale)
     served, known = Policy(tmp_path / "bundle", ROBOT, TASK), NetworkController(network, ROBOT, TASK, 10.0)
-    for seen in sights(4):
+    for seen in map(inputs_seeing, sights(4)):
         np.testing.assert_allclose(served.act(seen), known.act(seen), atol=1e-5)
-    one = sights(4)[:, 0]
+    one = [inputs_seeing(row) for row in sights(4)[:, 0]]
     served.reset()
     known.reset()
     np.testing.assert_allclose(

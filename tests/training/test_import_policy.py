@@ -23,6 +23,7 @@ from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
 from sim_nodes.mujoco_backend import MujocoBackend
+from tests.policy_server.observed import inputs_seeing
 from tests.training import foreign
 from training.import_policy import import_policy
 
@@ -75,7 +76,7 @@ def _compare(out, robot_name, task_name, net, learner):
         with torch.no_grad():
             raw = net(foreign.normalised(seen, learner)).numpy()
         ours = Observer(robot, task)(state, goal, np.zeros((WORLDS, len(robot.actuators.names))))
-        found = policy.act(ours)
+        found = policy.act(inputs_seeing(ours))
         if robot.actuators.binary:
             margin = raw[:, 1::2] - raw[:, ::2]
             clear = np.abs(margin) > 1e-4

@@ -9,7 +9,7 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from fulmar_core.controllers.told import told_terms
+from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.holding import stranding_losses
@@ -28,7 +28,7 @@ from training.settings import OnPolicy, RecurrentPpo, SpecialistPlan, load_train
 from training.specialist import specialist_settings
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
-NAMES = Observer(ROBOT, TASK).names + told_terms(ROBOT)
+NAMES = Observer(ROBOT, TASK).names + disturbance_terms(ROBOT)
 STRANDED, MORE, ABLE = (0, 5), (0, 5, 6), (0, 1)
 
 

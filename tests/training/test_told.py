@@ -1,10 +1,17 @@
-"""What a network is told beside its observations: in training, when judged, and when deployed."""
+"""Estimated disturbances as inputs of a network: as a controller receives them, and as a learner does."""
 
 import numpy as np
 import pytest
 
-from fulmar_core.controllers.told import PUSH_TERMS, Told, told_for, told_terms
+from fulmar_core.control_loop import ControlLoop
+from fulmar_core.controllers.disturbance_inputs import (
+    ESTIMATOR,
+    PUSH_TERMS,
+    disturbance_terms,
+    with_disturbances,
+)
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.goal import goal_in_float64
 from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
@@ -13,70 +20,77 @@ from training.vec_env import BatchVecEnv
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 NAMES = Observer(ROBOT, TASK).names
-HZ = ROBOT.timing.control_hz
+
+
+class Random:
+    """Opens valves at random, and keeps what a network would be shown."""
+
+    name, control_hz, estimator = "random", ROBOT.timing.control_hz, ESTIMATOR
+
+    def __init__(self):
+        self._rng, self._observer = np.random.default_rng(1), Observer(ROBOT, TASK)
+
+    def reset(self): ...
+
+    def act(self, inputs):
+        self.shown = with_disturbances(self._observer, inputs)
+        return (self._rng.random(inputs.previous.shape) < 0.2).astype(float)
 
 
 def lived(scenario, steps, *, worlds=8, seed=4):
-    """Random valves for a while: what was told last, the estimator's completed observations, and the simulation."""
-    simulation = BatchSimulation(
-        ROBOT, TASK, load_scenario(scenario), worlds=worlds, seed=seed, control_hz=HZ
-    )
-    told, rng = Told(ROBOT, TASK, HZ), np.random.default_rng(1)
-    for _ in range(steps):
-        seen = told.complete(np.asarray(simulation.observe()))
-        command = (rng.random((worlds, 8)) < 0.2).astype(float)
-        told.acts(command)
-        simulation.step(command)
-    return told.complete(np.asarray(simulation.observe())), simulation, seen
+    """Random valves for a while: what was shown last, and the simulation at that moment."""
+    simulation = BatchSimulation(ROBOT, TASK, load_scenario(scenario), worlds=worlds, seed=seed)
+    controller = Random()
+    loop = ControlLoop(ROBOT, TASK, controller, robots=worlds)
+    loop.begin(goal_in_float64(simulation.goal))
+    for number in range(steps):
+        simulation.move(loop.step(simulation.measured, round(1e9 * number * loop.dt)).command)
+    loop.step(simulation.measured, round(1e9 * steps * loop.dt))
+    return controller.shown, simulation
 
 
-def pushes(told, simulation):
-    """Told and true push in the body's frame, shape (worlds, 3) each."""
+def pushes(shown, simulation):
+    """Shown and true push in the body's frame, shape (worlds, 3) each."""
     world, yaw = simulation.world, simulation.truth.yaw
     c, s = np.cos(yaw), np.sin(yaw)
     true = np.stack(
         (c * world.force_x + s * world.force_y, c * world.force_y - s * world.force_x, world.torque), -1
     )
-    return told[:, len(NAMES) : len(NAMES) + 3], true
+    return shown[:, len(NAMES) : len(NAMES) + 3], true
 
 
-def test_a_robot_without_valves_has_nothing_to_be_told():
-    assert told_terms(load_robot("turtlebot2")) == ()
-    assert told_terms(ROBOT)[:3] == PUSH_TERMS
-    assert len(told_terms(ROBOT)) == 3 + 8
-
-
-def test_only_a_network_that_takes_more_than_is_seen_is_told():
-    assert told_for(ROBOT, TASK, HZ, len(NAMES)) is None
-    assert told_for(ROBOT, TASK, HZ, len(NAMES) + 11) is not None
+def test_a_robot_without_valves_has_no_disturbances_among_its_inputs():
+    assert disturbance_terms(load_robot("turtlebot2")) == ()
+    assert disturbance_terms(ROBOT)[:3] == PUSH_TERMS
+    assert len(disturbance_terms(ROBOT)) == 3 + 8
 
 
 @pytest.mark.parametrize("scenario", ["drift_force_4", "drift_torque", "drift_force_torque"])
 def test_a_push_is_found_within_seconds(scenario):
-    told, true = pushes(*lived(scenario, 40)[:2])
-    np.testing.assert_allclose(told, true, atol=0.04)
+    shown, true = pushes(*lived(scenario, 40))
+    np.testing.assert_allclose(shown, true, atol=0.04)
     assert np.abs(true).max() > 0.04
 
 
-def test_a_dead_valve_is_found_once_it_was_told_to_open():
-    told, simulation, _ = lived("drift_one_lost", 40)
-    np.testing.assert_array_equal(told[:, -8:].round(), simulation.world.alive.T)
+def test_a_dead_valve_is_found_once_it_was_commanded_to_open():
+    shown, simulation = lived("drift_one_lost", 40)
+    np.testing.assert_array_equal(shown[:, -8:].round(), simulation.world.alive.T)
 
 
-def test_blurred_velocities_are_told_sharper_than_they_are_seen():
-    told, simulation, _ = lived("drift_velocity_noise_4", 60, worlds=32)
+def test_blurred_velocities_are_shown_sharper_than_they_are_measured():
+    shown, simulation = lived("drift_velocity_noise_4", 60, worlds=32)
     column = NAMES.index("velocity_x_in_body")
     true = simulation.truth.velocity_in_body[0]
-    seen = np.asarray(simulation.observe())[:, column]
-    assert np.std(told[:, column] - true) < 0.5 * np.std(seen - true)
+    measured = np.asarray(simulation.observe())[:, column]
+    assert np.std(shown[:, column] - true) < 0.5 * np.std(measured - true)
 
 
 def test_without_noise_the_terms_of_the_task_stay_what_they_are():
-    told, simulation, _ = lived("drift_ideal", 30)
-    np.testing.assert_allclose(told[:, : len(NAMES)], np.asarray(simulation.observe()), atol=0.02)
+    shown, simulation = lived("drift_ideal", 30)
+    np.testing.assert_allclose(shown[:, : len(NAMES)], np.asarray(simulation.observe()), atol=0.02)
 
 
-def test_a_learner_is_told_the_same_as_a_deployed_network_up_to_errors():
+def test_a_learner_receives_the_same_as_a_deployed_network_up_to_errors():
     env = BatchVecEnv(
         ROBOT, TASK, load_scenario("drift_force_4"), worlds=4, seed=2, told=True, staggered=False
     )
@@ -85,8 +99,8 @@ def test_a_learner_is_told_the_same_as_a_deployed_network_up_to_errors():
     np.testing.assert_allclose(seen[:, -11:-8], 0.0, atol=0.05)
     for _ in range(20):
         seen, _, _, _ = env.step(np.zeros((4, 8)))
-    told, true = pushes(seen, env.simulation)
-    np.testing.assert_allclose(told, true, atol=0.05)
+    shown, true = pushes(seen, env.simulation)
+    np.testing.assert_allclose(shown, true, atol=0.05)
     np.testing.assert_array_equal(seen[:, -8:], 1.0)
 
 

@@ -17,6 +17,7 @@ from fulmar_core.episode import HELD_OUT_SEED, JUDGE_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.policy_bundle import read_golden, read_passport
 from policy_server.policy import Policy
+from tests.policy_server.observed import inputs_seeing
 from training.deploy import deployed_network
 from training.export import export
 from training.judge import judge_in_mujoco
@@ -64,8 +65,7 @@ def test_the_network_of_a_run_can_be_loaded_and_used(run, robot, task):
     network = load_network(run[0] / NETWORK_FILE)
     controller = NetworkController(network, robot, task, 5.0)
     assert network.plan.inputs == len(task.observation_names)
-    assert controller.act(np.zeros(10)).shape == (8,)
-    assert controller.act(np.zeros((3, 10))).shape == (3, 8)
+    assert controller.act(inputs_seeing(np.zeros((3, 10)))).shape == (3, 8)
 
 
 def test_judging_writes_the_figures_into_the_record(run_copy):
@@ -108,7 +108,7 @@ def test_the_onnx_command_is_stable_baselines_deterministic_prediction(bundle, l
         np.float32
     )
     predicted, _ = ppo.predict(env.normalize_obs(seen), deterministic=True)
-    served = Policy(bundle[0], robot, task).act(seen)
+    served = Policy(bundle[0], robot, task).act(inputs_seeing(seen))
     # A logit within rounding of zero may fall either way; everywhere else not one valve may differ.
     _, logits, _ = deployed_network(ppo, env, SCALE).infer(seen)
     clear = np.abs(logits) > 1e-4
@@ -121,7 +121,7 @@ def test_far_observations_are_clipped_as_in_training(bundle, learner, robot, tas
     ppo, env = learner
     far = np.full((1, 10), 1e6, np.float32)
     predicted, _ = ppo.predict(env.normalize_obs(far), deterministic=True)
-    np.testing.assert_array_equal(Policy(bundle[0], robot, task).act(far), predicted)
+    np.testing.assert_array_equal(Policy(bundle[0], robot, task).act(inputs_seeing(far)), predicted)
 
 
 def test_a_deployed_network_does_not_follow_the_learner_s_later_steps(learner):

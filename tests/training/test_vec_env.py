@@ -55,10 +55,10 @@ def test_the_reward_is_the_task_s_own_less_the_actuators_cost_times_the_scale(bu
     plain, scaled = build(), build(reward_scale=0.1)
     for env in (plain, scaled):
         env.reset()
-    before = plain.simulation.truth
+    before, goal = plain.simulation.truth, plain.simulation.goal
     rewards, dones = plain.step(OPEN_ONE)[1:3]
     assert not dones.any()  # else the truth is already the next episode's
-    expected = task.reward(before, plain.simulation.truth, plain.simulation.goal) - robot.costs.effort
+    expected = task.reward(before, plain.simulation.truth, goal, plain.simulation.goal) - robot.costs.effort
     np.testing.assert_allclose(rewards, expected, rtol=1e-6)
     np.testing.assert_allclose(scaled.step(OPEN_ONE)[1], 0.1 * rewards, rtol=1e-6)
 

@@ -9,7 +9,9 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from fulmar_core.control_loop import ControlLoop
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.goal import goal_in_float64
 from fulmar_core.policy_bundle import read_golden
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
@@ -91,11 +93,14 @@ def test_the_served_policy_flies_as_the_network_does(learner, bundle):
     env = BatchVecEnv(ROBOT, TASK, load_scenario("drift_one_lost"), worlds=8, seed=5)
     env.reset()
     twin = NetworkController(network, ROBOT, TASK, ROBOT.timing.control_hz)
-    for _ in range(5):
-        seen = np.asarray(env.simulation.observe())
-        command = served.act(seen)
-        np.testing.assert_array_equal(command, twin.act(seen))
-        env.step(command)
+    loop = ControlLoop(ROBOT, TASK, served, robots=8)
+    loop.begin(goal_in_float64(env.simulation.goal))
+    for number in range(5):
+        inputs = loop.inputs(env.simulation.measured, round(1e9 * number * loop.dt))
+        assert (inputs.estimates is not None) == learner[1].unwrapped.told
+        step = loop.act(inputs)
+        np.testing.assert_array_equal(step.action, twin.act(inputs))
+        env.simulation.move(step.command)
 
 
 def network_of(learner):

@@ -19,6 +19,7 @@ from fulmar_core.identification.model import Known
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from tests.inputs import inputs_of
 
 PLATFORM, BOAT, BASE = (load_robot(name) for name in ("floating_platform", "kingfisher", "turtlebot2"))
 
@@ -31,7 +32,7 @@ def driven(true, nominal, *, duration_s=120.0, seed=1, load=0, spoil=None):
     controller = Excite(nominal, load_task("go_to_position"))
     times, poses, commands = [0.0], [simulation.measured], []
     for step in range(round(duration_s / simulation.control_dt)):
-        simulation.step(np.asarray(controller.act(np.asarray(simulation.observe()))))
+        simulation.step(controller.act(inputs_of(simulation)))
         times.append((step + 1) * simulation.control_dt)
         poses.append(simulation.measured)
         commands.append(simulation.command[0])

@@ -10,17 +10,25 @@ from fulmar_core.safety.command_gate import REJECTIONS_TO_LATCH, Rejections, com
 
 @pytest.mark.parametrize("values", [[0.0, 1.0, 0.0], [-7.0, 1e9, 0.5]])
 def test_finite_values_of_the_right_number_pass(values):
-    assert command_problem(np.array(values), 3) is None
+    assert command_problem(np.array(values), (3,)) is None
 
 
 @pytest.mark.parametrize("shape", [(), (2,), (4,), (1, 3), (3, 1), (0,)])
 def test_every_other_shape_is_refused(shape):
-    assert command_problem(np.zeros(shape), 3) == f"command has shape {shape}, must be (3,)"
+    assert command_problem(np.zeros(shape), (3,)) == f"command has shape {shape}, must be (3,)"
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_value_that_is_not_finite_is_refused_with_its_actuator(value):
-    assert command_problem(np.array([0.0, value, 0.0]), 3) == "command for actuator 2 is not finite"
+    assert command_problem(np.array([0.0, value, 0.0]), (3,)) == "command for actuator 2 is not finite"
+
+
+def test_commands_of_many_robots_are_checked_together():
+    commands = np.zeros((2, 3))
+    assert command_problem(commands, (2, 3)) is None
+    assert command_problem(commands, (1, 3)) == "command has shape (2, 3), must be (1, 3)"
+    commands[1, 2] = np.nan
+    assert command_problem(commands, (2, 3)) == "command for actuator 3 is not finite"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,198 @@
+"""Training, evaluation in the batch and in simulators, and the node advance goals at the same control step.
+
+All four get the same measurements here: a robot that is carried from target to target, past some of them, with noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core import rollout
+from fulmar_core.controller_settings import ControllerSettings
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episodes
+from fulmar_core.goal import goal_in_float64
+from fulmar_core.guarded_loop import GuardedLoop
+from fulmar_core.paths import config_names
+from fulmar_core.planar import COLUMNS, PlanarState, rigid_of
+from fulmar_core.robot import load_robot
+from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.safety.succession import Succession
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.standby import Standby
+from fulmar_core.tasks import fitted, load_task
+from sim_nodes.mock_backend import MockBackend
+
+ROBOT, SCENARIO = load_robot("turtlebot2"), load_scenario("nominal")
+SEED, EPISODES, STEPS, STRIDE = 3, 3, 120, 0.12  # m a step
+DT = 1.0 / ROBOT.timing.control_hz
+S = 1_000_000_000
+
+
+def drawn(task):
+    return draw_episodes(ROBOT, fitted(task, ROBOT), SCENARIO, seed=SEED, numbers=np.arange(EPISODES))
+
+
+def short(task):
+    """The task in an episode in which several targets have their turn."""
+    hold = {"hold_s": 3.0} if task.goal_topic == "goal_velocity" else {}
+    return replace(task, episode_s=STEPS * DT, **hold)
+
+
+TASKS = {name: short(load_task(name)) for name in config_names("tasks")}
+TASKS = {name: task for name, task in TASKS.items() if drawn(task).goal.targets.shape[1] > 1}
+
+
+@pytest.fixture(params=TASKS.values(), ids=TASKS)
+def task(request):
+    return request.param
+
+
+def measurements(task):
+    """Odometry from target to target, of each episode and step, in single precision as the batch has it."""
+    episode, rng = drawn(task), np.random.default_rng(5)
+    shape = (STEPS, EPISODES)
+    columns = {name: np.zeros(shape) for name in COLUMNS}
+    if task.goal_topic != "goal_velocity":
+        for world in range(EPISODES):
+            targets = episode.goal.targets[world]
+            start = [episode.start.x[world], episode.start.y[world], targets[0, 2]]
+            way = np.vstack((start, *(targets for _ in range(3))))
+            along = np.append(0.0, np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T)))
+            place = STRIDE * np.arange(STEPS)
+            columns["x"][:, world] = np.interp(place, along, way[:, 0])
+            columns["y"][:, world] = np.interp(place, along, way[:, 1])
+            columns["yaw"][:, world] = np.interp(place, along, np.unwrap(way[:, 2]))
+    noise = {"x": 0.06, "y": 0.06, "yaw": 0.1}
+    return PlanarState(
+        *(
+            (columns[name] + rng.normal(0.0, noise.get(name, 0.0), shape)).astype(np.float32)
+            for name in COLUMNS
+        )
+    )
+
+
+class Replayed(BatchSimulation):
+    """A batch in which the measurements are given, whatever happens."""
+
+    series: PlanarState
+
+    def _measure(self):
+        super()._measure()
+        self.measured = self.series[int(self._steps[0])] if self._steps[0] < STEPS else self.measured
+
+
+class ReplayedBackend(MockBackend):
+    """A simulator whose measurements are given."""
+
+    def __init__(self, series):
+        super().__init__(ROBOT)
+        self._series, self._number, self._control_step = series, 0, 0
+
+    def reset(self, episode, *, seed, number=0):
+        self._number, self._control_step = number, 0
+        return self._given(super().reset(episode, seed=seed, number=number))
+
+    def step(self, command, ticks=1):
+        self._control_step += 1
+        return self._given(super().step(command, ticks))
+
+    def _given(self, sample):
+        step = min(self._control_step, STEPS - 1)
+        return replace(sample, odometry=rigid_of(exact(self._series[step, self._number])))
+
+
+class Recorder:
+    """Stands, and keeps the targets that it is shown."""
+
+    name, control_hz, estimator = "recorder", ROBOT.timing.control_hz, None
+
+    def __init__(self):
+        self.targets = []
+
+    def reset(self): ...
+
+    def act(self, inputs):
+        self.targets.append(inputs.goal.current)
+        return np.zeros_like(inputs.previous)
+
+
+def exact(state):
+    return PlanarState(*(np.asarray(getattr(state, name), dtype=float) for name in COLUMNS))
+
+
+def in_training(task, series, monkeypatch):
+    monkeypatch.setattr(Replayed, "series", series, raising=False)
+    simulation = Replayed(ROBOT, task, SCENARIO, worlds=EPISODES, seed=SEED)
+    targets = []
+    for _ in range(STEPS):
+        targets.append(np.array(simulation.goal.current))
+        simulation.step(simulation.command)
+    return targets
+
+
+def in_the_batch(task, series, monkeypatch):
+    monkeypatch.setattr(Replayed, "series", series, raising=False)
+    monkeypatch.setattr(rollout, "BatchSimulation", Replayed)
+    recorder = Recorder()
+    rollout.roll_out_in_batch(recorder, ROBOT, task, SCENARIO, episodes=EPISODES, seed=SEED)
+    return recorder.targets
+
+
+def in_simulators(task, series, monkeypatch):
+    recorder = Recorder()
+    rollout.roll_out_in_backends(
+        recorder, lambda: ReplayedBackend(series), task, SCENARIO, episodes=EPISODES, seed=SEED
+    )
+    return recorder.targets
+
+
+class NoEstop:
+    heard = False
+
+    def reason(self, now_ns):
+        return ""
+
+
+def in_the_node(task, series, monkeypatch):
+    """As the node: a goal that came on a wire, velocities each with the stamp of its time, odometry one by one."""
+    targets = []
+    for world in range(EPISODES):
+        recorder, goal = Recorder(), goal_in_float64(drawn(task).goal)[world]
+        guard = GuardedLoop(
+            ROBOT, task, ControllerSettings(lockstep=True), Succession(Standby(recorder, "{}", "")), NoEstop()
+        )
+        guard.activate()
+        if task.goal_topic == "goal_velocity":
+            for i, target in enumerate(goal.targets):
+                one = replace(goal, targets=target[None])
+                guard.take_goal(one, round(S * (1.0 + i * task.step_s)), S)
+        else:
+            guard.take_goal(goal, 1, S)
+        for step in range(STEPS):
+            now_ns = round(S * (1.0 + step * DT))
+            seen = Measurement(now_ns, "odom", "base_link", rigid_of(exact(series[step, world])))
+            assert guard.take(seen, now_ns)
+            decision, inputs = guard.begin_step(seen, now_ns)
+            assert decision.may_act, decision.reason
+            guard.act(inputs)
+        targets.append(np.concatenate(recorder.targets))
+    return list(np.stack(targets, axis=1))
+
+
+def test_goals_advance_at_the_same_step_everywhere(task, monkeypatch):
+    series = measurements(task)
+    expected = in_the_batch(task, series, monkeypatch)
+    changes = np.any(np.diff(expected, axis=0) != 0.0, axis=2).sum(axis=0)
+    assert len(expected) == STEPS
+    assert changes.max() >= 3
+    for follow in (in_training, in_simulators, in_the_node):
+        found = follow(task, series, monkeypatch)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5, err_msg=follow.__name__)
+
+
+def test_every_task_with_several_targets_is_compared():
+    assert {"go_through_positions", "go_through_poses", "race_gates", "track_velocities"} <= set(TASKS)
