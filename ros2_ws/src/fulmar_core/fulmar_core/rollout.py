@@ -12,7 +12,6 @@ from fulmar_core.backend import Backend, Sample
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
-from fulmar_core.health.informer import Informer
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import planar_of, stack_planar
@@ -85,9 +84,8 @@ def batches(
         dt = simulation.control_dt
         controller.reset()
         log, judge = TrajectoryLog(robot, task, dt), Judge(task, simulation.goal, dt)
-        steps, informer = episode_steps(task, dt), Informer(robot, controller)
+        steps = episode_steps(task, dt)
         for step in range(steps):
-            informer.see(simulation.measured, simulation.command, dt)
             action = np.asarray(controller.act(simulation.observe()))
             simulation.step(action)
             log.add(simulation.truth, judge.see(simulation.truth, simulation.goal.block), simulation.command)
@@ -160,7 +158,6 @@ def _side_by_side(
     count = len(samples)
     observer = Observer(robot, task)
     controller.reset()
-    informer = Informer(robot, controller)
     goal, command = drawn.goal, np.tile(robot.actuators.safe_command, (count, 1))
     log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, drawn.goal, control_dt)
     for step in range(episode_steps(task, control_dt)):
@@ -168,7 +165,6 @@ def _side_by_side(
         if block is not None:
             goal = dataclasses.replace(goal, block=block)
         goal = task.advance(goal, measured, np.asarray(step * control_dt)) if step else goal
-        informer.see(measured, command, control_dt)
         action = np.asarray(controller.act(observer(measured, goal, command)))
         command = slewed(robot.actuators.limited(action), command, robot, control_dt)
         samples = [backend.step(each, substeps) for backend, each in zip(backends, command, strict=False)]

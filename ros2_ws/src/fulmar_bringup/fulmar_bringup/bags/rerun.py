@@ -16,10 +16,9 @@ from fulmar_bringup.bags.guarded import RecordedEstop
 from fulmar_bringup.bags.told import ABSENT
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import BagError, FulmarError, RunFailed
-from fulmar_core.health.applied import Applied, AppliedHistory, report_applied
-from fulmar_core.health.informer import Informer
+from fulmar_core.health.applied import Applied, AppliedHistory
+from fulmar_core.health.observer import report_applied
 from fulmar_core.observation import slewed
-from fulmar_core.planar import planar_of
 from fulmar_core.rotation import rotate
 from fulmar_core.safety.arbiter import Flags, arbitrate
 from fulmar_core.safety.area import outside
@@ -112,20 +111,17 @@ class _Rerun:
         self._robot, self._safe = robot, robot.actuators.safe_command
         self._pause_ns = course.settings.pause_ns(robot)
         self._control_ns = round(1e9 / course.settings.control_rate(robot))
-        self._succession = Succession(
-            Standby(controller, Informer(robot, controller), "", ""),
-            ready(fallback, robot) if fallback else None,
-        )
+        self._succession = Succession(Standby(controller, "", ""), ready(fallback) if fallback else None)
         self._mission = Mission(robot, course.task, streamed=course.settings.goals_streamed)
         self._gate = InputGate(robot.limits, frozen_after=0)
-        self._answered_ns, self._answer, self._seen_ns = -1, self._safe, 0
+        self._answered_ns, self._answer = -1, self._safe
         self._states = _States(course)
         # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
         self._gated = source == "odometry" and (course.settings.lockstep or not course.own)
         self._estop = RecordedEstop(course.presses, required=self._gated and course.settings.estop)
         self._history = AppliedHistory(course.settings.hold_ns(robot))
         self._states_fed = 0  # states of the actuators that the history has taken
-        self._observed_ns = 0  # stamp of the newest observation
+        self._observed_ns = 0  # stamp of the newest observation; 0 before the first of a controller
         # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
         self._bearing_on = not course.bearing or bool(course.bearing[0].what)
         self._fed = 0
@@ -171,14 +167,13 @@ class _Rerun:
             for told in changes.get(step, ()):
                 self._succession.propose(self._successor(*told.what))
             if self._succession.turn():
-                self._seen_ns = 0
+                self._observed_ns = 0
             reasons[step] = self._reason(step)
             acted[step] = not reasons[step]
             if acted[step]:
                 self._begin_anew_after_a_pause(stamp)
                 shown[step] = self._shown(step)
             try:
-                self._inform(step)
                 if acted[step]:
                     report_applied(self._controller, self._applied(self._observed_ns, stamp))
                     self._observed_ns = stamp
@@ -264,21 +259,6 @@ class _Rerun:
         what, task = self._mission.lacking, self._course.task.name
         return BagError(f"the bag holds no {what} for '{task}'. Give --goal x,y,deg.")
 
-    def _inform(self, step: int) -> None:
-        """Tell the controller how its actuators do, if it wants to know."""
-        sample, informer = int(self._course.sample[step]), self._succession.current.informer
-        if not informer.listens or sample == ABSENT:
-            return
-        stamp = int(self._course.stamp_ns[step])
-        passed_ns = stamp - self._seen_ns
-        if passed_ns == 0:
-            return
-        if not 0 < passed_ns <= self._pause_ns:
-            informer.reset()
-        self._seen_ns = stamp
-        applied = self._applied(stamp - passed_ns, stamp)
-        informer.see(planar_of(self._states[sample]), applied, passed_ns / 1e9)
-
     def _applied(self, begin_ns: int, end_ns: int) -> Applied | None:
         """What the actuators did between two measurements; the recorded command where the bag holds no more of it."""
         if not 0 < end_ns - begin_ns <= self._pause_ns:
@@ -303,7 +283,7 @@ class _Rerun:
         before = self._succession.current
         self._fault = self._succession.judge(problem) or self._fault
         if self._succession.current is not before:
-            self._seen_ns = 0
+            self._observed_ns = 0
         if problem:
             return self._safe
         limited = self._robot.actuators.limited(action)
@@ -314,7 +294,7 @@ class _Rerun:
         reason = f"'{self._controller.name}' raised {type(error).__name__} at step {step}: {error}"
         if not self._succession.fall_back(reason):
             raise RunFailed(reason) from error
-        self._seen_ns = 0
+        self._observed_ns = 0
         return reason
 
     def _successor(self, folder: str, sha256: str) -> Standby:
@@ -322,7 +302,7 @@ class _Rerun:
         assert self._load is not None
         where = f"the run went on with the policy of {folder}"
         try:
-            found = ready(self._load(folder), self._robot)
+            found = ready(self._load(folder))
         except FulmarError as error:
             raise BagError(f"{where}, which cannot be loaded: {error}") from error
         if found.sha256 != sha256:
