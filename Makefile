@@ -14,7 +14,7 @@ RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
 # Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`.
 RUN_SIZE := 884
-DEV_SIZE := 7330
+DEV_SIZE := 7053
 
 # A sourced ROS shell puts its own packages in front of the ones in .venv; the two must not mix.
 unexport PYTHONPATH
@@ -59,7 +59,7 @@ help: ## Show this list
 setup: $(RUN_STAMP) ## Install what a robot or a simulation needs, into .venv (no torch; 0.9 GiB)
 
 .PHONY: dev
-dev: $(DEV_STAMP) ## Install everything, also training and the tools for tests (7.2 GiB)
+dev: $(DEV_STAMP) ## Install everything, also training and the tools for tests (6.9 GiB)
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \

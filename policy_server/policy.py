@@ -63,6 +63,7 @@ class Policy:
         self.observation_names = Observer(robot, task).names
         self._session = _open(bundle)
         self._memory: np.ndarray | None = None
+        self._alone = True  # whether the last observation was of one robot, without a leading shape
         _check_shapes(self._session, self.passport, folder)
         _check_golden(self._session, bundle)
 
@@ -78,6 +79,7 @@ class Policy:
         A network with memory remembers every row by itself, until `reset` or another number of rows.
         """
         rows = np.atleast_2d(np.asarray(observation))
+        self._alone = np.ndim(observation) == 1
         batch = np.asarray(self._told.complete(rows) if self._told else rows, dtype=np.float32)
         if self.passport.memory:
             if self._memory is None or len(self._memory) != len(batch):
@@ -99,7 +101,8 @@ class Policy:
     @property
     def health(self) -> Health | None:
         """What is estimated of valves and push for the network; None where it is not given that."""
-        return self._told.health if self._told else None
+        health = self._told.health if self._told else None
+        return health.of(0) if health and self._alone else health
 
     def metadata(self) -> dict[str, Any]:
         """The passport, with the name of the controller."""

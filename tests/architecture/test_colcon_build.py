@@ -26,7 +26,6 @@ PROGRAMS = {
     "policy_server/excite_node": "policy_server.excite_node",
     "policy_server/lqr_node": "policy_server.lqr_node",
     "policy_server/mpc_node": "policy_server.mpc_node",
-    "policy_server/planner_node": "policy_server.planner_node",
     "policy_server/policy_node": "policy_server.policy_node",
     "sim_nodes/emulator_node": "sim_nodes.emulator_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",

@@ -108,7 +108,7 @@ def test_a_failed_install_is_not_taken_for_done(make, tmp_path):
     assert make("-q", "setup").returncode != 0
 
 
-@pytest.mark.parametrize(("target", "size"), [("setup", 884), ("dev", 7330)])
+@pytest.mark.parametrize(("target", "size"), [("setup", 884), ("dev", 7053)])
 @pytest.mark.parametrize("free", [100, 90_000])
 def test_size_and_free_disk_are_printed_before_an_install(make, tmp_path, target, size, free):
     disk = tmp_path / "bin" / "df"

@@ -128,7 +128,6 @@ def test_the_programs_are_those_that_systems_start(packages):
         ("policy_server", "excite_node"),
         ("policy_server", "lqr_node"),
         ("policy_server", "mpc_node"),
-        ("policy_server", "planner_node"),
         ("policy_server", "policy_node"),
         ("sim_nodes", "emulator_node"),
         ("sim_nodes", "sim_node"),

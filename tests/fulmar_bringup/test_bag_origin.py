@@ -52,13 +52,6 @@ def test_a_run_of_a_policy_carries_its_passport():
     assert json.loads(path.read_text())["task"] == "go_to_pose"
 
 
-def test_a_run_of_a_planner_carries_its_settings_and_the_passport_of_its_policy():
-    plan = RunPlan("kingfisher", "go_through_positions", "planner", "mujoco", 10.0)
-    carried = names(plan)
-    assert carried["controller.yaml"] == "kingfisher_planner.yaml"
-    assert carried["passport.json"] == "passport.json"
-
-
 def test_the_given_bundle_goes_before_the_shipped_one(tmp_path):
     plan = RunPlan("floating_platform", "go_to_pose", "policy", "mujoco", 5.0, policy=str(tmp_path))
     assert json.loads(attachments(plan))["passport.json"] == str(tmp_path / "passport.json")

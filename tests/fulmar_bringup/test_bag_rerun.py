@@ -101,28 +101,6 @@ def test_a_run_is_repeated_with_the_calibration_that_it_was_driven_with(tmp_path
     assert load_robot("floating_platform").actuators.thrust == 0.5
 
 
-def test_a_controller_that_wants_to_know_the_course_is_told_it_as_by_the_node():
-    course = course_of(open_bag(POLICY))
-    heard = []
-
-    class Listener:
-        name, control_hz = "listener", course.settings.control_rate(course.robot)
-        observation_names = course.observation_names
-
-        def reset(self):
-            heard.clear()
-
-        def hear_course(self, places):
-            heard.append(places)
-
-        def act(self, observation):
-            return np.zeros(len(course.robot.actuators.names))
-
-    answers = rerun(course, Listener())
-    assert len(heard) == answers.acted.sum() > 0
-    np.testing.assert_array_equal(heard[-1], course.goals[-1].what.targets[..., :2])
-
-
 def test_another_bundle_is_found_out_with_its_first_step(other_bundle):
     code, found = ask(str(POLICY), "--controller", "policy", "--policy", str(other_bundle))
     first = found["first_difference"]

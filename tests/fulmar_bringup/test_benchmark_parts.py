@@ -18,7 +18,6 @@ from fulmar_bringup.benchmark.results import wilson
 from fulmar_bringup.benchmark.roboran import document_of
 from fulmar_bringup.benchmark.thesis import ROBOTS, TABLE, TASKS, thesis_row
 from fulmar_bringup.benchmark.unit import done_already
-from fulmar_bringup.evaluation import runs_of
 from policy_server.shipped import policies_directory
 
 GOOD = {"batch": 0.995, "mujoco": 0.992}
@@ -28,7 +27,7 @@ def unit_of(
     folder, *, controller="classical", robot="floating_platform", task="go_to_pose", way="batch", episodes=3
 ):
     pair = find_pair(robot, task, controller)
-    (unit,) = units_of(pair, {way: episodes}, seed=7, scenario="nominal", folder=folder, jobs=1, worlds=64)
+    (unit,) = units_of(pair, {way: episodes}, seed=7, scenario="nominal", folder=folder, worlds=64)
     return unit
 
 
@@ -121,27 +120,12 @@ def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
     assert unit.done_before() is None
 
 
-def test_what_is_to_be_judged_again_forgets_what_was_done_by_halves(tmp_path):
-    unit, other = unit_of(tmp_path), unit_of(tmp_path, task="go_to_position")
-    outdated = replace(unit, defines="other code")
-    for each in (unit, outdated, other):
-        each.parts.mkdir(parents=True)
+def test_what_was_judged_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path):
+    unit = unit_of(tmp_path)
     assert done_already([unit], fresh=False) == {}
-    assert unit.parts.is_dir()
-    assert done_already([unit], fresh=True) == {}
-    assert not unit.parts.exists() and not outdated.parts.exists() and other.parts.is_dir()
-
     outcome = units.judge(unit)
     assert done_already([unit], fresh=False)[unit].about["key"] == outcome.about["key"]
     assert done_already([unit], fresh=True) == {}
-
-
-def test_a_judging_that_is_done_leaves_no_parts(tmp_path):
-    unit = unit_of(tmp_path)
-    outdated = replace(unit, defines="other code")
-    outdated.parts.mkdir()
-    units.judge(unit)
-    assert not outdated.parts.exists()
 
 
 def test_an_outcome_does_not_depend_on_where_the_policy_lies(tmp_path):
@@ -188,7 +172,7 @@ def test_the_hash_of_the_code_knows_the_simulator_only_where_it_is_used():
     assert code_hash("batch") != code_hash("mujoco")
 
 
-@pytest.mark.parametrize("library", ["numpy", "onnxruntime", "casadi", "mujoco"])
+@pytest.mark.parametrize("library", ["numpy", "onnxruntime", "mujoco"])
 def test_the_hash_of_the_code_knows_which_libraries_computed(library, monkeypatch):
     before, version = code_hash("mujoco"), pairs.version
     monkeypatch.setattr(pairs, "version", lambda name: "another" if name == library else version(name))
@@ -200,60 +184,11 @@ def test_a_pair_without_anybody_says_why(tmp_path):
     assert "no classical law does 'push_block'" in find_pair("jetbot", "push_block", "classical").reason
 
 
-def test_a_planner_is_judged_where_there_are_plans_with_its_policys_training():
-    pair = find_pair("kingfisher", "go_through_positions", "planner")
-    policy = find_pair("kingfisher", "go_through_positions", "policy")
-    assert (pair.kind, pair.controller, pair.policy) == ("planner", "planner", policy.policy)
-    assert pair.sha256 != policy.sha256
-    assert pair.passport == policy.passport
-    assert "boats with propellers" in find_pair("turtlebot2", "go_through_positions", "planner").reason
-
-
-def test_a_planner_whose_policy_is_not_there_is_missing(tmp_path):
-    pair = find_pair("kingfisher", "go_through_positions", "planner", tmp_path)
-    assert pair.missing and (pair.kind, pair.reason) == ("planner", "no policy is shipped")
-
-
-@pytest.mark.slow
-def test_a_planner_is_judged_over_the_episode_that_it_plans_for(tmp_path, monkeypatch):
-    unit = unit_of(
-        tmp_path, controller="planner", robot="kingfisher", task="go_through_positions", episodes=3
-    )
-    asked = []
-
-    def as_the_classical_law(trial, progress=lambda steps: None, **how):
-        asked.append((trial.episodes, trial.worlds, trial.jobs, trial.task.episode_s))
-        plan = replace(trial.plan, controller="classical")
-        yield from runs_of(replace(trial, plan=plan), progress, **how)
-
-    monkeypatch.setattr(units, "runs_of", as_the_classical_law)
-    outcome = units.judge(unit)
-    assert asked == [(3, 64, 1, 60.0), (3, units.FEW_AT_ONCE, 1, 60.0)]
-    assert "goals_in_1000_steps" not in outcome.figures
-    assert outcome.figures["share_of_bound"].shape == (3,)
-
-
-@pytest.mark.parametrize(
-    ("met", "counted"),
-    [
-        ((False, True), (1, 1, 0)),
-        ((False, None), (1, 0, 1)),
-        ((False, False), (1, 0, 0)),
-        ((False,), (1, 0, 0)),
-    ],
-)
-def test_a_pair_counts_once_and_policy_or_planner_may_meet_what_is_asked(met, counted):
-    entries = [
-        {"robot": "kingfisher", "task": "go_through_positions", "kind": kind, "status": "judged", "met": each}
-        for kind, each in zip(("policy", "planner"), met, strict=False)
-    ]
-    beside = [
-        {**entries[0], "kind": "classical", "met": None},
-        {**entries[0], "robot": "turtlebot2", "kind": "planner", "status": "missing", "met": None},
-    ]
-    document = document_of(
-        entries + beside, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.0
-    )
+@pytest.mark.parametrize(("met", "counted"), [(True, (1, 1, 0)), (None, (1, 0, 1)), (False, (1, 0, 0))])
+def test_only_what_a_policy_drives_counts_as_asked(met, counted):
+    policy = {"robot": "kingfisher", "task": "go_to_pose", "kind": "policy", "status": "judged", "met": met}
+    entries = [policy, {**policy, "kind": "classical", "met": None}]
+    document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.0)
     assert (document["asked"], document["met"], document["open"]) == counted
 
 
@@ -265,17 +200,6 @@ def test_a_damaged_bundle_is_missing_with_its_reason(tmp_path):
     pair = find_pair("floating_platform", "go_to_pose", "policy", tmp_path)
     assert pair.missing
     assert "not the one that was exported" in pair.reason
-
-
-def test_what_uses_all_processes_itself_is_not_done_in_a_pool(tmp_path, monkeypatch):
-    unit, told, done = unit_of(tmp_path), [], []
-    monkeypatch.setattr(work, "together", lambda trial: 32)
-    monkeypatch.setattr(work, "_in_a_pool", lambda *_: pytest.fail("a pool within a pool"))
-    outcomes = work.do_all(
-        [unit], jobs=2, progress=told.append, on_done=lambda one, outcome: done.append(one)
-    )
-    assert done == [unit] and isinstance(outcomes[unit], Judged)
-    assert told[-1] == unit.cost
 
 
 def test_the_fault_of_one_unit_is_a_sentence_and_costs_no_other(tmp_path, monkeypatch):

@@ -187,26 +187,3 @@ def test_the_overview_marks_its_scale_where_its_numbers_say(findings, low):
     (axes,) = figure.axes
     for at, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):
         assert float(label.get_text().removesuffix(" %")) == pytest.approx(100.0 * at)
-
-
-@pytest.mark.parametrize(
-    ("robot", "kinds", "met", "told"),
-    [
-        ("kingfisher", ["policy"], False, True),
-        ("kingfisher", ["policy"], True, False),
-        ("kingfisher", ["policy"], None, False),
-        ("kingfisher", ["policy", "planner"], False, False),
-        ("turtlebot2", ["policy"], False, False),  # there are no plans for it
-    ],
-)
-def test_a_planner_that_could_meet_what_the_policy_does_not_is_named(findings, robot, kinds, met, told):
-    from fulmar_bringup.benchmark.tables import notes
-
-    (entry,) = (
-        entry
-        for entry in findings.document["pairs"]
-        if (entry["robot"], entry["task"]) == (robot, "go_through_positions")
-    )
-    entries = [entry | {"kind": kind, "met": met} for kind in kinds]
-    words = " ".join(notes(findings.document | {"pairs": entries}))
-    assert ("--controllers policy,planner" in words) is told

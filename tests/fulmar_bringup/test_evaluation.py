@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-import pytest
-
 from fulmar_bringup import evaluation
 from fulmar_bringup.evaluation import Trial, runs_of
 from fulmar_bringup.node_table import RunPlan
-from fulmar_core.rollout import WORLDS
-from policy_server.shipped import shipped_policy
 
 
-@pytest.mark.parametrize(
-    ("controller", "asked", "together"),
-    [("planner", WORLDS, 32), ("planner", 8, 8), ("classical", WORLDS, WORLDS), ("classical", 64, 64)],
-)
-def test_controllers_whose_every_episode_takes_seconds_have_few_at_once_so_that_progress_shows(
-    monkeypatch, controller, asked, together
-):
-    told = []
-    monkeypatch.setattr(evaluation, "batches", lambda *given, **options: told.append(options) or [])
-    policy = str(shipped_policy("kingfisher", "go_through_positions"))
-    plan = RunPlan(
-        "kingfisher", "go_through_positions", controller, "mujoco", 10.0, policy=policy, duration_s=60.0
-    )
-    assert list(runs_of(Trial(plan, "batch", 4096, worlds=asked))) == []
-    assert told[0]["worlds"] == together
+def test_a_batch_has_as_many_worlds_at_once_as_are_asked_for(monkeypatch):
+    calls = []
+    monkeypatch.setattr(evaluation, "batches", lambda *given, **options: calls.append(options) or [])
+    plan = RunPlan("kingfisher", "go_to_pose", "classical", "mujoco", 10.0, duration_s=60.0)
+    assert list(runs_of(Trial(plan, "batch", 4096, worlds=64))) == []
+    assert (calls[0]["episodes"], calls[0]["worlds"]) == (4096, 64)

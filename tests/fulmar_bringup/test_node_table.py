@@ -120,11 +120,10 @@ def test_everything_of_a_plan_reaches_the_nodes():
     assert controller.items() >= {"task": "go_to_pose", "lockstep": True, "wait_for_subscribers": 3}.items()
 
 
-def test_a_bundle_goes_to_the_nodes_that_run_one_alone():
+def test_a_bundle_goes_to_the_node_that_runs_one_alone():
     with_bundle = replace(PLAN, policy="/some/where")
     assert "policy" not in controller_spec(with_bundle).parameters
-    for name in ("policy", "planner"):
-        assert controller_spec(replace(with_bundle, controller=name)).parameters["policy"] == "/some/where"
+    assert controller_spec(replace(with_bundle, controller="policy")).parameters["policy"] == "/some/where"
 
 
 def test_the_recorder_gets_only_what_was_said():

@@ -154,16 +154,6 @@ def test_a_damaged_policy_is_refused_before_anything_starts(plan, tmp_path):
         plan(controller="policy", policy=folder)
 
 
-def test_a_planner_runs_the_shipped_policy_of_its_pair_or_another_that_fits(plan, tmp_path):
-    boat = {"robot": "kingfisher", "task": "go_through_positions", "controller": "planner"}
-    shipped = shipped_policy("kingfisher", "go_through_positions")
-    assert plan(**boat).plan.policy == str(shipped)
-    mine = shutil.copytree(shipped, tmp_path / "mine")
-    assert plan(**boat, policy=mine).plan.policy == str(mine)
-    with pytest.raises(BundleError, match="go_to_pose"):
-        plan(**boat, policy=shipped_policy("kingfisher", "go_to_pose"))
-
-
 def test_a_policy_for_a_controller_that_runs_none_is_refused(plan):
     with pytest.raises(ConfigError, match="controller 'lqr' runs no policy bundle"):
         plan(policy=shipped_policy("floating_platform", "go_to_pose"))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.health.applied import Applied, AppliedHistory, report_applied
+from fulmar_core.health.applied import Applied, AppliedHistory
+from fulmar_core.health.observer import report_applied
 from fulmar_core.health.thruster_health import ThrusterHealth
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot

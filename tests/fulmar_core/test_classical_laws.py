@@ -206,7 +206,6 @@ def test_every_file_of_gains_belongs_to_a_robot_and_its_law():
         for robot in ROBOTS.values()
         if robot.actuators.kind == family
     }
-    plans = {f"{robot.name}_planner" for robot in ROBOTS.values() if robot.actuators.kind == "propellers"}
-    found = set(config_names("controllers")) - plans
+    found = set(config_names("controllers"))
     assert every <= found <= every | others
     assert {name.removeprefix("floating_platform_") for name in found & others} == set(OTHERS)

@@ -63,25 +63,6 @@ def test_a_waypoint_is_reached_as_near_as_the_robot_can_tell():
     assert told.done == 1
 
 
-class Knowing:
-    """A controller that knows which waypoint comes next."""
-
-    def coming(self, places):
-        return np.array(1)
-
-
-def test_a_controller_that_knows_to_have_passed_a_waypoint_is_believed():
-    told = mission("go_through_positions")
-    told.hear_of(Knowing())
-    assert told.done == 0
-    told.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (6.0, 0.0, 0.0)), 1)
-    before = told.observe(at(1.0), S, STILL)
-    told.hear_of(Knowing())
-    assert told.done == 1
-    assert told.distance(at(1.0)) == pytest.approx(2.0)
-    assert np.abs(told.observe(at(1.0), 2 * S, STILL) - before).max() > 0.5
-
-
 def test_the_block_of_each_state_is_waited_for():
     told = mission("push_block")
     told.give(goal_at((1.0, 0.0, 0.0)), 1)

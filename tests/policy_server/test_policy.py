@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.errors import BundleError
+from fulmar_core.health.beliefs import BeliefReader
 from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import (
     FORMAT,
@@ -384,3 +385,16 @@ def test_what_was_verified_is_what_runs_though_the_files_are_exchanged_afterward
     np.testing.assert_array_equal(policy.act(golden.observations), signed.act(golden.observations))
     with pytest.raises(BundleError, match="not signed"):
         load(folder, trusted=tmp_path / "lab.pem")
+
+
+def test_the_estimates_of_one_robot_have_no_leading_axis_so_that_an_operator_can_be_warned():
+    policy = Policy(
+        policies_directory() / "floating_platform_drift_go_to_pose", ROBOT, load_task("drift_go_to_pose")
+    )
+    seen = np.zeros(len(policy.observation_names))
+    policy.act(seen)
+    assert policy.health.effectiveness.shape == (8,)
+    assert BeliefReader(ROBOT).read(policy.health).dead == ()
+    policy.reset()
+    policy.act(np.stack((seen, seen)))
+    assert policy.health.effectiveness.shape == (2, 8)

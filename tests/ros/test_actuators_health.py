@@ -1,4 +1,4 @@
-"""The health of the valves, over real wires and in the bag of a run."""
+"""The health of the valves that a controller estimates, over real wires and in the bag of a run."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from fulmar_bringup.bags.contents import open_bag
+from fulmar_bringup.bags.course import course_of
+from fulmar_bringup.bags.rerun import rerun
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.health.informer import Informer
+from fulmar_core.health.observer import health_of
 from fulmar_core.robot import load_robot
-from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ACTUATORS_HEALTH, COMMAND
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import subscriber_qos
+from policy_server.policy import Policy
+from policy_server.shipped import shipped_policy
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar
 from tests.ros.neighbour import Stream, until
@@ -37,56 +41,74 @@ def told(bag: Path, topic: str) -> list[JointState]:
         ]
 
 
-def test_a_valve_that_stays_closed_is_in_the_bag_of_its_run(ros_domain: RosDomain, tmp_path: Path) -> None:
-    """The recorder listens, so the controller's node says what it believes at every step."""
-    scenario, seed = "drift_two_lost", 3
-    asked = ("floating_platform", "--controller", "policy", "--scenario", scenario, "--seed", str(seed))
-    done = fulmar(
-        "run", *asked, "--lockstep", "--duration", "20", "--record", "bag", env=ros_domain.env, cwd=tmp_path
-    )
-    assert (tmp_path / "bag").is_dir(), done.stderr
-    world = draw_episode(
-        PLATFORM, load_task("go_to_pose"), load_scenario(scenario), seed=seed, number=0
-    ).world
-    commands = np.array([message.effort for message in told(tmp_path / "bag", COMMAND.name)])
-    health = told(tmp_path / "bag", ACTUATORS_HEALTH.name)
+def run_policy(ros_domain: RosDomain, folder: Path, task: str, *more: str) -> Path:
+    """The bag of a policy's run in lock step."""
+    asked = ("floating_platform", "--task", task, "--controller", "policy", *more)
+    done = fulmar("run", *asked, "--lockstep", "--record", "bag", env=ros_domain.env, cwd=folder)
+    assert (folder / "bag").is_dir(), done.stderr
+    return folder / "bag"
+
+
+def test_the_estimate_that_a_policy_uses_of_its_valves_is_in_the_bag_and_in_a_rerun(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    scenario, seed, task = "drift_two_lost", 3, load_task("drift_go_to_pose")
+    more = ("--scenario", scenario, "--seed", str(seed), "--duration", "20")
+    bag = run_policy(ros_domain, tmp_path, task.name, *more)
+    world = draw_episode(PLATFORM, task, load_scenario(scenario), seed=seed, number=0).world
+    health = told(bag, ACTUATORS_HEALTH.name)
     assert len(health) >= 95
     assert list(health[-1].name) == list(PLATFORM.actuators.names)
     last = np.array(health[-1].effort)
-    used = commands.sum(axis=0) >= 5
     dead = np.asarray(world.alive) == 0.0
-    assert np.any(used & dead)
-    assert np.all(last[used & dead] < 0.2)
+    assert dead.sum() == 2
+    assert np.all(last[dead] < 0.2)
     assert np.all(last[~dead] > 0.5)
+
+    folder = shipped_policy(PLATFORM.name, task.name)
+    assert folder is not None
+    policy = Policy(folder, PLATFORM, task)
+    rerun(course_of(open_bag(bag)), policy, source="odometry")
+    estimated = health_of(policy)
+    assert estimated is not None
+    np.testing.assert_array_equal(last, estimated.effectiveness)
+
+
+@pytest.mark.slow
+def test_a_controller_without_an_estimator_publishes_no_health(ros_domain: RosDomain, tmp_path: Path) -> None:
+    bag = run_policy(ros_domain, tmp_path, "go_to_pose", "--duration", "2")
+    assert told(bag, COMMAND.name)
+    assert told(bag, ACTUATORS_HEALTH.name) == []
 
 
 @pytest.mark.real_time
-def test_a_command_does_not_wait_for_a_health_that_only_a_recorder_wants(
+def test_health_is_published_where_it_is_subscribed_to_and_never_before_its_command(
     stream: Stream, controller: ControllerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else recording would make the control loop slower."""
-    answered = []
-
-    def see(measurement: Measurement, _informer: Informer, *, wanted: bool) -> None:
-        answered.append(wanted and controller._answered_ns == measurement.stamp_ns)
-
-    monkeypatch.setattr(controller._actuators, "see", see)
-    stream.neighbour.node.create_subscription(
-        JointState, ACTUATORS_HEALTH.name, lambda _message: None, subscriber_qos(ACTUATORS_HEALTH)
-    )
-    until(lambda: controller.wires.health_wanted)
-    answered.clear()
-    until(lambda: len(answered) > 5)
-    assert all(answered[1:])
-
-
-@pytest.mark.real_time
-def test_where_nobody_listens_nothing_is_reckoned(stream: Stream, controller: ControllerNode) -> None:
-    """And from the first listener on, it is."""
     assert not controller.wires.health_wanted
-    heard: list[JointState] = []
+    published: list[tuple[str, int]] = []
+    command, health = controller.wires.publish_command, controller.wires.publish_actuators_health
+
+    def publish_command(values: np.ndarray, stamp: int) -> None:
+        published.append(("command", stamp))
+        command(values, stamp)
+
+    def publish_health(values: np.ndarray, stamp: int) -> None:
+        published.append(("health", stamp))
+        health(values, stamp)
+
+    monkeypatch.setattr(controller.wires, "publish_command", publish_command)
+    monkeypatch.setattr(controller.wires, "publish_actuators_health", publish_health)
+    until(lambda: len(published) > 5)
+    assert not [stamp for name, stamp in published if name == "health"]
+    received: list[JointState] = []
     stream.neighbour.node.create_subscription(
-        JointState, ACTUATORS_HEALTH.name, heard.append, subscriber_qos(ACTUATORS_HEALTH)
+        JointState, ACTUATORS_HEALTH.name, received.append, subscriber_qos(ACTUATORS_HEALTH)
     )
-    until(lambda: len(heard) > 5)
-    assert np.asarray(heard[0].effort) == pytest.approx(0.98, abs=0.01)
+    until(lambda: len(received) > 5)
+    assert np.asarray(received[0].effort) == pytest.approx(0.98, abs=0.01)
+    seen = list(published)
+    for at, (name, stamp) in enumerate(seen):
+        if name == "health":
+            assert ("command", stamp) in seen[:at]

@@ -12,7 +12,8 @@ from fulmar_core.controllers.classical import load_classical
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
-from fulmar_core.health.applied import Applied, report_applied
+from fulmar_core.health.applied import Applied
+from fulmar_core.health.observer import report_applied
 from fulmar_core.observation import Observer
 from fulmar_core.planar import at_rest, planar_of
 from fulmar_core.robot import load_robot

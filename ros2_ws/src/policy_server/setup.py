@@ -23,7 +23,6 @@ setup(
     entry_points={
         "console_scripts": [
             "policy_node = policy_server.policy_node:main",
-            "planner_node = policy_server.planner_node:main",
             "lqr_node = policy_server.lqr_node:main",
             "mpc_node = policy_server.mpc_node:main",
             "lqr_drift_node = policy_server.lqr_drift_node:main",

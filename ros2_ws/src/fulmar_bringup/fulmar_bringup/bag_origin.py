@@ -15,7 +15,6 @@ from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
 from fulmar_ros.provenance import fulmar_version, git_revision
-from policy_server.planning.loading import settings_path
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:
@@ -81,6 +80,5 @@ def _of_controller(plan: RunPlan) -> dict[str, Path]:
     if not CONTROLLERS[plan.controller].runs_bundle:
         law = None if plan.controller == "classical" else plan.controller
         return {"controller.yaml": gains_path(load_robot(plan.robot), law)}
-    settings = {"controller.yaml": settings_path(plan.robot)} if plan.controller == "planner" else {}
     folder = Path(plan.policy) if plan.policy else shipped_policy(plan.robot, plan.task)
-    return settings | ({"passport.json": folder / PASSPORT} if folder else {})
+    return {"passport.json": folder / PASSPORT} if folder else {}

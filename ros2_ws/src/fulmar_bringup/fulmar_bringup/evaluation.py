@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +37,7 @@ class Trial:
     through: str  # one of WAYS
     episodes: int
     worlds: int = WORLDS  # of a batch at once
-    jobs: int = 1  # processes; through ros, pairs of them
+    jobs: int = 1  # pairs of processes, through ros
     bounded: int = BOUNDED_EPISODES  # episodes whose bound is computed
 
     @property
@@ -69,7 +68,6 @@ def runs_of(
     progress: Progress = lambda steps: None,
     *,
     pool: RosPool | None = None,
-    keep: Path | None = None,
 ) -> Iterator[Trajectories]:
     """Run the episodes of a trial, in their order.
 
@@ -77,7 +75,6 @@ def runs_of(
         trial: What to run.
         progress: Told how many control steps have been done.
         pool: Processes that stay for one trial after another, through ros; by default it has its own.
-        keep: Folder for what is done of this very trial, where it takes long; what lies there is not done again.
 
     Yields:
         What happened, for the next so many episodes.
@@ -97,63 +94,30 @@ def runs_of(
         else:
             yield roll_out_through_ros(plan, episodes=trial.episodes, jobs=trial.jobs, progress=progress)
         return
-    most = together(trial)
-    if most and (trial.jobs > 1 or keep):
-        from fulmar_bringup.parts import runs_by_parts
-
-        yield from runs_by_parts(trial, most, progress, keep)
-    else:
-        yield from runs_of_part(trial, trial.controller(), 0, trial.episodes, progress)
-
-
-def runs_of_part(
-    trial: Trial, controller: Controller, first: int, episodes: int, progress: Progress = lambda steps: None
-) -> Iterator[Trajectories]:
-    """Run some episodes of a trial in the batch or in MuJoCo.
-
-    Args:
-        trial: What to run.
-        controller: Its controller; reset before it drives.
-        first: Number of the first episode.
-        episodes: How many.
-        progress: As in `runs_of`.
-
-    Yields:
-        What happened, for the next so many episodes.
-    """
-    robot, task, scenario = trial.robot, trial.task, load_scenario(trial.plan.scenario)
+    robot, task, scenario = trial.robot, trial.task, load_scenario(plan.scenario)
     if trial.through == "batch":
         yield from batches(
-            controller,
+            trial.controller(),
             robot,
             task,
             scenario,
-            episodes=episodes,
-            seed=trial.plan.seed,
-            first=first,
-            worlds=min(trial.worlds, together(trial) or trial.worlds),
+            episodes=trial.episodes,
+            seed=plan.seed,
+            worlds=trial.worlds,
             progress=progress,
         )
         return
     from sim_nodes.mujoco_backend import MujocoBackend
 
     yield roll_out_in_backends(
-        controller,
+        trial.controller(),
         lambda: MujocoBackend.of(robot, task, scenario),
         task,
         scenario,
-        episodes=episodes,
-        seed=trial.plan.seed,
-        first=first,
+        episodes=trial.episodes,
+        seed=plan.seed,
         progress=progress,
     )
-
-
-def together(trial: Trial) -> int | None:
-    """Episodes that its controller takes at once at most; None for any number."""
-    from fulmar_bringup.system import CONTROLLERS
-
-    return CONTROLLERS[trial.plan.controller].together
 
 
 class Tally:

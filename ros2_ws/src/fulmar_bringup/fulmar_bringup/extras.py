@@ -25,7 +25,6 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "bags": ("mcap", "rosbags", "mcap_ros2", "zstandard"),
     "hardware": ("filterpy", "serial", "gpiod", "pymavlink"),
     "view": ("matplotlib",),
-    "planning": ("casadi",),
     "datasets": ("pyarrow",),
     "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
     "cluster": ("ray",),

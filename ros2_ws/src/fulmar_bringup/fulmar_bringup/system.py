@@ -26,18 +26,6 @@ def _load_policy(robot: Robot, task: Task, control_hz: float, policy: str) -> Co
     return Policy(Path(policy), robot, task, control_hz=control_hz)
 
 
-def _load_planner(robot: Robot, task: Task, control_hz: float, policy: str) -> Controller:
-    from policy_server.planning.loading import load_planner
-
-    return load_planner(robot, task, Path(policy), control_hz=control_hz)
-
-
-def _check_planner(robot: Robot, task: Task) -> None:
-    from policy_server.planning.loading import check_planner
-
-    check_planner(robot, task)
-
-
 def _load_lqr(robot: Robot, task: Task, control_hz: float, _policy: str) -> Controller:
     return load_lqr(robot, task, control_hz=control_hz)
 
@@ -92,8 +80,7 @@ class ControllerEntry:
     check: Callable[[Robot, Task], None]  # refuses a robot and a task that it has nothing for
     needs: tuple[str, ...] = ()  # modules that an extra brings
     strives: bool = True  # whether it means to meet the goal
-    runs_bundle: bool = False  # whether a learned policy drives, or helps
-    together: int | None = None  # episodes that a batch has at once at most, where each takes seconds
+    runs_bundle: bool = False  # whether a learned policy drives
 
 
 _LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
@@ -105,15 +92,6 @@ CONTROLLERS = {
         _any_pair,
         ("onnxruntime",),
         runs_bundle=True,
-    ),
-    "planner": ControllerEntry(
-        "a learned policy whose drive of the whole course optimal control makes quicker (boats)",
-        "planner_node",
-        _load_planner,
-        _check_planner,
-        ("onnxruntime", "casadi"),
-        runs_bundle=True,
-        together=32,
     ),
     "lqr": ControllerEntry(
         "linear-quadratic regulator with valve allocation", "lqr_node", _load_lqr, _check_lqr

@@ -10,10 +10,8 @@ import numpy as np
 
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import progressed, tell_course
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
-from fulmar_core.health.informer import Informer
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import planar_of, stack_planar
@@ -51,7 +49,6 @@ def batches(
     *,
     episodes: int,
     seed: int,
-    first: int = 0,
     worlds: int = WORLDS,
     progress: Progress = lambda steps: None,
 ) -> Iterator[Trajectories]:
@@ -64,7 +61,6 @@ def batches(
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
-        first: Number of the first of them, >= 0.
         worlds: How many run at once, >= 1; what happens does not depend on it.
         progress: Told how many control steps have been done.
 
@@ -82,18 +78,15 @@ def batches(
             scenario,
             worlds=count,
             seed=seed,
-            first=first + done,
+            first=done,
             control_hz=controller.control_hz,
         )
         dt = simulation.control_dt
         controller.reset()
         log, judge = TrajectoryLog(robot, task, dt), Judge(task, simulation.goal, dt)
-        steps, informer = episode_steps(task, dt), Informer(robot, controller)
+        steps = episode_steps(task, dt)
         for step in range(steps):
-            informer.see(simulation.measured, simulation.command, dt)
-            tell_course(controller, simulation.goal)
             action = np.asarray(controller.act(simulation.observe()))
-            simulation.goal = progressed(controller, simulation.goal)
             simulation.step(action)
             log.add(simulation.truth, judge.see(simulation.truth, simulation.goal.block), simulation.command)
             progress(done * steps + (step + 1) * count)
@@ -108,7 +101,6 @@ def roll_out_in_backends(
     *,
     episodes: int,
     seed: int,
-    first: int = 0,
     progress: Progress = lambda steps: None,
 ) -> Trajectories:
     """Run some episodes of a seed, each in a backend of its own, stepped side by side.
@@ -120,7 +112,6 @@ def roll_out_in_backends(
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
-        first: Number of the first of them, >= 0.
         progress: Told how many control steps have been done.
 
     Returns:
@@ -135,9 +126,8 @@ def roll_out_in_backends(
         for _ in range(min(episodes, SIDE_BY_SIDE)):
             backends.append(make_backend())
             stack.callback(backends[-1].close)
-        end = first + episodes
-        for number in range(first, end, SIDE_BY_SIDE):
-            numbers = range(number, min(number + SIDE_BY_SIDE, end))
+        for number in range(0, episodes, SIDE_BY_SIDE):
+            numbers = range(number, min(number + SIDE_BY_SIDE, episodes))
             done = sum(run.position_error.size for run in runs)
 
             def further(steps: int, done: int = done) -> None:
@@ -168,7 +158,6 @@ def _side_by_side(
     count = len(samples)
     observer = Observer(robot, task)
     controller.reset()
-    informer = Informer(robot, controller)
     goal, command = drawn.goal, np.tile(robot.actuators.safe_command, (count, 1))
     log, judge = TrajectoryLog(robot, task, control_dt), Judge(task, drawn.goal, control_dt)
     for step in range(episode_steps(task, control_dt)):
@@ -176,10 +165,7 @@ def _side_by_side(
         if block is not None:
             goal = dataclasses.replace(goal, block=block)
         goal = task.advance(goal, measured, np.asarray(step * control_dt)) if step else goal
-        informer.see(measured, command, control_dt)
-        tell_course(controller, goal)
         action = np.asarray(controller.act(observer(measured, goal, command)))
-        goal = progressed(controller, goal)
         command = slewed(robot.actuators.limited(action), command, robot, control_dt)
         samples = [backend.step(each, substeps) for backend, each in zip(backends, command, strict=False)]
         truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])

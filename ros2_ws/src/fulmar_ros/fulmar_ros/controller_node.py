@@ -16,20 +16,17 @@ from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import FulmarError
 from fulmar_core.exit_codes import FAILED
-from fulmar_core.health.applied import report_applied
 from fulmar_core.health.beliefs import BeliefReader, Beliefs
-from fulmar_core.health.informer import Informer
-from fulmar_core.health.thruster_health import Health, can_be_watched
+from fulmar_core.health.observer import AppliedFeed, health_of, report_applied
+from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.observation import slewed
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
-from fulmar_ros.actuator_watch import ActuatorWatch
 from fulmar_ros.control_beat import ControlBeat
 from fulmar_ros.controller_inputs import ControllerInputs
 from fulmar_ros.controller_settings import ControllerSettings
@@ -87,7 +84,7 @@ class ControllerNode(LifecycleNode):
         self._answered_ns, self._answer = -1, self.robot.actuators.safe_command
         self._control_ns = round(1e9 / hz)
         self._pause_ns = self.settings.pause_ns(self.robot)
-        self._actuators = ActuatorWatch(self._pause_ns, self.settings.hold_ns(self.robot))
+        self._applied = AppliedFeed(self._pause_ns, self.settings.hold_ns(self.robot))
         self._belief_reader = BeliefReader(self.robot) if can_be_watched(self.robot) else None
         self._beliefs = Beliefs()
         self._beat = ControlBeat(
@@ -111,7 +108,7 @@ class ControllerNode(LifecycleNode):
             self._refusal = str(error)
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
-        self._actuators.forget()
+        self._applied.forget()
         self.wires = ControllerWires(
             self,
             self.robot,
@@ -214,7 +211,8 @@ class ControllerNode(LifecycleNode):
 
     def _announce(self) -> None:
         """Say who controls now; what is known of the actuators begins anew."""
-        self._actuators.forget()
+        self._applied.forget()
+        self._beliefs = Beliefs()
         self.wires.publish_metadata(self._succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
@@ -237,7 +235,7 @@ class ControllerNode(LifecycleNode):
 
     def _on_applied(self, message: JointState) -> None:
         if tuple(message.name) == self.robot.actuators.names and len(message.effort) == len(message.name):
-            self._actuators.history.add(stamp_ns(message.header.stamp), np.array(message.effort))
+            self._applied.history.add(stamp_ns(message.header.stamp), np.array(message.effort))
         self._go_on()
 
     def _on_bearing(self, message: Bool) -> None:
@@ -278,7 +276,7 @@ class ControllerNode(LifecycleNode):
         """Whether something is on its way in lock step that belongs to a measurement."""
         if self.inputs.mission.lacks_something_of(stamp) or not self.inputs.bearing_known:
             return True
-        if again or self._belief_reader is None or not self._actuators.lacks(stamp, self._answered_ns):
+        if again or self._belief_reader is None or not self._applied.lacks(stamp, self._answered_ns):
             return False
         return self.wires.state_published()
 
@@ -300,8 +298,6 @@ class ControllerNode(LifecycleNode):
                 decision = self.inputs.arbitrate()
                 self._begin_anew()
                 observation = self._observe(measurement) if decision.may_act and measurement else None
-            informer = self._succession.current.informer
-            health = self._watch(measurement, informer) if informer.listens else None
             if observation is not None:
                 command, action, problem = self._act(observation)
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
@@ -314,13 +310,9 @@ class ControllerNode(LifecycleNode):
         self._status.steps += 1
         if observation is not None and action is not None:
             self.wires.publish_reasoning(observation, action, stamp)
+            self._report_health(stamp)
             self._judge(problem)
             self.inputs.acted += 1
-        if not informer.listens:  # only for others: the command does not wait for it
-            health = self._watch(measurement, informer)
-        if health is not None and self.wires.health_wanted:
-            self.wires.publish_actuators_health(health.effectiveness, stamp)
-        self._note_beliefs(health)
         self._tell_status(decision)
 
     def _speak(self, publish: Callable[[], None]) -> bool:
@@ -337,20 +329,18 @@ class ControllerNode(LifecycleNode):
         """Let the controller forget what was before a new goal or a jump; call with the lock held."""
         jumped, anew = self.inputs.news()
         if jumped:
-            self._actuators.forget()  # no motion of the body was behind it
+            self._applied.forget()  # no motion of the body was behind it
         if jumped or anew:
             self.controller.reset()
 
-    def _watch(self, measurement: Measurement | None, informer: Informer) -> Health | None:
-        if measurement is None:
-            return None
-        return self._actuators.see(measurement, informer, wanted=self.wires.health_wanted)
-
-    def _note_beliefs(self, health: Health | None) -> None:
-        """Keep what is believed of valves and push: by the controller's own observer, else by ours."""
-        believed = getattr(self.controller, "health", None) or health
-        if self._belief_reader is not None and believed is not None:
-            self._beliefs = self._belief_reader.read(believed)
+    def _report_health(self, stamp: int) -> None:
+        """Publish the estimate of the actuators' health that the controller used; the status says what is wrong."""
+        health = health_of(self.controller)
+        if self._belief_reader is None or health is None:
+            return
+        if self.wires.health_wanted:
+            self.wires.publish_actuators_health(health.effectiveness, stamp)
+        self._beliefs = self._belief_reader.read(health)
 
     def _observe(self, measurement: Measurement) -> np.ndarray:
         """What the controller sees of a measurement; targets that are reached give way to the next."""
@@ -358,11 +348,8 @@ class ControllerNode(LifecycleNode):
             self._answer = self.robot.actuators.safe_command
             self.controller.reset()
         mission = self.inputs.mission
-        mission.hear_of(self.controller)
         observation = mission.observe(measurement.state, measurement.stamp_ns, self._answer)
-        assert mission.goal is not None
-        tell_course(self.controller, mission.goal)
-        report_applied(self.controller, self._actuators.since_observation(measurement.stamp_ns))
+        report_applied(self.controller, self._applied.since_observation(measurement.stamp_ns))
         return observation
 
     def _act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:

@@ -45,7 +45,7 @@ def line_up(
             raise
         complain(f"falling back to {settings.fallback}: {error}")
         return Succession(None, fallback, refused=str(error))
-    return Succession(ready(controller, robot), fallback)
+    return Succession(ready(controller), fallback)
 
 
 def load_other(
@@ -65,7 +65,7 @@ def load_other(
     controller = make_controller(robot, task, dataclasses.replace(settings, policy=folder))
     if controller.observation_names != like.observation_names:
         raise ConfigError("it sees something else than the controller that runs")
-    return ready(controller, robot)
+    return ready(controller)
 
 
 def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby | None:
@@ -74,4 +74,4 @@ def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby
         return None
     law = None if name == "classical" else name
     controller = load_classical(robot, task, control_hz=settings.control_rate(robot), law=law)
-    return ready(controller, robot, said={"fallback": True})
+    return ready(controller, said={"fallback": True})

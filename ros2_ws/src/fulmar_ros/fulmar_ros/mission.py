@@ -7,8 +7,6 @@ from collections import deque
 
 import numpy as np
 
-from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import progressed
 from fulmar_core.geofence import distance_from_goal
 from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.observation import Observer
@@ -141,11 +139,6 @@ class Mission:
         """Whether the block, or a streamed goal, of this stamp is still to come."""
         block = self._pushes and self._block_stamp_ns != stamp_ns
         return block or (self._streamed and self.goal_stamp_ns != stamp_ns)
-
-    def hear_of(self, controller: Controller) -> None:
-        """Take over how far a controller knows to have come; call before `observe`."""
-        if self._goal is not None:
-            self._goal = progressed(controller, self._goal)
 
     def distance(self, state: RigidBodyState) -> float:
         """From a state to the current target; 0 where the task has none, infinite before everything is known [m]."""

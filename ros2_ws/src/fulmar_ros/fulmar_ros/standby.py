@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.health.informer import Informer
-from fulmar_core.robot import Robot
 
 WARM_UP = 20  # the first inferences are slow; they happen before anything moves
 
@@ -20,17 +18,15 @@ class Standby:
     """One controller and its company."""
 
     controller: Controller
-    informer: Informer
     metadata: str  # JSON, ready to publish
     sha256: str
 
 
-def ready(controller: Controller, robot: Robot, *, said: dict[str, Any] | None = None) -> Standby:
+def ready(controller: Controller, *, said: dict[str, Any] | None = None) -> Standby:
     """Warm a controller up.
 
     Args:
         controller: Loaded and checked.
-        robot: The robot.
         said: What its metadata shall say beside what it says itself.
     """
     for _ in range(WARM_UP):
@@ -38,4 +34,4 @@ def ready(controller: Controller, robot: Robot, *, said: dict[str, Any] | None =
     controller.reset()
     metadata = {**controller.metadata(), **(said or {})}
     text = json.dumps(metadata, sort_keys=True)
-    return Standby(controller, Informer(robot, controller), text, str(metadata.get("sha256", "")))
+    return Standby(controller, text, str(metadata.get("sha256", "")))

@@ -15,12 +15,10 @@ from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.guarded import RecordedEstop
 from fulmar_bringup.bags.told import ABSENT
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.course import tell_course
 from fulmar_core.errors import BagError, FulmarError, RunFailed
-from fulmar_core.health.applied import Applied, AppliedHistory, report_applied
-from fulmar_core.health.informer import Informer
+from fulmar_core.health.applied import Applied, AppliedHistory
+from fulmar_core.health.observer import report_applied
 from fulmar_core.observation import slewed
-from fulmar_core.planar import planar_of
 from fulmar_core.rotation import rotate
 from fulmar_core.safety.arbiter import Flags, arbitrate
 from fulmar_core.safety.area import outside
@@ -113,20 +111,17 @@ class _Rerun:
         self._robot, self._safe = robot, robot.actuators.safe_command
         self._pause_ns = course.settings.pause_ns(robot)
         self._control_ns = round(1e9 / course.settings.control_rate(robot))
-        self._succession = Succession(
-            Standby(controller, Informer(robot, controller), "", ""),
-            ready(fallback, robot) if fallback else None,
-        )
+        self._succession = Succession(Standby(controller, "", ""), ready(fallback) if fallback else None)
         self._mission = Mission(robot, course.task, streamed=course.settings.goals_streamed)
         self._gate = InputGate(robot.limits, frozen_after=0)
-        self._answered_ns, self._answer, self._seen_ns = -1, self._safe, 0
+        self._answered_ns, self._answer = -1, self._safe
         self._states = _States(course)
         # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
         self._gated = source == "odometry" and (course.settings.lockstep or not course.own)
         self._estop = RecordedEstop(course.presses, required=self._gated and course.settings.estop)
         self._history = AppliedHistory(course.settings.hold_ns(robot))
         self._states_fed = 0  # states of the actuators that the history has taken
-        self._observed_ns = 0  # stamp of the newest observation
+        self._observed_ns = 0  # stamp of the newest observation; 0 before the first of a controller
         # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
         self._bearing_on = not course.bearing or bool(course.bearing[0].what)
         self._fed = 0
@@ -172,16 +167,14 @@ class _Rerun:
             for told in changes.get(step, ()):
                 self._succession.propose(self._successor(*told.what))
             if self._succession.turn():
-                self._seen_ns = 0
+                self._observed_ns = 0
             reasons[step] = self._reason(step)
             acted[step] = not reasons[step]
             if acted[step]:
                 self._begin_anew_after_a_pause(stamp)
                 shown[step] = self._shown(step)
             try:
-                self._inform(step)
                 if acted[step]:
-                    self._tell_course()
                     report_applied(self._controller, self._applied(self._observed_ns, stamp))
                     self._observed_ns = stamp
                     actions[step] = self._act(shown[step])
@@ -260,27 +253,11 @@ class _Rerun:
         if not self._mission.complete:
             raise self._goalless()
         sample = int(self._course.sample[step])
-        self._mission.hear_of(self._controller)
         return self._mission.observe(self._states[sample], int(self._course.stamp_ns[step]), self._answer)
 
     def _goalless(self) -> BagError:
         what, task = self._mission.lacking, self._course.task.name
         return BagError(f"the bag holds no {what} for '{task}'. Give --goal x,y,deg.")
-
-    def _inform(self, step: int) -> None:
-        """Tell the controller how its actuators do, if it wants to know."""
-        sample, informer = int(self._course.sample[step]), self._succession.current.informer
-        if not informer.listens or sample == ABSENT:
-            return
-        stamp = int(self._course.stamp_ns[step])
-        passed_ns = stamp - self._seen_ns
-        if passed_ns == 0:
-            return
-        if not 0 < passed_ns <= self._pause_ns:
-            informer.reset()
-        self._seen_ns = stamp
-        applied = self._applied(stamp - passed_ns, stamp)
-        informer.see(planar_of(self._states[sample]), applied, passed_ns / 1e9)
 
     def _applied(self, begin_ns: int, end_ns: int) -> Applied | None:
         """What the actuators did between two measurements; the recorded command where the bag holds no more of it."""
@@ -295,11 +272,6 @@ class _Rerun:
             self._history.add(int(states.stamp_ns[index]), states.values[index])
         return self._history.between(begin_ns, end_ns)
 
-    def _tell_course(self) -> None:
-        """Tell the controller the whole course, if it wants to know and there is one."""
-        if self._mission.goal is not None:
-            tell_course(self._controller, self._mission.goal)
-
     def _act(self, observation: np.ndarray) -> np.ndarray:
         action = np.asarray(self._controller.act(observation), dtype=float)
         self._acted += 1
@@ -311,7 +283,7 @@ class _Rerun:
         before = self._succession.current
         self._fault = self._succession.judge(problem) or self._fault
         if self._succession.current is not before:
-            self._seen_ns = 0
+            self._observed_ns = 0
         if problem:
             return self._safe
         limited = self._robot.actuators.limited(action)
@@ -322,7 +294,7 @@ class _Rerun:
         reason = f"'{self._controller.name}' raised {type(error).__name__} at step {step}: {error}"
         if not self._succession.fall_back(reason):
             raise RunFailed(reason) from error
-        self._seen_ns = 0
+        self._observed_ns = 0
         return reason
 
     def _successor(self, folder: str, sha256: str) -> Standby:
@@ -330,7 +302,7 @@ class _Rerun:
         assert self._load is not None
         where = f"the run went on with the policy of {folder}"
         try:
-            found = ready(self._load(folder), self._robot)
+            found = ready(self._load(folder))
         except FulmarError as error:
             raise BagError(f"{where}, which cannot be loaded: {error}") from error
         if found.sha256 != sha256:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from policy_server.shipped import policies_directory
 
-KINDS = ("policy", "planner", "classical")
-BUNDLED = ("policy", "planner")  # what is asked of a pair, one of these may meet
+KINDS = ("policy", "classical")
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) ->
     Args:
         robot: Name of the robot.
         task: Name of the task.
-        kind: policy: the bundle; planner: plans that begin from it; classical: the law of the robot's family.
+        kind: policy: the bundle; classical: the law of the robot's family.
         policies: Folder of bundles named <robot>_<task>; the shipped ones by default.
 
     Returns:
@@ -60,8 +59,6 @@ def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) ->
     folder = (policies or policies_directory()) / f"{robot}_{task}"
     if kind == "policy":
         return with_policy(robot, task, folder)
-    if kind == "planner":
-        return with_planner(robot, task, folder)
     return with_law(robot, task, "classical")
 
 
@@ -87,34 +84,6 @@ def with_policy(robot: str, task: str, folder: Path) -> Pair:
     )
 
 
-def with_planner(robot: str, task: str, folder: Path) -> Pair:
-    """A pair that a planner with the bundle of a folder drives, or why it cannot."""
-    from fulmar_bringup.system import CONTROLLERS
-    from policy_server.planning.loading import check_planner
-
-    the_robot, the_task = load_robot(robot), load_task(task)
-    try:
-        check_planner(the_robot, the_task)
-    except ConfigError as error:
-        return Pair(robot, task, "planner", reason=str(error))
-    pair = with_policy(robot, task, folder)
-    if pair.missing:
-        return replace(pair, kind="planner")
-    planner = CONTROLLERS["planner"].load(the_robot, the_task, the_robot.timing.control_hz, pair.policy)
-    return replace(pair, kind="planner", controller="planner", sha256=str(planner.metadata()["sha256"]))
-
-
-def has_planner(robot: str, task: str) -> bool:
-    """Whether there are plans for a robot at a task."""
-    from policy_server.planning.loading import check_planner
-
-    try:
-        check_planner(load_robot(robot), load_task(task))
-    except ConfigError:
-        return False
-    return True
-
-
 def with_law(robot: str, task: str, name: str) -> Pair:
     """A pair that a controller without a bundle drives, or why it cannot.
 
@@ -136,7 +105,7 @@ def with_law(robot: str, task: str, name: str) -> Pair:
 
 
 def units_of(
-    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, jobs: int, worlds: int
+    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, worlds: int
 ) -> list[Unit]:
     """The work on one pair.
 
@@ -146,7 +115,6 @@ def units_of(
         seed: Seed of the episodes.
         scenario: Name of the scenario.
         folder: Where outcomes are kept.
-        jobs: Processes, where a trial has several of its own.
         worlds: Episodes of a batch at once.
     """
     plan = RunPlan(
@@ -162,7 +130,7 @@ def units_of(
         lockstep=True,
     )
     return [
-        Unit(Trial(plan, way, episodes, worlds, jobs), hash_of(pair.sha256, code_hash(way)), folder)
+        Unit(Trial(plan, way, episodes, worlds), hash_of(pair.sha256, code_hash(way)), folder)
         for way, episodes in ways.items()
     ]
 
@@ -178,7 +146,7 @@ def code_hash(way: str) -> str:
         for family in ("robots", "tasks", "scenarios", "controllers", "goals")
         for path in config_files(family).values()
     )
-    installed = [_version(name) for name in ("numpy", "onnxruntime", "casadi", "mujoco")]
+    installed = [_version(name) for name in ("numpy", "onnxruntime", "mujoco")]
     return hash_of(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files), *installed)
 
 

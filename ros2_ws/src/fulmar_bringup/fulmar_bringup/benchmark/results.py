@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bringup.benchmark.judged import Judged
-from fulmar_bringup.benchmark.pairs import BUNDLED, Pair
+from fulmar_bringup.benchmark.pairs import Pair
 from fulmar_bringup.benchmark.required import judged_figure, verdicts
 from fulmar_bringup.benchmark.thesis import thesis_row
 from fulmar_bringup.evaluation import share_of_mean
@@ -37,7 +37,7 @@ def pair_entry(pair: Pair, outcomes: dict[str, Judged | str]) -> dict[str, Any]:
     same = judged["batch"].about.get("same_at_64_worlds") if "batch" in judged else None
     checks = (
         verdicts(pair.robot, pair.task, values, same=same, training_s=training_s)
-        if pair.kind in BUNDLED
+        if pair.kind == "policy"
         else []
     )
     met = [check.met for check in checks]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.benchmark.judged import Judged
-from fulmar_bringup.benchmark.pairs import BUNDLED, Pair, find_pair, units_of
+from fulmar_bringup.benchmark.pairs import Pair, find_pair, units_of
 from fulmar_bringup.benchmark.results import FORMAT, pair_entry
 from fulmar_bringup.benchmark.unit import Unit, done_already
 from fulmar_bringup.benchmark.work import Outcome, do_all
@@ -76,7 +76,6 @@ def run_benchmark(
             seed=request.seed,
             scenario=request.scenario,
             folder=request.folder / "outcomes",
-            jobs=request.jobs,
             worlds=max(request.episodes.get("batch", 1), 1),
         )
         for pair in pairs
@@ -123,7 +122,7 @@ def document_of(
     """The whole document; docs/evaluation.md names its keys."""
     met: dict[tuple[str, str], list[bool | None]] = {}
     for entry in entries:
-        if entry["kind"] == "policy" or (entry["kind"] in BUNDLED and entry["status"] != "missing"):
+        if entry["kind"] == "policy":
             met.setdefault((entry["robot"], entry["task"]), []).append(entry["met"])
     return {
         "benchmark": "roboran",

@@ -9,7 +9,6 @@ from rich.markup import escape
 from rich.table import Table
 
 from fulmar_bringup.benchmark.cells import BAD, GOOD, head, missing, rows, spoken
-from fulmar_bringup.benchmark.pairs import has_planner
 
 _MARKS = {GOOD: "[green]{} ✓[/]", BAD: "[bold red]{} ✗[/]", "": "{}"}
 _PLACES = {"batch": "the batch", "mujoco": "MuJoCo", "ros": "ROS"}
@@ -46,17 +45,6 @@ def verdict(document: dict[str, Any]) -> str:
     )
 
 
-def _planners_left_out(document: dict[str, Any]) -> list[tuple[str, str]]:
-    """Pairs whose policy does not meet what is asked, and whose planner nobody asked for."""
-    judged = {(entry["robot"], entry["task"]) for entry in document["pairs"] if entry["kind"] == "planner"}
-    unmet = [
-        (entry["robot"], entry["task"])
-        for entry in document["pairs"]
-        if entry["kind"] == "policy" and entry["met"] is False
-    ]
-    return [pair for pair in unmet if pair not in judged and has_planner(*pair)]
-
-
 def notes(document: dict[str, Any]) -> list[str]:
     """What one has to know to read the tables."""
     ways = ", ".join(
@@ -74,11 +62,6 @@ def notes(document: dict[str, Any]) -> list[str]:
                 seconds = f"1,000 steps are {way['thousand_steps_s']:g} s"
                 seen[spoken(entry["robot"])] = f"{way['bound']}; {seconds} at {way['control_hz']:g} Hz"
     lines += [f"bound for {robot}: {rule}." for robot, rule in seen.items()]
-    lines += [
-        f"{spoken(robot)}, {spoken(task).lower()}: its planner was not judged; `--controllers policy,planner` does so, "
-        "in an hour or two."
-        for robot, task in _planners_left_out(document)
-    ]
     compared = [entry for entry in document["pairs"] if entry["same_at_64_worlds"] is not None]
     if compared:
         same = sum(entry["same_at_64_worlds"] for entry in compared)

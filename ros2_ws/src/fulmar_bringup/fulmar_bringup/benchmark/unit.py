@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
@@ -16,7 +15,7 @@ import numpy as np
 from fulmar_bringup.benchmark.bound_file import cached_bound
 from fulmar_bringup.benchmark.judged import QUANTILES, Judged
 from fulmar_bringup.benchmark.thesis import CONTROL_HZ, GOAL_STEPS
-from fulmar_bringup.evaluation import Progress, Tally, Trial, runs_of, together
+from fulmar_bringup.evaluation import Progress, Tally, Trial, runs_of
 from fulmar_core.episode import Episode, episode_steps
 from fulmar_core.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.planar import wrapped
@@ -28,11 +27,8 @@ if TYPE_CHECKING:
 KEPT = 48  # episodes whose paths are kept
 FEW_WORLDS = 64  # of the second run in batch, which must give the same numbers
 COMPARED = 256  # episodes of that second run
-FEW_AT_ONCE = 8  # the same for controllers that take few episodes at once, of one such batch
-_KEY_DIGITS = 16  # of a key, in the name of a folder
 # How long one step takes, in steps of a batch; for the progress bar.
 STEP_COSTS = {"batch": 1.0, "mujoco": 120.0, "ros": 600.0}
-PLANNED_COST = 3000.0  # of a step of a controller that takes seconds for an episode, whatever moves
 
 
 class Extra:
@@ -82,20 +78,10 @@ class Unit:
         return self.folder / f"{self.name}.npz"
 
     @property
-    def parts(self) -> Path:
-        """Folder of what is done of it so far, by controllers that take long."""
-        return self.folder / f"{self.name}_{self.key[:_KEY_DIGITS]}"
-
-    def forget_parts(self) -> None:
-        """Remove what was done of it by halves, also by code and configuration that are no more."""
-        for folder in self.folder.glob(f"{self.name}_{'[0-9a-f]' * _KEY_DIGITS}"):
-            shutil.rmtree(folder, ignore_errors=True)
-
-    @property
     def cost(self) -> float:
         """How long it takes, in steps of a batch."""
         steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
-        return steps * _step_cost(self.trial)
+        return steps * STEP_COSTS[self.trial.through]
 
     def done_before(self) -> Judged | None:
         """The outcome of an earlier run with the same key, if there is one."""
@@ -111,16 +97,14 @@ def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, Judged]:
 
     Args:
         units: What is to be done.
-        fresh: Do all of it again: nothing is known, and what was done by halves is forgotten.
+        fresh: Do all of it again: nothing is known.
 
     Returns:
         Their outcomes.
     """
     known = {}
     for unit in units:
-        if fresh:
-            unit.forget_parts()
-        elif (before := unit.done_before()) is not None:
+        if not fresh and (before := unit.done_before()) is not None:
             known[unit] = before
     return known
 
@@ -137,12 +121,12 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         The outcome.
     """
     began = time.monotonic()
-    trial, weight = _long(unit.trial), _step_cost(unit.trial)
+    trial, weight = _long(unit.trial), STEP_COSTS[unit.trial.through]
     short = unit.trial.task
     steps = episode_steps(short, _control_dt(trial))
     tally, errors, kept, extra = Tally(short), [], _Kept(), unit.extra()
     goals: list[np.ndarray] = []
-    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool, keep=unit.parts):
+    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool):
         beginning = first_steps(run, steps)
         tally.add(beginning)
         errors.append(_main_column(run, short))
@@ -171,7 +155,6 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         more=extra.arrays(),
     )
     outcome.save(unit.path)
-    unit.forget_parts()
     return outcome
 
 
@@ -202,15 +185,11 @@ def _control_dt(trial: Trial) -> float:
     return robot.timing.substeps(trial.plan.control_hz) * robot.timing.physics_dt
 
 
-def _step_cost(trial: Trial) -> float:
-    return STEP_COSTS[trial.through] + (PLANNED_COST if together(trial) else 0.0)
-
-
 def _long(trial: Trial) -> Trial:
     """The same trial, in the batch as long as the thesis counts waypoints for, where that is longer."""
     task = trial.task
-    if trial.through != "batch" or not counts_targets(task) or together(trial):
-        return trial  # whoever takes seconds for an episode plans for its end
+    if trial.through != "batch" or not counts_targets(task):
+        return trial
     seconds = max(task.episode_s, GOAL_STEPS * max(_control_dt(trial), 1.0 / CONTROL_HZ))
     return replace(trial, plan=replace(trial.plan, duration_s=seconds))
 
@@ -265,10 +244,9 @@ def _count_goals(
 
 def _same_with_few_worlds(trial: Trial, figures: dict[str, np.ndarray]) -> tuple[bool, int]:
     """Whether the first episodes give the same numbers in small batches, bit for bit."""
-    most = together(trial)
-    count = min(most or COMPARED, trial.episodes)
+    count = min(COMPARED, trial.episodes)
     tally = Tally(trial.task)
-    for run in runs_of(replace(trial, episodes=count, worlds=FEW_AT_ONCE if most else FEW_WORLDS, jobs=1)):
+    for run in runs_of(replace(trial, episodes=count, worlds=FEW_WORLDS)):
         tally.add(run)
     again = tally.figures
     same = all(

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from fulmar_bringup.benchmark.judged import Judged
 from fulmar_bringup.benchmark.unit import Unit, judge
-from fulmar_bringup.evaluation import together
 from fulmar_bringup.pools import begin_worker, counted, ended_with_us, one_thread_each
 from fulmar_core.errors import RunFailed
 
@@ -25,7 +24,7 @@ Done = Callable[[Unit, Outcome], None]
 def do_all(
     units: list[Unit], *, jobs: int, progress: Callable[[float], None], on_done: Done
 ) -> dict[Unit, Outcome]:
-    """Do units, the costliest first; those that use all cores themselves after the others.
+    """Do units, the costliest first; those through ros, which use all cores themselves, after the others.
 
     Args:
         units: What to do.
@@ -47,16 +46,11 @@ def do_all(
 
     ordered = sorted(units, key=lambda unit: -unit.cost)
     ros = [unit for unit in ordered if unit.trial.through == "ros"]
-    parted = [unit for unit in ordered if unit not in ros and together(unit.trial)]
-    pooled = [unit for unit in ordered if unit not in ros and unit not in parted]
+    pooled = [unit for unit in ordered if unit not in ros]
     if pooled:
         _in_a_pool(pooled, min(jobs, len(pooled)), progress, note)
-    done = sum(unit.cost for unit in pooled)
-    for unit in parted:
-        note(unit, _outcome_of(unit, _beyond(done, progress)))
-        done += unit.cost
     if ros:
-        _through_ros(ros, jobs, done, progress, note)
+        _through_ros(ros, jobs, sum(unit.cost for unit in pooled), progress, note)
     return outcomes
 
 

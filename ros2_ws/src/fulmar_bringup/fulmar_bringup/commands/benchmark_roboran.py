@@ -37,8 +37,7 @@ def roboran(
         str,
         typer.Option(
             metavar="K,...",
-            help="policy: the shipped bundles. planner: plans that begin from them (hours). classical: the laws of "
-            "the families.",
+            help="policy: the shipped bundles. classical: the laws of the families.",
         ),
     ] = "policy",
     policies: Annotated[

@@ -49,7 +49,7 @@ def evaluate(
         typer.Option(
             metavar="N",
             min=1,
-            help="Number of episodes; 4,096 in the batch, 256 elsewhere and for a planner.",
+            help="Number of episodes; 4,096 in the batch, 256 elsewhere.",
         ),
     ] = None,
     seed: SeedOption = JUDGE_SEED,
@@ -63,7 +63,7 @@ def evaluate(
         typer.Option(
             metavar="N",
             min=1,
-            help="Processes at once, through ros and for a planner; one for each core.",
+            help="Processes at once, through ros; one for each core.",
         ),
     ] = None,
     episode_s: Annotated[
@@ -106,7 +106,7 @@ def evaluate(
     )
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import checked_rate, chosen_policy
-    from fulmar_bringup.system import CONTROLLERS, check_names, modules_of
+    from fulmar_bringup.system import check_names, modules_of
     from fulmar_core.calibration import use_calibration
     from fulmar_core.disturbances.scenario import check_delays, load_scenario
     from fulmar_core.robot import load_robot
@@ -146,9 +146,7 @@ def evaluate(
         duration_s=duration_s,
         lockstep=True,
     )
-    episodes = episodes or (
-        BATCH_EPISODES if through == "batch" and not CONTROLLERS[controller].together else EPISODES
-    )
+    episodes = episodes or (BATCH_EPISODES if through == "batch" else EPISODES)
     trial = Trial(plan, through, episodes, worlds or WORLDS, jobs or _cores(), bounds or BOUNDED_EPISODES)
     began = time.monotonic()
     with step_bar("judging", episodes * episode_steps(trial.task, control_dt)) as progress:

@@ -25,7 +25,6 @@ CONTROLLER_COLOURS = {
     "lqr": "#d9780f",
     "mpc": "#a23b9e",
     "lqr_drift": "#8a6d3b",
-    "planner": "#c2477f",
     "classical": "#1a9e84",
     "excite": "#777777",
 }

@@ -18,7 +18,6 @@ SPOKEN = {
     "mpc": "MPC",
     "lqr_drift": "DRIFT's LQR",
     "policy": "policy",
-    "planner": "planner",
     "classical": "classical law",
     "excite": "excitation",
 }

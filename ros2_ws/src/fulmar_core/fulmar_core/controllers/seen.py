@@ -11,7 +11,6 @@ from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.obstacles import FAR, SIGHT
-from fulmar_core.tasks.passing import IN_ORDER
 from fulmar_core.tasks.terms import HEADING_TERMS
 from fulmar_core.tasks.ways import TOUCHING
 
@@ -73,11 +72,6 @@ class Reader:
         """Way from the current target to the one after it, in the body's frame."""
         (x, y), (next_x, next_y) = self._along(observation, "goal"), self._along(observation, "next_goal")
         return next_x - x, next_y - y
-
-    def in_sight(self, observation: np.ndarray) -> list[Vector]:
-        """Ways to the targets that are seen one after another, from the current one on, in the body's frame."""
-        seen = [name for name in IN_ORDER if f"{name}_distance" in self._column]
-        return [self._along(observation, name) for name in seen]
 
     def turn(self, observation: np.ndarray) -> np.ndarray:
         """Wanted heading minus heading, shape (...,) in [-pi, pi] [rad]."""

@@ -5,11 +5,8 @@ from __future__ import annotations
 import threading
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
-
-from fulmar_core.controllers.controller import Controller
 
 KEPT_NS = 3_000_000_000  # of the past; longer than any interval between two measurements that is learned from
 
@@ -30,27 +27,6 @@ class Applied:
     def duration_s(self) -> float:
         """All of them together [s]."""
         return float(self.seconds.sum())
-
-
-@runtime_checkable
-class ActuatorObserver(Protocol):
-    """A controller with an observer that compares actuators with motion; `Controller` itself does not ask for it."""
-
-    def see_applied(self, applied: Applied | None) -> None:
-        """Receive what the actuators did since the last observation, right before `act`.
-
-        Without this call the observer takes the controller's own command for it.
-
-        Args:
-            applied: For one robot; None where it is not known, and nothing can be learned from the motion.
-        """
-        ...
-
-
-def report_applied(controller: Controller, applied: Applied | None) -> None:
-    """Give a controller's observer, if it has one, what the actuators did since its last observation."""
-    if isinstance(controller, ActuatorObserver):
-        controller.see_applied(applied)
 
 
 class AppliedHistory:

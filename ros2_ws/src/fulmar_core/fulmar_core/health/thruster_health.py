@@ -12,7 +12,7 @@ A lost valve stays closed, and under a shared pressure line leaves its share to 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -41,6 +41,10 @@ class Health:
     held: (
         np.ndarray
     )  # (...,) whether something keeps the body from moving: then nothing is learned of the others
+
+    def of(self, row: int) -> Health:
+        """What is believed of one of several robots."""
+        return Health(*(getattr(self, field.name)[row] for field in fields(self)))
 
 
 class ThrusterHealth:
