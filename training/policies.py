@@ -7,7 +7,7 @@ import itertools
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -71,10 +71,11 @@ def load_policy_table() -> PolicyTable:
 def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
     """Hash of everything a policy is made from: robot, task, scenario, settings, seed and number of updates.
 
-    What is at its default does not count, so that a new option leaves policies that do without it as they are.
+    What is at its default does not count, so that a new option leaves policies that do without it as they are. The air
+    bearing does not count either: worlds that train float always.
     """
     ingredients = {
-        "robot": _chosen(load_robot(policy.robot)),
+        "robot": _chosen(replace(load_robot(policy.robot), air_bearing=False)),
         "task": _chosen(load_task(policy.task)),
         "scenario": _chosen(load_scenario(settings.scenario)),
         "settings": _chosen(settings),

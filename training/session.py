@@ -1,4 +1,4 @@
-"""What happens between two updates of a run: checks, checkpoints, the curriculum, and its end."""
+"""What happens between two updates of a run: checks, checkpoints, refinement, and its end."""
 
 from __future__ import annotations
 
@@ -138,7 +138,6 @@ class Session(BaseCallback):
         story.elapsed_s = self.elapsed_s
         progress = self._limits.progress(story.elapsed_s, story.updates)
         self._watcher.advance(progress, story.elapsed_s, self._steps)
-        self._worlds.set_strength(self._settings.strength(progress))
         if self._settings.refinement:
             self._worlds.set_effort(self._settings.effort(progress))
             self.model.ent_coef = self._settings.entropy(progress)  # type: ignore[attr-defined]

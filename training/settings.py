@@ -120,23 +120,6 @@ Algorithm = Ppo | RecurrentPpo | Sac | Td3
 
 
 @dataclass(frozen=True)
-class Curriculum:
-    """The scenario grows from a share of its strength to all of it, linearly over part of the run."""
-
-    start: float  # strength at the beginning, 0: nominal [-]
-    until: float  # share of the run after which it is whole [-]
-
-    def __post_init__(self) -> None:
-        """Refuse shares that are none."""
-        if not (0.0 <= self.start <= 1.0 and 0.0 < self.until <= 1.0):
-            raise ValueError("'start' must lie in [0, 1] and 'until' in (0, 1].")
-
-    def strength(self, progress: float) -> float:
-        """Strength of the scenario, where `progress` is the share of the run that is over [-]."""
-        return min(1.0, self.start + (1.0 - self.start) * progress / self.until)
-
-
-@dataclass(frozen=True)
 class Refinement:
     """Economy and precision, later in a run: dearer commands, less exploring and smaller updates, all linearly."""
 
@@ -226,7 +209,6 @@ class TrainingSettings:
     evaluate_every_s: float  # [s]
     checkpoint_every_s: float = 30.0  # wall-clock between checkpoints to resume from [s]
     threads: int = 1  # of PyTorch, each on a core of its own; in deep networks a second one gains a fifth
-    curriculum: Curriculum | None = None
     refinement: Refinement | None = None  # of ppo and recurrent_ppo
     stop_at_success: StopAtSuccess | None = None
     specialist: SpecialistPlan | None = None
@@ -299,10 +281,6 @@ class TrainingSettings:
                 f"'course_reward': task '{task.name}' has no waypoints. Leave 'course_reward' out."
             )
         return replace(task, reward_weights=replace(own, **new))
-
-    def strength(self, progress: float) -> float:
-        """Strength of the scenario when this share of the run is over [-]."""
-        return self.curriculum.strength(progress) if self.curriculum else 1.0
 
     def effort(self, progress: float) -> float:
         """Factor on what using the actuators costs when this share of the run is over [-]."""

@@ -129,7 +129,6 @@ def train(
         worlds=settings.worlds,
         seed=seed,
         reward_scale=settings.reward_scale,
-        strength=settings.strength(0.0),
         told=settings.told,
         wrench=settings.wrench,
         gas=settings.gas,

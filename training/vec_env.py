@@ -53,7 +53,6 @@ class BatchVecEnv(VecEnv):
         seed: int,
         reward_scale: float = 1.0,
         training: bool = True,
-        strength: float = 1.0,
         staggered: bool = True,
         told: bool = False,
         wrench: bool = False,
@@ -73,7 +72,6 @@ class BatchVecEnv(VecEnv):
             seed: Seed of every draw.
             reward_scale: Factor on the rewards.
             training: Start episodes where learning starts.
-            strength: How much of the scenario counts, from 0 to 1; may be moved later by `set_strength` [-].
             staggered: First episodes have random lengths.
             told: Observations also tell pushes and dead valves (`fulmar_core.controllers.disturbance_inputs`).
             wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
@@ -101,7 +99,7 @@ class BatchVecEnv(VecEnv):
         self.takes_orders, self.hold = orders_held > 0, max(orders_held, 1)
         self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
         self._compiled = compiled
-        self._begin(strength)
+        self._begin()
         self._horizon = episode_steps(task, self.simulation.control_dt)
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
@@ -117,7 +115,7 @@ class BatchVecEnv(VecEnv):
         self._age = np.zeros(worlds, dtype=int)
         self._actions = np.zeros((worlds, count), dtype=np.float32)
 
-    def _begin(self, strength: float) -> None:
+    def _begin(self) -> None:
         """Build the worlds anew."""
         self.simulation = BatchSimulation(
             self.robot,
@@ -126,7 +124,6 @@ class BatchVecEnv(VecEnv):
             worlds=self._worlds,
             seed=self._seed,
             training=self._training,
-            strength=strength,
         )
         self._observed_step = step_of(self.simulation, compiled=self._compiled)
 
@@ -148,10 +145,6 @@ class BatchVecEnv(VecEnv):
         if self._told:
             self._told.set_state(state["told"])
 
-    def set_strength(self, strength: float) -> None:
-        """How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-]."""
-        self.simulation.strength = strength
-
     def set_effort(self, factor: float) -> None:
         """What using the actuators costs from now on, as a multiple of the robot's own costs [-]."""
         self._effort = factor * self.robot.costs.effort
@@ -163,7 +156,7 @@ class BatchVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """Begin anew in every world; returns the observations, shape (worlds, n)."""
-        self._begin(self.simulation.strength)
+        self._begin()
         rng = np.random.Generator(np.random.Philox(self._seed))
         self._age = rng.integers(0, self._horizon if self._staggered else 1, self.num_envs)
         self.reset_infos = [{} for _ in range(self.num_envs)]

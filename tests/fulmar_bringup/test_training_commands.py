@@ -159,6 +159,21 @@ def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):
     assert "success 0.875 of 16 episodes in MuJoCo" in told
 
 
+@pytest.mark.parametrize(
+    ("more", "line"),
+    [
+        ((), "to end it once the task is learned: --stop-at-success 0.99"),
+        (("--stop-at-success", 0.9), "ends early after 2 checks in a row with success 0.9 or more"),
+    ],
+    ids=["offered", "asked for"],
+)
+def test_training_says_when_it_ends_early(learned, monkeypatch, tmp_path, more, line):
+    printed = io.StringIO()
+    monkeypatch.setattr("fulmar_bringup.commands.train.console", Console(file=printed, width=500))
+    assert call(train, *PLATFORM, *more, "--out", tmp_path / "run")[0] == 0
+    assert line in printed.getvalue()
+
+
 def test_the_rate_of_the_commands_may_be_another_than_the_robot_s(learned, tmp_path):
     from fulmar_core.robot import load_robot
 

@@ -115,9 +115,9 @@ PARTS = {
 }
 
 
-def worlds(scenario, robot=PLATFORM, *, count=COUNT, strength=1.0, seed=7):
+def worlds(scenario, robot=PLATFORM, *, count=COUNT, seed=7):
     draws = Draws(seed, np.arange(count), np.zeros(count), WORLD)
-    return draw_world(robot, scenario, draws, strength=strength)
+    return draw_world(robot, scenario, draws)
 
 
 def fills(values, low, high):
@@ -141,26 +141,6 @@ def test_an_entry_changes_what_it_says_and_nothing_else(robot, entry):
     differing = {name for name in FIELDS if not np.array_equal(getattr(before, name), getattr(after, name))}
     without_sense = {"drag"} if robot is PLATFORM else {"opening_delay"}  # in air; of propellers
     assert differing == meant - without_sense
-
-
-@pytest.mark.parametrize(
-    "scenario", [*map(load_scenario, config_names("scenarios")), ALL], ids=lambda s: s.title[:20]
-)
-@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
-def test_at_strength_0_a_scenario_is_the_nominal_robot_in_a_still_world(robot, scenario):
-    calm = worlds(SEEING if scenario.sensor_noise else STILL, robot, count=50)
-    weak = worlds(scenario, robot, count=50, strength=0.0)
-    idle = {"wave_number", "kick_period"}  # of waves and kicks without force
-    for name in set(FIELDS) - idle:
-        np.testing.assert_array_equal(getattr(weak, name), getattr(calm, name), err_msg=name)
-
-
-def test_half_the_strength_is_half_of_the_way():
-    level = replace(ALL, slope=Slope())  # downhill is a product of the slope and of the mass, which both grow
-    calm, half, full = (worlds(level, BOAT, count=100, strength=s) for s in (0.0, 0.5, 1.0))
-    for name in set(FIELDS) - {"alive"}:
-        middle = 0.5 * (getattr(calm, name) + getattr(full, name))
-        np.testing.assert_allclose(getattr(half, name), middle, rtol=1e-9, atol=1e-12, err_msg=name)
 
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)

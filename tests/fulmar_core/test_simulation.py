@@ -184,26 +184,6 @@ def test_a_task_that_begins_anew_again_and_again_stays_finite(robot, task):
         assert np.isfinite(simulation.observe()).all()
 
 
-@EACH_ROBOT
-@pytest.mark.parametrize("scenario", config_names("scenarios"))
-def test_at_strength_0_every_scenario_moves_as_the_nominal_robot_does(robot, scenario):
-    scenario = load_scenario(scenario)
-    weak = run(build(scenario, robot, strength=0.0), 15)
-    calm = run(build(replace(STILL, sensor_noise=scenario.sensor_noise), robot), 15)
-    for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(weak.truth, name), getattr(calm.truth, name))
-        np.testing.assert_array_equal(getattr(weak.measured, name), getattr(calm.measured, name))
-
-
-def test_strength_may_rise_while_worlds_run_and_counts_from_their_next_episode():
-    simulation = build(replace(STILL, body="uncertain"), strength=0.0)
-    assert np.all(simulation.world.mass == np.float32(PLATFORM.body.mass))
-    simulation.strength = 1.0
-    simulation.reset([0, 1])
-    nominal = simulation.world.mass == np.float32(PLATFORM.body.mass)
-    assert nominal.tolist() == [False, False, True, True, True]
-
-
 ACTS = {
     "push": {"push": Push(0.3, 0.3, least=0.5)},
     "wave": {"wave": Wave(0.5, 0.5)},

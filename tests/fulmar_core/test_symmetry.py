@@ -62,9 +62,7 @@ def test_a_mirrored_situation_is_seen_as_the_mirror_says(robot, task, alike):
 def test_mirrored_commands_drive_the_mirrored_way(robot, alike):
     the_robot, task = load_robot(robot), load_task("go_to_position")
     mirror = Mirror.of(the_robot, task, alike)
-    simulation = BatchSimulation(
-        the_robot, task, load_scenario("nominal"), worlds=2, seed=1, training=False, strength=1.0
-    )
+    simulation = BatchSimulation(the_robot, task, load_scenario("nominal"), worlds=2, seed=1, training=False)
     state = simulation.truth
     for name in ("x", "y", "yaw", "vx", "vy", "yaw_rate"):
         getattr(state, name)[:] = 0.0

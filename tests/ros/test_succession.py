@@ -17,6 +17,7 @@ from fulmar_bringup.robot_operator import Operator
 from fulmar_core.bundle_signature import make_keys, sign_bundle
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.errors import FulmarError, RunFailed
+from fulmar_core.health.beliefs import Beliefs
 from fulmar_core.topics import METADATA, SWAP
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -242,11 +243,14 @@ def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_ag
     person = Operator(neighbour.node)
     with pytest.raises(RunFailed, match="no controller of 'floating_platform'"):
         person.say_swap(ROBOT, "x", find_s=0.3, answer_s=0.1)
-    start(policy=SHIPPED)
+    node = start(policy=SHIPPED)
     odometry = Stream(neighbour)
     second = str(copy_of(tmp_path, "second"))
+    node._beliefs = Beliefs(("thruster_1",), ("valve thruster_1 believed dead",))
+    until(lambda: values(neighbour)["beliefs"] != "")
     for number in (1, 2):
         assert person.say_swap(ROBOT, second, find_s=5.0, answer_s=10.0) == f"done {second}"
         assert loaded == [second] * number
+    until(lambda: values(neighbour)["beliefs"] == "")  # the one before believed it
     odometry.stop()
     assert dropped == [second] * 2

@@ -45,6 +45,17 @@ def test_the_table_names_every_policy_that_shall_ship():
     assert names == wanted
 
 
+def test_every_shipped_policy_is_up_to_date_with_what_it_is_made_from(tmp_path):
+    told = {
+        "episodes": 1,
+        "command": "",
+        "git_revision": "",
+        "runs": tmp_path,
+        "bundles": policies_directory(),
+    }
+    assert [one.name for one in load_policy_table().policies if not is_made(policy_job(one, **told))] == []
+
+
 def test_making_all_of_them_takes_under_ninety_minutes():
     table = load_policy_table()
     jobs = [

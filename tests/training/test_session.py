@@ -18,7 +18,7 @@ from fulmar_core.tasks import load_task
 from training.checkpoint import load_checkpoint
 from training.fast_ppo import FastPPO
 from training.run_folder import CHECKPOINT_FILE, SETTINGS_FILE, TENSORBOARD_FOLDER, read_run_record
-from training.settings import Curriculum, Refinement, StopAtSuccess, load_training_settings
+from training.settings import Refinement, StopAtSuccess, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -39,8 +39,7 @@ def small(name):
         )
     if hasattr(algorithm, "memory"):
         algorithm = replace(algorithm, memory=4)
-    curriculum = Curriculum(0.0, 0.5)
-    return replace(settings, algorithm=algorithm, worlds=16, evaluate_every_s=1e6, curriculum=curriculum)
+    return replace(settings, algorithm=algorithm, worlds=16, evaluate_every_s=1e6)
 
 
 def weights(folder, settings):
@@ -80,9 +79,7 @@ def test_a_resumed_run_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_pa
     settings = small(name)
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     train(TURTLEBOT, TASK, settings, seed=1, out=whole, updates=6)
-    # The first part has the curriculum of the whole run, and ends in the middle of it.
-    first = replace(settings, curriculum=Curriculum(0.0, 1.0))
-    train(TURTLEBOT, TASK, first, seed=1, out=parts, updates=3)
+    train(TURTLEBOT, TASK, settings, seed=1, out=parts, updates=3)
     torch.manual_seed(99)
     np.random.seed(99)
     record = train(TURTLEBOT, TASK, settings, seed=1, out=parts, updates=6, resume=True)
@@ -203,13 +200,6 @@ def test_a_disk_that_has_no_room_for_a_checkpoint_costs_not_the_network(
     if left == "a check":
         record = read_run_record(tmp_path)
         assert (record["updates"], record["interrupted"]) == (3, True)
-
-
-def test_the_curriculum_reaches_the_worlds(tmp_path, quick_judge, monkeypatch):
-    told = []
-    monkeypatch.setattr(BatchVecEnv, "set_strength", lambda self, strength: told.append(strength))
-    train(TURTLEBOT, TASK, small("differential_drive"), seed=1, out=tmp_path, updates=4)
-    assert told == pytest.approx([0.0, 0.5, 1.0, 1.0, 1.0])
 
 
 def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypatch):

@@ -12,7 +12,6 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.settings import (
     CourseReward,
-    Curriculum,
     Refinement,
     StopAtSuccess,
     load_training_settings,
@@ -45,7 +44,7 @@ def test_a_file_of_the_pair_s_own_name_replaces_the_family_s(monkeypatch, tmp_pa
 @pytest.mark.parametrize("name", ["thrusters", "recurrent_ppo", "sac", "td3"])
 def test_what_is_written_is_what_is_read(tmp_path, name):
     settings = load_training_settings(TURTLEBOT, TASK, name)
-    settings = replace(settings, curriculum=Curriculum(0.2, 0.5), stop_at_success=StopAtSuccess(0.995))
+    settings = replace(settings, stop_at_success=StopAtSuccess(0.995))
     settings = replace(settings, course_reward=CourseReward(3.0, 30.0))
     write_training_settings(settings, tmp_path / "settings.yaml")
     assert load_training_settings(TURTLEBOT, TASK, str(tmp_path / "settings.yaml")) == settings
@@ -69,11 +68,6 @@ def test_an_unknown_algorithm_names_the_line(tmp_path):
     (tmp_path / "wrong.yaml").write_text("scenario: nominal\nalgorithm:\n  kind: pppo\n")
     with pytest.raises(ConfigError, match=r"wrong\.yaml:3: 'kind' = 'pppo' is not known"):
         load_training_settings(PLATFORM, TASK, str(tmp_path / "wrong.yaml"))
-
-
-@pytest.mark.parametrize(("progress", "strength"), [(0.0, 0.2), (0.25, 0.6), (0.5, 1.0), (0.9, 1.0)])
-def test_a_curriculum_grows_until_the_scenario_is_whole(progress, strength):
-    assert Curriculum(0.2, 0.5).strength(progress) == pytest.approx(strength)
 
 
 @pytest.mark.parametrize(
@@ -117,12 +111,6 @@ def test_a_learner_that_weighs_entropy_by_itself_takes_no_refinement():
         replace(settings, refinement=Refinement(0.2, 0.6, 3.0, 0.0))
 
 
-def test_without_a_curriculum_the_scenario_is_whole_from_the_start():
-    settings = load_training_settings(PLATFORM, TASK)
-    assert settings.curriculum is None
-    assert settings.strength(0.0) == 1.0
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -159,12 +147,6 @@ def test_hyper_parameters_that_no_learner_can_do_with_are_refused(name, change, 
     settings = load_training_settings(load_robot("turtlebot2"), TASK, name)
     with pytest.raises(ValueError, match=words):
         replace(settings.algorithm, **change)
-
-
-@pytest.mark.parametrize("values", [(-0.1, 0.5), (0.5, 0.0), (0.5, 1.5)])
-def test_a_curriculum_of_impossible_shares_is_refused(values):
-    with pytest.raises(ValueError, match="must lie in"):
-        Curriculum(*values)
 
 
 @pytest.mark.parametrize("values", [(0.0, 2), (1.1, 2), (0.9, 0)])

@@ -67,7 +67,6 @@ def draw_episodes(
     numbers: np.ndarray,
     repeats: np.ndarray | None = None,
     training: bool = False,
-    strength: float = 1.0,
 ) -> Episode:
     """Draw episodes.
 
@@ -79,7 +78,6 @@ def draw_episodes(
         numbers: Numbers of the episodes, or of the worlds they run in, shape (n,), >= 0.
         repeats: How many episodes each of these worlds has had before, shape (n,); none by default.
         training: Start where learning starts instead of where judging does.
-        strength: How much of the scenario counts, from 0 to 1 [-].
 
     Returns:
         As many episodes.
@@ -87,7 +85,7 @@ def draw_episodes(
     numbers = np.asarray(numbers)
     repeats = np.zeros_like(numbers) if repeats is None else repeats
     start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)
-    world = draw_world(robot, scenario, Draws(seed, numbers, repeats, WORLD), strength=strength)
+    world = draw_world(robot, scenario, Draws(seed, numbers, repeats, WORLD))
     return Episode(start, goal, world)
 
 

@@ -52,7 +52,6 @@ def batches(
     *,
     episodes: int,
     seed: int,
-    first: int = 0,
     worlds: int = WORLDS,
     progress: Progress = lambda steps: None,
 ) -> Iterator[Trajectories]:
@@ -65,7 +64,6 @@ def batches(
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
-        first: Number of the first of them, >= 0.
         worlds: How many run at once, >= 1; what happens does not depend on it.
         progress: Told how many control steps have been done.
 
@@ -83,7 +81,7 @@ def batches(
             scenario,
             worlds=count,
             seed=seed,
-            first=first + done,
+            first=done,
             control_hz=controller.control_hz,
         )
         before = done * episode_steps(task, simulation.control_dt)
@@ -102,7 +100,6 @@ def roll_out_in_backends(
     *,
     episodes: int,
     seed: int,
-    first: int = 0,
     progress: Progress = lambda steps: None,
 ) -> Trajectories:
     """Run some episodes of a seed, each in a backend of its own, stepped side by side.
@@ -114,7 +111,6 @@ def roll_out_in_backends(
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
-        first: Number of the first of them, >= 0.
         progress: Told how many control steps have been done.
 
     Returns:
@@ -129,9 +125,8 @@ def roll_out_in_backends(
         for _ in range(min(episodes, SIDE_BY_SIDE)):
             backends.append(make_backend())
             stack.callback(backends[-1].close)
-        end = first + episodes
-        for number in range(first, end, SIDE_BY_SIDE):
-            numbers = range(number, min(number + SIDE_BY_SIDE, end))
+        for number in range(0, episodes, SIDE_BY_SIDE):
+            numbers = range(number, min(number + SIDE_BY_SIDE, episodes))
             done = sum(run.position_error.size for run in runs)
 
             def further(steps: int, done: int = done) -> None:

@@ -37,12 +37,11 @@ class BatchSimulation(Moves):
         measured: What the odometry reports of it.
         goal: Goal of each world.
         command: What was last commanded, after every limit, shape (worlds, n).
-        strength: How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-].
     """
 
     MOVING = (
         "truth", "measured", "goal", "world", "command",
-        "_strength", "_repeats", "_steps", "_noise_keys",
+        "_repeats", "_steps", "_noise_keys",
     )  # fmt: skip
 
     truth: PlanarState
@@ -61,7 +60,6 @@ class BatchSimulation(Moves):
         first: int = 0,
         control_hz: float | None = None,
         training: bool = False,
-        strength: float = 1.0,
         xp: Any = np,
         device: Any = None,
         dtype: Any = None,
@@ -77,13 +75,12 @@ class BatchSimulation(Moves):
             first: Number of the first world, >= 0.
             control_hz: Command rate; the robot's own by default [Hz].
             training: Start episodes where learning starts.
-            strength: How much of the scenario counts [-].
             xp: Array library: NumPy, or torch.
             device: Where its arrays live, for torch.
             dtype: Floating type; the library's float32 by default.
         """
         self.robot, self.task, self.scenario, self.seed = robot, fitted(task, robot), scenario, seed
-        self.worlds, self.training, self._strength = worlds, training, strength
+        self.worlds, self.training = worlds, training
         self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
         self.observer = Observer(robot, task)
@@ -113,17 +110,6 @@ class BatchSimulation(Moves):
         self._upcoming = UpcomingEpisodes(self._draw, worlds)
         self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
         self._measure()
-
-    @property
-    def strength(self) -> float:
-        """How much of the scenario counts in episodes that begin from now on, from 0 to 1 [-]."""
-        return self._strength
-
-    @strength.setter
-    def strength(self, strength: float) -> None:
-        if strength != self._strength:
-            self._strength = strength
-            self._upcoming.forget()
 
     @property
     def control_dt(self) -> float:
@@ -269,7 +255,6 @@ class BatchSimulation(Moves):
             numbers=self._first + worlds,
             repeats=repeats,
             training=self.training,
-            strength=self._strength,
         )
         return (
             PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS)),

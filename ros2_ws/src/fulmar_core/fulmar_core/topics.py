@@ -86,8 +86,8 @@ ACTUATORS_HEALTH = Wire(
     "sensor_msgs/msg/JointState",
     "controller",
     "stream",
-    "control rate, where there are thrusters",
-    "share of its thrust that each valve is believed to give, 0 to 1; `effort` by actuator name",
+    "control rate, from a controller that estimates it",
+    "share of its thrust that each valve gives by the controller's own estimate, 0 to 1; `effort` by actuator name",
 )
 CLOCK = Wire(
     "/clock",

@@ -203,7 +203,8 @@ class ControllerNode(LifecycleNode):
         return load_other(self._make_controller, self.robot, self.task, self.settings, folder)
 
     def _announce(self) -> None:
-        """Publish the identity of the controller that acts from now on."""
+        """Publish the identity of the controller that acts from now on; estimates begin anew."""
+        self._beliefs = Beliefs()
         self.wires.publish_metadata(self._guarded.succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:

@@ -221,6 +221,7 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     with learning_in(job.out):
         if not resumes and (job.out / START_FILE).exists():  # since we looked
             raise ConfigError(f"{job.out}: another training began there. Give --out another folder.")
+        console.print(_when_it_ends_early(job), markup=False, soft_wrap=True)
         try:
             record = learn(job, LearningBar(job.out))
         except KeyboardInterrupt:
@@ -238,6 +239,14 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
         f"next: fulmar export {job.out} --out DIR",
         markup=False,
     )
+
+
+def _when_it_ends_early(job: Job) -> str:
+    """One line on `--stop-at-success`: what was asked for, or what to ask for."""
+    enough = job.settings.stop_at_success
+    if enough is None:
+        return "learns for all of its time; to end it once the task is learned: --stop-at-success 0.99"
+    return f"ends early after {enough.checks} checks in a row with success {enough.rate:g} or more"
 
 
 def _tell_how_to_go_on(run: Path) -> None:

@@ -249,7 +249,7 @@ def load_scenario(name: str) -> Scenario:
     return scenario
 
 
-def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: float = 1.0) -> World:
+def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     """Draw the worlds of some episodes.
 
     The same numbers are drawn whatever the scenario, so that episodes of one seed differ between scenarios in nothing
@@ -259,7 +259,6 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
         robot: Its body and the spans it is uncertain over.
         scenario: What may differ.
         draws: One row for each episode.
-        strength: How much of the scenario counts, from 0 (nominal) to 1; what a curriculum moves [-].
 
     Returns:
         Worlds of as many episodes as `draws` has.
@@ -269,7 +268,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     """
     check_delays(robot, scenario)
     count = len(robot.actuators.names)
-    uncertain = strength if scenario.body == "uncertain" else 0.0
+    uncertain = 1.0 if scenario.body == "uncertain" else 0.0
     spans = robot.uncertainty
     mass = _around(robot.body.mass, spans.mass, uncertain, draws)
     izz = _around(robot.body.inertia[2], spans.yaw_inertia, uncertain, draws)
@@ -281,7 +280,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     together = stranding_losses(robot, faults.failures) if faults.stranding else ()
     force, torque = robot.performance.force, robot.performance.torque
     push, wave, kick = scenario.push, scenario.wave, scenario.kick
-    size = strength * force * push.force * draws.uniform(push.least, 1.0)
+    size = force * push.force * draws.uniform(push.least, 1.0)
     direction = draws.uniform(-math.pi, math.pi)
     share = draws.uniform(-1.0, 1.0)
     twist = xp.sign(share) * (push.least + (1.0 - push.least) * xp.abs(share))
@@ -299,14 +298,15 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
     stiffness = draws.uniform(*tether.stiffness)
     reach, anchor_bearing = draws.uniform(0.0, tether.reach), draws.uniform(-math.pi, math.pi)
     lever, lever_bearing = draws.uniform(0.0, tether.lever), draws.uniform(-math.pi, math.pi)
-    fall = strength * 1e-3 * draws.uniform(*slope.milliradians)
+    fall = 1e-3 * draws.uniform(*slope.milliradians)
     opening_delay = draws.uniform(*faults.opening_delay_s)
     velocity_noise = draws.uniform(*sensing.velocity_noise)
     yaw_rate_noise = draws.uniform(*sensing.yaw_rate_noise)
     downhill = mass * GRAVITY * xp.sin(fall)
     valves = 1.0 if isinstance(robot.actuators, Thrusters) else 0.0
     low, high = faults.gain
-    gain = 1.0 + strength * (low + (high - low) * gain_share - 1.0)
+    # Sums with 1.0 keep their roundings, here and below: policies have learned from these very draws.
+    gain = 1.0 + (low + (high - low) * gain_share - 1.0)
     if robot.actuators.response.gain:
         gain = gain * xp.asarray(robot.actuators.response.gain, dtype=gain.dtype)
     own = 1.0 if scenario.sensor_noise else 0.0  # what the robot's YAML says of its sensors
@@ -318,44 +318,44 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws, *, strength: floa
         com_y=robot.body.center_of_mass[1] + offset * xp.sin(bearing),
         drag=drag,
         gain=gain.T,
-        alive=_survivors(lottery, chances, faults, strength, together),
-        action_noise=zero + strength * faults.noise * noise,
-        action_delay=strength * faults.delay_s * delay,
-        opening_delay=strength * valves * opening_delay,
+        alive=_survivors(lottery, chances, faults, together),
+        action_noise=zero + faults.noise * noise,
+        action_delay=faults.delay_s * delay,
+        opening_delay=valves * opening_delay,
         force_x=size * xp.cos(direction) + downhill * math.cos(math.radians(slope.direction_deg)),
         force_y=size * xp.sin(direction) + downhill * math.sin(math.radians(slope.direction_deg)),
-        torque=strength * torque * push.torque * twist,
-        wave_force=strength * force * wave.force * wave_size,
-        wave_torque=strength * torque * wave.torque * wave_size,
+        torque=torque * push.torque * twist,
+        wave_force=force * wave.force * wave_size,
+        wave_torque=torque * wave.torque * wave_size,
         wave_number=wave_number,
         wave_phase_x=phases[:, 0],
         wave_phase_y=phases[:, 1],
-        tether_stiffness=strength * stiffness,
-        tether_x=strength * lever * xp.cos(lever_bearing),
-        tether_y=strength * lever * xp.sin(lever_bearing),
-        anchor_x=strength * reach * xp.cos(anchor_bearing),
-        anchor_y=strength * reach * xp.sin(anchor_bearing),
-        kick=strength * force * kick.force * kick_size,
+        tether_stiffness=stiffness,
+        tether_x=lever * xp.cos(lever_bearing),
+        tether_y=lever * xp.sin(lever_bearing),
+        anchor_x=reach * xp.cos(anchor_bearing),
+        anchor_y=reach * xp.sin(anchor_bearing),
+        kick=force * kick.force * kick_size,
         kick_period=kick_period,
         kick_direction=kick_direction,
-        noise=zero + own * (1.0 + strength * (sensing.noise - 1.0)),
-        velocity_noise=strength * velocity_noise,
-        yaw_rate_noise=strength * yaw_rate_noise,
-        sensor_bias=(own * (1.0 + strength * (sensing.bias - 1.0)) * bias).T,
-        sensor_scale=(own * (1.0 + strength * (sensing.bias - 1.0)) * scale).T,
-        sensor_delay=strength * sensing.delay_s * sensor_delay,
-        dropout=strength * sensing.dropout * dropout,
+        noise=zero + own * (1.0 + (sensing.noise - 1.0)),
+        velocity_noise=velocity_noise,
+        yaw_rate_noise=yaw_rate_noise,
+        sensor_bias=(own * (1.0 + (sensing.bias - 1.0)) * bias).T,
+        sensor_scale=(own * (1.0 + (sensing.bias - 1.0)) * scale).T,
+        sensor_delay=sensing.delay_s * sensor_delay,
+        dropout=sensing.dropout * dropout,
     )
 
 
-def _around(nominal: float, span: Range, strength: float, draws: Draws) -> Array:
-    """Between the ends of a span; with less strength, nearer to the nominal value."""
+def _around(nominal: float, span: Range, uncertain: float, draws: Draws) -> Array:
+    """Between the ends of a span where the body is `uncertain` (1), the nominal value where it is not (0)."""
     drawn = draws.uniform(span[0], span[1])
-    return nominal + strength * (drawn - nominal)
+    return nominal + uncertain * (drawn - nominal)
 
 
 def _survivors(
-    lottery: Array, chances: Array, faults: Actuation, strength: float, together: tuple[tuple[int, ...], ...]
+    lottery: Array, chances: Array, faults: Actuation, together: tuple[tuple[int, ...], ...]
 ) -> Array:
     """1 for actuators that work, 0 for those that failed, shape (n, worlds).
 
@@ -363,7 +363,7 @@ def _survivors(
     `together`, the first lot says which, and they share the first chance.
     """
     xp = array_namespace(lottery)
-    chance = strength * faults.failure_chance
+    chance = faults.failure_chance
     if together:
         table = np.zeros((len(together), lottery.shape[1]), dtype=bool)
         for row, lost in zip(table, together, strict=True):

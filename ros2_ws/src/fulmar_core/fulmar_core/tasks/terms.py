@@ -25,7 +25,7 @@ class Start:
     """Where episodes begin, relative to the goal; headings are uniform over the circle."""
 
     distance: Range  # when judged [m]
-    training_distance: Range  # when learning; reaching down to 0 makes a curriculum [m]
+    training_distance: Range  # when learning; reaching down to 0 it holds near goals too [m]
     goal_area: float  # side of the square that goals are drawn from [m]
 
     def __post_init__(self) -> None:
