@@ -21,12 +21,7 @@ PROGRAMS = {
     "fulmar_ros/teleop_node": "fulmar_ros.teleop_node",
     "hardware_drivers/adapter_node": "hardware_drivers.adapter_node",
     "hardware_drivers/driver_node": "hardware_drivers.driver_node",
-    "policy_server/classical_node": "policy_server.classical_node",
-    "policy_server/lqr_drift_node": "policy_server.lqr_drift_node",
-    "policy_server/excite_node": "policy_server.excite_node",
-    "policy_server/lqr_node": "policy_server.lqr_node",
-    "policy_server/mpc_node": "policy_server.mpc_node",
-    "policy_server/policy_node": "policy_server.policy_node",
+    "policy_server/controller_node": "policy_server.controller_node",
     "sim_nodes/emulator_node": "sim_nodes.emulator_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",
 }

@@ -122,7 +122,7 @@ def test_arguments_that_are_given_reach_the_node_table(launch_with):
 
 
 def test_every_row_of_the_table_becomes_one_node(launch_with):
-    rows = [Row(), Row(name="controller", package="policy_server", executable="lqr_node")]
+    rows = [Row(), Row(name="controller", package="policy_server", executable="controller_node")]
     _, nodes = launch_with(*rows)
     assert [type(node).__name__ for node in nodes] == ["Node", "Node"]
     for row, node in zip(rows, nodes, strict=True):

@@ -123,12 +123,7 @@ def test_the_programs_are_those_that_systems_start(packages):
         ("fulmar_ros", "teleop_node"),
         ("hardware_drivers", "adapter_node"),
         ("hardware_drivers", "driver_node"),
-        ("policy_server", "classical_node"),
-        ("policy_server", "lqr_drift_node"),
-        ("policy_server", "excite_node"),
-        ("policy_server", "lqr_node"),
-        ("policy_server", "mpc_node"),
-        ("policy_server", "policy_node"),
+        ("policy_server", "controller_node"),
         ("sim_nodes", "emulator_node"),
         ("sim_nodes", "sim_node"),
     }

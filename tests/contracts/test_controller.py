@@ -9,7 +9,6 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 
-from fulmar_bringup.system import CONTROLLERS
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import LAWS
 from fulmar_core.disturbances.scenario import load_scenario
@@ -22,6 +21,7 @@ from fulmar_core.policy_bundle import read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from policy_server.controllers import CONTROLLERS, Choice, load_controller
 from policy_server.shipped import shipped_policies
 from tests.inputs import some_of
 
@@ -58,7 +58,7 @@ CASES = [
 def case(request):
     name, robot, task = request.param
     policy = LEARNED.get((robot.name, task.name), "")
-    controller = CONTROLLERS[name].load(robot, task, robot.timing.control_hz, policy)
+    controller = load_controller(name, robot, task, Choice(robot.timing.control_hz, policy))
     return name, robot, task, controller
 
 
@@ -182,7 +182,7 @@ def test_a_pair_without_a_law_is_refused_with_what_to_use_instead(name, robot, t
     if has_one(name, robot, task):
         return
     with pytest.raises(ConfigError, match="Use --controller") as told:
-        CONTROLLERS[name].load(robot, task, robot.timing.control_hz, "")
+        load_controller(name, robot, task, Choice(robot.timing.control_hz))
     assert f"'{robot.name}'" in str(told.value)
     assert "is for robots with thrusters" in str(told.value) or "there is one for: go_to_" in str(told.value)
 

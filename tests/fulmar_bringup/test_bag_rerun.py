@@ -22,13 +22,13 @@ from fulmar_bringup.bags.reference import TOLERANCES
 from fulmar_bringup.bags.rerun import rerun
 from fulmar_bringup.bags.verdict import FIELDS, judge_answers
 from fulmar_bringup.cli import app
-from fulmar_bringup.system import CONTROLLERS
 from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.policy_bundle import NETWORK, Golden, read_golden, read_passport, write_bundle
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY
 from fulmar_ros.bag_writer import BagWriter
+from policy_server.controllers import Choice, load_controller
 from policy_server.shipped import shipped_policy
 from tests.fulmar_bringup.foreign_bag import write_foreign
 
@@ -41,7 +41,7 @@ def answered(bag: Path, controller: str, source: str = "observations", course=No
     course = course or course_of(open_bag(bag))
     folder = shipped_policy(course.robot.name, course.task.name) if controller == "policy" else ""
     hz = course.settings.control_rate(course.robot)
-    loaded = CONTROLLERS[controller].load(course.robot, course.task, hz, str(folder))
+    loaded = load_controller(controller, course.robot, course.task, Choice(hz, str(folder)))
     # Another processor rounds a sine otherwise, of which observations are made anew.
     limits = TOLERANCES if source == "odometry" else EXACT
     return judge_answers(course, rerun(course, loaded, source=source), limits)

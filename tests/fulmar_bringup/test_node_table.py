@@ -53,7 +53,7 @@ def test_a_choice_replaces_what_the_system_says():
     nodes = by_name(
         list_nodes(system="mujoco_policy", controller="lqr", backend="mock", task="go_to_position")
     )
-    assert nodes["controller"].module == "policy_server.lqr_node"
+    assert nodes["controller"].module == "policy_server.controller_node"
     assert nodes["plant"].parameters["backend"] == "mock"
     assert nodes["controller"].parameters["task"] == "go_to_position"
 

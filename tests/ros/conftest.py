@@ -19,9 +19,9 @@ from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
-from policy_server.lqr_node import make_lqr
 from sim_nodes.sim_node import make_backend
 from tests.conftest import RosDomain
+from tests.ros.controllers import make_lqr
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, until
 from tests.ros.recorder import Recorder
 
@@ -50,7 +50,7 @@ def plant(neighbour: Neighbour) -> Iterator[PlantNode]:
 @pytest.fixture
 def controller(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[ControllerNode]:
     """A real-time LQR node at 50 Hz."""
-    monkeypatch.setattr(sys, "argv", ["lqr_node"])
+    monkeypatch.setattr(sys, "argv", ["controller_node"])
     arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=50.0"]
     node = ControllerNode(make_lqr, lambda _code: None, cli_args=arguments)
     with spinning(node, lambda error: pytest.fail(repr(error))):

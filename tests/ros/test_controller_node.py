@@ -40,8 +40,8 @@ from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
-from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
+from tests.ros.controllers import make_lqr
 from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, asked_by_neighbour, until
 
 pytestmark = pytest.mark.real_time
@@ -274,7 +274,7 @@ def test_shutdown_from_active_ends_with_the_safe_command(stream: Stream, control
 
 def test_copies_of_a_command_come_within_its_period(neighbour: Neighbour, monkeypatch) -> None:
     """Three of each, all with the stamp of the state that it answers."""
-    monkeypatch.setattr(sys, "argv", ["lqr_node"])
+    monkeypatch.setattr(sys, "argv", ["controller_node"])
     stamps: list[int] = []
     qos = subscriber_qos(COMMAND, reliable=True, depth=50)
     neighbour.node.create_subscription(

@@ -101,7 +101,7 @@ def test_a_run_that_is_stopped_before_there_is_a_bag_has_an_outcome_all_the_same
 def test_ctrl_c_ends_a_demo_and_not_its_first_run_alone(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Nothing is compared, and no second run begins."""
     demo = start_fulmar("demo", "--out", "demo", env=ros_domain.env, cwd=tmp_path)
-    child_running(demo, "policy_server.policy_node")
+    child_running(demo, "policy_server.controller_node")
     children = wait_for_children(demo, 3)
     demo.send_signal(signal.SIGINT)
     out, err = demo.communicate(timeout=30.0)
@@ -148,7 +148,7 @@ def test_the_first_failure_of_an_evaluation_ends_it(ros_domain: RosDomain, tmp_p
     run = start_evaluation(ros_domain, tmp_path)
     children = wait_for_children(run, 5)
     time.sleep(UNDER_WAY_S)
-    child_running(run, "policy_server.lqr_node").kill()
+    child_running(run, "policy_server.controller_node").kill()
     _, err = run.communicate(timeout=15.0)  # a plant waits 5 s for an answer
     assert run.returncode == 1
     assert "fulmar: controller was killed by SIGKILL" in err

@@ -63,7 +63,7 @@ def test_a_dead_or_hung_policy_closes_the_valves_within_the_watchdog_and_a_tick(
 ) -> None:
     """Measured in the bag, between the last command and the first closed state after it."""
     run = start_run(ros_domain, tmp_path)
-    child_running(run, "policy_server.policy_node").send_signal(number)
+    child_running(run, "policy_server.controller_node").send_signal(number)
     out, err = run.communicate(timeout=30.0)
     assert run.returncode == 1
     summary = json_of(out)
@@ -166,7 +166,7 @@ def test_a_ring_writes_the_run_of_a_controller_that_died(ros_domain: RosDomain, 
     """The watchdog trips; the goal, the way until then and the closed valves are in the bag."""
     asked = ("run", "floating_platform", "--controller", "lqr", *FAR, "--recording", "ring")
     run = start_fulmar(*asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
-    controller = child_running(run, "policy_server.lqr_node")
+    controller = child_running(run, "policy_server.controller_node")
     time.sleep(10.0)
     controller.kill()
     _, err = run.communicate(timeout=30.0)

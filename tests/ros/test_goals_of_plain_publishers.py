@@ -24,9 +24,9 @@ from fulmar_ros.goal_node import GoalNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
-from policy_server.classical_node import make_classical
 from sim_nodes.sim_node import make_backend
 from tests.conftest import RosDomain
+from tests.ros.controllers import make_classical
 from tests.ros.neighbour import until
 
 ROBOT = "turtlebot2"

@@ -22,8 +22,8 @@ from fulmar_core.topics import METADATA, SWAP
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
+from policy_server.controller_node import make_controller
 from policy_server.policy import Policy
-from policy_server.policy_node import make_policy
 from policy_server.shipped import policies_directory
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, asked_by_neighbour, until
 
@@ -39,7 +39,7 @@ Start = Callable[..., ControllerNode]
 @pytest.fixture
 def start(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
     """Starts a policy node with parameters; stops it at the end."""
-    monkeypatch.setattr(sys, "argv", ["policy_node"])
+    monkeypatch.setattr(sys, "argv", ["controller_node"])
     nodes: list[ControllerNode] = []
     contexts = []
 
@@ -47,7 +47,7 @@ def start(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[Sta
         arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=5.0"]
         for name, value in parameters.items():
             arguments += ["-p", f"{name}:={value}"]
-        node = ControllerNode(make_policy, lambda _code: None, cli_args=arguments, learned=True)
+        node = ControllerNode(make_controller, lambda _code: None, cli_args=arguments)
         context = spinning(node, lambda error: pytest.fail(repr(error)))
         context.__enter__()
         nodes.append(node)

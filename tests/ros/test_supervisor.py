@@ -23,8 +23,8 @@ from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import spinning
-from policy_server.lqr_node import make_lqr
 from tests.conftest import RosDomain
+from tests.ros.controllers import make_lqr
 from tests.ros.neighbour import NAMESPACE, until
 
 pytestmark = pytest.mark.real_time
@@ -76,7 +76,7 @@ def operated(
     ros_domain: RosDomain, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[tuple[Supervisor, Button, Node]]:
     """A supervisor of an LQR node that needs an e-stop, the e-stop, and a node for more."""
-    monkeypatch.setattr(sys, "argv", ["lqr_node"])
+    monkeypatch.setattr(sys, "argv", ["controller_node"])
     arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "estop:=true"]
     with supervisor("floating_platform", load_task("go_to_pose")) as overseer:
         controller = ControllerNode(make_lqr, lambda _code: None, cli_args=arguments)
