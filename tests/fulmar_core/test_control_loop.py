@@ -86,8 +86,9 @@ def test_the_time_of_a_goal_begins_with_its_first_step_and_anew_with_another_goa
     goal = goal_at((0.1, 0.0, 0.0), (0.2, 0.0, 0.0), (0.3, 0.0, 0.0))[None]
     loop = loop_of(Scripted(), task=task, goal=goal)
     hold = round(S * task.hold_s)
-    for _ in range(2):
-        seen = [float(loop.inputs(at(0.0), 100 * S + t).goal.current[0, 0]) for t in (0, hold - MS, hold)]
+    for began in (100 * S, 200 * S):
+        times = (began, began + hold - MS, began + hold)
+        seen = [float(loop.inputs(at(0.0), stamp).goal.current[0, 0]) for stamp in times]
         assert seen == [0.1, 0.1, 0.2]
         loop.begin(goal)
 

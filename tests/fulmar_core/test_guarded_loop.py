@@ -135,6 +135,8 @@ def test_activation_waits_for_fresh_odometry_and_counts_steps_anew():
     bench.guard.activate()
     assert (bench.guard.newest, bench.guard.acted) == (None, 0)
     assert "no odom yet" in bench.guard.decide(bench.now_ns).reason
+    assert bench.see(5.0 * JUMP_M)  # wherever it was carried meanwhile
+    assert bench.guard.epoch == 0
 
 
 def test_a_jump_of_the_odometry_lets_the_controller_forget_once():

@@ -12,7 +12,7 @@ from fulmar_core.disturbances.scenario import Actuation, Kick, Push, Scenario, S
 from fulmar_core.goal import Goal
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
-from fulmar_core.planar import COLUMNS
+from fulmar_core.planar import COLUMNS, at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.odometer import Channel
 from fulmar_core.simulation import ACTUATOR_NOISE, BatchSimulation
@@ -309,6 +309,39 @@ def test_commands_are_cut_to_what_the_robot_can_follow(robot):
     for _ in range(30):
         simulation.step(np.tile(100.0 * scale, (5, 1)))
     assert np.all(np.abs(simulation.command) <= scale + 1e-6)
+
+
+def test_a_move_applies_a_command_as_it_is_and_leaves_goals_to_the_loop_that_follows_them():
+    course = load_task("go_through_positions")
+    simulation = BatchSimulation(BASE, course, STILL, worlds=2, seed=1, dtype=np.float64)
+    target = simulation.goal.current
+    there = at_rest(target[:, 0], target[:, 1], target[:, 2])
+    beyond = 2.0 * np.tile(BASE.actuators.scale, (2, 1))  # more than a learner's command is cut to
+    simulation.put(there, simulation.goal, simulation.command)
+    simulation.move(beyond)
+    np.testing.assert_array_equal(simulation.command, beyond)
+    np.testing.assert_array_equal(simulation.goal.done, 0.0)
+
+
+def test_a_learner_s_step_advances_goals_by_what_is_measured_and_not_by_the_truth():
+    course = load_task("go_through_positions")
+    simulation = BatchSimulation(BASE, course, STILL, worlds=2, seed=1, dtype=np.float64)
+    target, start = simulation.goal.current, simulation.truth
+    x = np.array([target[0, 0], start.x[1]])  # one is there, the other is where it began
+    y = np.array([target[0, 1], start.y[1]])
+    simulation.put(at_rest(x, y, start.yaw), simulation.goal, simulation.command)
+    measure = simulation._measure
+
+    def mistaken():
+        measure()
+        seen = simulation.measured  # the second believes to be there, the first does not
+        simulation.measured = replace(
+            seen, x=np.array([seen.x[0] + 1.0, target[1, 0]]), y=np.array([seen.y[0], target[1, 1]])
+        )
+
+    simulation._measure = mistaken
+    simulation.step(np.zeros((2, 2)))
+    assert simulation.goal.done.tolist() == [0.0, 1.0]
 
 
 @EACH_ROBOT

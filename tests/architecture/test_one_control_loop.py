@@ -1,0 +1,71 @@
+"""The step from measurement to command is written once: nodes, re-runs and evaluations ask a loop for it."""
+
+from __future__ import annotations
+
+import ast
+
+import pytest
+
+PACKAGES = ("ros2_ws/src", "policy_server", "sim_nodes", "hardware_drivers")
+STEPS = ("act", "observe")
+LOOPS = {"loop", "guard"}  # names of a `ControlLoop` and a `GuardedLoop`, private or not
+WRITTEN = {
+    "control_loop.py": "the step itself",
+    "guarded_loop.py": "the same behind its guards",
+    "observation.py": "what the step observes with",
+    "simulation.py": "the batch that learners step",
+    "learning_step.py": "a step of a learner",
+    "throughput.py": "measures that one",
+    "policy.py": "inputs of a network beside its observation",
+    "go_to_position_with_obstacles.py": "a part of what its task observes",
+}
+
+
+def receiver(call):
+    """Last name of what a method is called on."""
+    value = call.func.value
+    return getattr(value, "attr", getattr(value, "id", ""))
+
+
+def own_steps(tree):
+    """Calls that ask a controller or a task itself, or observe, past a loop."""
+    named = {
+        id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute) and node.attr == "names"
+    }
+    found = []
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        if isinstance(node.func, ast.Attribute) and node.func.attr in STEPS:
+            if receiver(node).strip("_").removesuffix("ed") not in LOOPS:
+                found.append(f"line {node.lineno}: .{node.func.attr}()")
+        elif isinstance(node.func, ast.Name) and node.func.id == "Observer" and id(node) not in named:
+            found.append(f"line {node.lineno}: Observer()")
+    return found
+
+
+def test_no_other_file_asks_a_controller_or_observes_by_itself(repository):
+    found, seen = {}, set()
+    for package in PACKAGES:
+        for path in sorted((repository / package).rglob("*.py")):
+            steps = own_steps(ast.parse(path.read_text(encoding="utf-8")))
+            if path.name in WRITTEN:
+                seen.add(path.name)
+            elif steps:
+                found[str(path.relative_to(repository))] = steps
+    assert found == {}
+    assert seen == set(WRITTEN)
+
+
+@pytest.mark.parametrize(
+    ("code", "count"),
+    [
+        ("command = self._controller.act(inputs)", 1),
+        ("terms = task.observe(state, goal)", 1),
+        ("seen = Observer(robot, task)(state, goal, before)", 1),
+        ("done = guard.act(self._guarded.observe(measurement))", 0),
+        ("names = Observer(robot, task).names", 0),
+    ],
+)
+def test_a_step_of_its_own_is_found(code, count):
+    assert len(own_steps(ast.parse(code))) == count
