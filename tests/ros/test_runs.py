@@ -41,7 +41,8 @@ def command_bytes(bag: Path) -> list[bytes]:
         ]
 
 
-@pytest.mark.parametrize("controller", ["policy", "lqr"])
+# Other quick runs have the LQR.
+@pytest.mark.parametrize("controller", ["policy", pytest.param("lqr", marks=pytest.mark.slow)])
 def test_a_lockstep_run_reaches_its_goal_and_says_so_in_json(
     controller: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:

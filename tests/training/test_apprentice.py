@@ -53,6 +53,7 @@ def error(learner, env):
     return float(np.mean((actions - teacher_of(env.unwrapped).actions(raw)) ** 2))
 
 
+@pytest.mark.slow
 def test_lessons_bring_a_policy_near_to_what_the_lqr_does(settings):
     many = replace(settings.algorithm, lessons=60)
     assert error(*learned(replace(settings, algorithm=many), 60)) < 0.3 * error(*learned(settings, 1))
