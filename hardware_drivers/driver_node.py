@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from fulmar_core.backend import Backend, Device
+from fulmar_core.backend import Backend
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_sender
@@ -16,6 +16,7 @@ from fulmar_ros.plant_node import DONE, PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.devices import make_device
+from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.settings import (
     UNARMED,
     Hardware,
@@ -109,7 +110,7 @@ class DriverNode(PlantNode):
         )
         return replace(hardware, driver=driver)
 
-    def _by_topic(self, robot: Robot, hardware: Hardware) -> Device | None:
+    def _by_topic(self, robot: Robot, hardware: Hardware) -> DriverBackend | None:
         driver = hardware.driver
         if isinstance(driver, VelocityTopic):
             send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped)
@@ -119,22 +120,27 @@ class DriverNode(PlantNode):
                 speed, turn_rate = (float(value) for value in command)
                 send_velocity(np.array(channel_velocity(driver.wiring, track, speed, turn_rate)))
 
-            return TopicDriver(robot, send_wheels)
+            return backend_of(robot, TopicDriver(send_wheels))
         if isinstance(driver, ThrustTopic):
             send_thrust = thrust_sender(self, driver.topic)
-            return TopicDriver(
-                robot,
-                lambda command: send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command)))),
-            )
+
+            def send_shares(command: np.ndarray) -> None:
+                send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command))))
+
+            return backend_of(robot, TopicDriver(send_shares))
         if isinstance(driver, ValveTopic):
             publish = valve_sender(self, driver.topic, driver.message)
 
             def send(valves: np.ndarray, bearing: bool) -> None:
                 publish(to_message(valves, bearing=bearing, order=driver.order))
 
-            return ValveTopicDriver(
-                robot, send, bearing_on=driver.bearing_on_at_start, linger_s=driver.linger_s
+            valves = ValveTopicDriver(
+                send,
+                count=len(robot.actuators.names),
+                bearing_on=driver.bearing_on_at_start,
+                linger_s=driver.linger_s,
             )
+            return backend_of(robot, valves)
         return None
 
 
