@@ -268,6 +268,11 @@ class Hardware:
         return NEEDS.get(type(self.driver), ())
 
     @property
+    def opens_valves(self) -> bool:
+        """Whether its wires open valves, which can be heard without any motion."""
+        return load_robot(self.robot).actuators.kind == "thrusters"
+
+    @property
     def measures_odometry(self) -> bool:
         """Whether the device knows where it is; if not, motion capture or another node says so."""
         if isinstance(self.driver, OwnDriver):

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from fulmar_bringup.emulation import check_emulated
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.remapping import read_remappings
@@ -40,6 +41,7 @@ from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
+from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import UNARMED, MavlinkBoat, load_hardware
 from policy_server.shipped import shipped_policies, shipped_policy
 
@@ -202,7 +204,12 @@ def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: b
         raise ConfigError(
             "a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate."
         )
-    return default_hardware(robot, asked)
+    path = default_hardware(robot, asked)
+    driver = load_hardware(path).driver
+    if emulate:
+        check_emulated(driver)
+    check_own_driver(driver)
+    return path
 
 
 def check_arming(hardware: str, *, arm: bool) -> None:
