@@ -126,7 +126,7 @@ def test_a_connection_that_ends_is_told_at_once(bench, driver):
 def test_an_autopilot_without_its_host_holds_by_its_own_failsafe(bench, driver):
     drive(driver, (1.0, 1.0), 0.5)
     driver._driver._over.set()  # as a process that was killed: neither heartbeats nor overrides
-    driver._thread.join()
+    driver._driver._thread.join()
     silent = time.monotonic()
     until(lambda: not bench.command.any())
     assert time.monotonic() - silent < 3.2
