@@ -190,5 +190,5 @@ def test_a_constructor_that_raises_is_reported_with_the_user_s_line(folder):
 
 def test_an_error_that_a_constructor_means_stays_what_it_is(folder):
     (folder / "own_meant.py").write_text(RAISING)
-    with pytest.raises(DeviceError, match="^not there$"):
+    with pytest.raises(DeviceError, match=r"^not there$"):
         construct(load("own_meant:Mine"), "Mine(what)", "controller", "absent")

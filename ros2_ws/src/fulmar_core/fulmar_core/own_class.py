@@ -64,7 +64,7 @@ def load_class(text: str, *, members: Iterable[str], what: str) -> type[Any]:
         raise ConfigError(f"{here}: '{name}' is a {type(found).__name__}, a class is needed.")
     lacking = [member for member in members if not _has(found, member)]
     if lacking:
-        names = [key for key in dir(found) if not key.startswith("_")]
+        names = [key for key in dir(found) if not key.startswith("_") and key not in lacking]
         near = did_you_mean(lacking[0], names) if names else ""
         raise ConfigError(
             f"{here}: class '{name}' lacks {', '.join(lacking)}."
