@@ -142,9 +142,9 @@ def test_a_function_is_no_class(folder):
 
 
 def test_missing_methods_are_named_and_a_typing_error_gets_the_nearest(folder):
-    (folder / "own_lacks.py").write_text("class Mine:\n    def wirte(self): pass\n    def read(self): pass\n")
+    (folder / "own_lacks.py").write_text("class Mine:\n    def wrote(self): pass\n    def read(self): pass\n")
     message = complaint("own_lacks:Mine", ("read", "write", "close"))
-    assert message.endswith("class 'Mine' lacks write, close. Did you mean 'wirte'?")
+    assert message.endswith("class 'Mine' lacks write, close. Did you mean 'wrote'?")
     assert complaint("own_lacks:Mine", ("x", "read")).endswith("lacks x. A controller needs: x, read.")
 
 

@@ -258,8 +258,8 @@ def test_without_an_air_bearing_there_is_no_service_for_one(folder):
         (BOARD, "  air_bearing: true\n", "class 'Board' lacks bearing_on, set_bearing"),
         (BOARD + FLOATING, "", "switches an air bearing: write air_bearing: true into its hardware file"),
         ("class Board:\n    def write(self, command): pass\n", "", "lacks begin, read, health, close"),
-        (BOARD.replace("def write", "def wirte"), "", "lacks write. Did you mean 'wirte'"),
-        (BOARD.replace("Board", "Bord"), "", "has no class 'Board'. Did you mean 'Bord'"),
+        (BOARD.replace("def write", "def wrote"), "", "lacks write. Did you mean 'wrote'"),
+        (BOARD.replace("Board", "Bort"), "", "has no class 'Board'. Did you mean 'Bort'"),
     ],
 )
 def test_a_class_that_does_not_fit_is_refused(folder, code, more, says):
