@@ -21,6 +21,7 @@ from hardware_drivers.settings import (
     UNARMED,
     Hardware,
     MavlinkBoat,
+    OwnDriver,
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
@@ -99,6 +100,15 @@ class DriverNode(PlantNode):
     def _armed(self, hardware: Hardware, settings: DriverSettings) -> Hardware:
         """The hardware file with the parameter `arm`; logs what arming does before anything is sent."""
         driver = hardware.driver
+        if isinstance(driver, OwnDriver) and driver.arm is not None:
+            driver = replace(driver, arm=driver.arm or settings.arm)
+            will = (
+                "this driver may ARM THE DEVICE."
+                if driver.arm
+                else f"{UNARMED}. This driver sends no command."
+            )
+            self.get_logger().warning(f"{driver.kind}: {will}")
+            return replace(hardware, driver=driver)
         if not isinstance(driver, MavlinkBoat):
             return hardware
         driver = replace(driver, arm=driver.arm or settings.arm)

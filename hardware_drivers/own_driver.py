@@ -14,7 +14,7 @@ from fulmar_core.robot import Robot
 from hardware_drivers.driver import MEMBERS, DeviceDriver
 from hardware_drivers.driver_backend import DriverBackend, FloatingDriverBackend
 from hardware_drivers.feedback import Report
-from hardware_drivers.settings import Driver, OwnDriver
+from hardware_drivers.settings import UNARMED, Driver, OwnDriver
 from hardware_drivers.wiring import channel_velocity, channels
 
 T = TypeVar("T")
@@ -70,6 +70,7 @@ class _WiredDriver(DeviceDriver):
     def __init__(self, robot: Robot, settings: OwnDriver, driver: DeviceDriver) -> None:
         self._name, self._module = settings.kind, type(driver).__module__
         self._driver, self._count = driver, len(robot.actuators.names)
+        self._safe, self._unarmed = robot.actuators.safe_command, settings.arm is False
         self._to_wires = _matrix(robot, settings)
         self._from_wires = np.linalg.inv(self._to_wires)
         self._as_named = bool((self._to_wires == np.eye(self._count)).all())
@@ -78,6 +79,8 @@ class _WiredDriver(DeviceDriver):
         self._call("begin", lambda: self._driver.begin(x, y, heading))
 
     def write(self, command: np.ndarray) -> np.ndarray:
+        if self._unarmed:
+            return self._safe
         # A copy: what a user's class does to it must not reach the guard's own.
         sent = command.copy() if self._as_named else self._to_wires @ command
         applied = self._call("write", lambda: self._driver.write(sent))
@@ -97,10 +100,10 @@ class _WiredDriver(DeviceDriver):
         return report
 
     def health(self) -> dict[str, str]:
+        unarmed = {"warning": UNARMED} if self._unarmed else {}
         try:
-            return {
-                str(name): str(value) for name, value in self._call("health", self._driver.health).items()
-            }
+            found = self._call("health", self._driver.health)
+            return {str(name): str(value) for name, value in found.items()} | unarmed
         except DeviceError as error:
             return {"warning": str(error)}
         except AttributeError:

@@ -19,7 +19,7 @@ ValveOrder = Annotated[tuple[int, ...], Named(VALVE_ORDERS)]  # a list, or the n
 
 # A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
 LONGEST_LINGER_S = 2.0
-UNARMED = "not armed: arm: true or --arm"  # what a boat says that may not arm
+UNARMED = "not armed: arm: true or --arm"  # what a device reports that may not be armed
 
 
 def check_linger(linger_s: float) -> None:
@@ -205,18 +205,17 @@ class OwnDriver:
     """A class of the user's own, by its dotted path; see `hardware_drivers.driver.DeviceDriver`."""
 
     kind: str  # mypackage.mymodule:MyDriver, found in the current folder, then on PYTHONPATH
-    port: str = (
-        ""  # serial port, tcp://host:port, udp://host:port, GPIO chip; empty: the class opens what it needs
-    )
+    # Serial port, tcp://host:port, udp://host:port or GPIO chip; empty: the class opens what it needs.
+    port: str = ""
     baud: int = 115200  # of a serial port
     order: ValveOrder = ()  # of valves: which thruster, counted from 0, each channel opens; empty: 0, 1, 2, ...
     wiring: tuple[str, ...] = AS_NAMED  # wheel or propeller that each channel turns, `-left` where backwards
     # Who knows where the robot is: motion capture, the device itself by `read`, or another node that publishes `odom`.
     odometry: Literal["motion_capture", "device", "other_node"] = "motion_capture"
     air_bearing: bool = False  # the class has `bearing_on` and `set_bearing` of `AirBearing`
-    device_timeout_s: float = (
-        0.0  # the device itself stops so long after the last command; 0: it does not [s]
-    )
+    # Whether the device may be armed: without it, or --arm, nothing is written. None: it has nothing to arm.
+    arm: bool | None = None
+    device_timeout_s: float = 0.0  # after the last command, when the device itself stops; 0: it does not [s]
     options: dict[str, Any] = field(default_factory=dict)  # whatever else the class reads
 
     def __post_init__(self) -> None:
@@ -266,6 +265,11 @@ class Hardware:
     def needs(self) -> tuple[str, ...]:
         """Modules that its driver imports, which not every machine has."""
         return NEEDS.get(type(self.driver), ())
+
+    @property
+    def arms(self) -> bool:
+        """Whether the device has to be armed, which a person allows."""
+        return getattr(self.driver, "arm", None) is not None
 
     @property
     def opens_valves(self) -> bool:

@@ -75,6 +75,16 @@ def test_no_emulator_speaks_for_it(folder, fulmar, command):
     )
 
 
+@pytest.mark.parametrize("command", [ON_HARDWARE, ["commission", "own.yaml"]])
+def test_a_device_that_is_armed_moves_only_when_a_person_allows_it(folder, fulmar, command):
+    (folder / "own_board.py").write_text(BOARD)
+    assert "--arm is for boats" in complaint(fulmar(*command, "--arm"))
+    (folder / "own.yaml").write_text(FILE + "  arm: false\n")
+    assert "not armed: arm: true or --arm. Driving arms the device. Write arm: true" in complaint(
+        fulmar(*command)
+    )
+
+
 def test_doctor_says_whether_class_and_port_are_there_and_what_stops_the_device(folder, fulmar):
     (folder / "own_board.py").write_text(BOARD)
     (folder / "own.yaml").write_text(FILE + "  port: /dev/ttyNONE\n")

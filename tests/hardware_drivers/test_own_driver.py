@@ -248,6 +248,17 @@ def test_an_air_bearing_of_its_own_is_switched_and_holds_the_valves_closed_while
     assert load_hardware(str(folder / "own.yaml")).has_bearing
 
 
+@pytest.mark.parametrize(
+    ("arm", "written_to"), [("", True), ("  arm: true\n", True), ("  arm: false\n", False)]
+)
+def test_a_device_that_may_not_be_armed_is_measured_and_never_written_to(folder, arm, written_to):
+    device, board = made(folder, more=arm)
+    assert device.step(np.ones(8)).applied.all() == written_to
+    device.close()
+    assert bool(board.sent) == written_to
+    assert ("not armed" in device.health().get("warning", "")) != written_to
+
+
 def test_without_an_air_bearing_there_is_no_service_for_one(folder):
     assert not isinstance(made(folder)[0], AirBearing)
 

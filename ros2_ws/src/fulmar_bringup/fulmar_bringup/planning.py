@@ -222,14 +222,19 @@ def check_arming(hardware: str, *, arm: bool) -> None:
     Raises:
         ConfigError: One of the two.
     """
-    driver = load_hardware(hardware).driver if hardware else None
-    if not isinstance(driver, MavlinkBoat):
+    file = load_hardware(hardware) if hardware else None
+    if file is None or not file.arms:
         if arm:
-            raise ConfigError("--arm is for boats with an autopilot (driver 'mavlink_boat'); leave it out.")
-    elif not (arm or driver.arm):
+            raise ConfigError(
+                "--arm is for boats with an autopilot (driver 'mavlink_boat') and own drivers with `arm`; leave it out."
+            )
+    elif not (arm or getattr(file.driver, "arm", None)):
+        driver, does = file.driver, "arms the device"
+        if isinstance(driver, MavlinkBoat):
+            channels = f"{driver.steering_channel} and {driver.throttle_channel}"
+            does = f"sets MANUAL, arms the boat and overrides RC channels {channels}"
         raise ConfigError(
-            f"{hardware}: {UNARMED}. Driving sets MANUAL, arms the boat and overrides RC channels "
-            f"{driver.steering_channel} and {driver.throttle_channel}. Write arm: true into the file, or give --arm, "
+            f"{hardware}: {UNARMED}. Driving {does}. Write arm: true into the file, or give --arm, "
             "once the propellers are clear."
         )
 
