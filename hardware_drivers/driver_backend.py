@@ -76,7 +76,7 @@ class DriverBackend:
             self._driver.close()
 
     def health(self) -> dict[str, str]:
-        """See `Device.health`."""
+        """See `DeviceDriver`."""
         return self._driver.health()
 
     def _failure(self, command: np.ndarray) -> Exception | None:

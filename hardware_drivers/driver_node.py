@@ -77,8 +77,8 @@ class DriverNode(PlantNode):
         """Connect to the device."""
         outcome = super().on_configure(state)
         device = self._backend
-        if outcome == DONE and device is not None:
-            self.health.more = device.health  # type: ignore[attr-defined]
+        if outcome == DONE and isinstance(device, DriverBackend):
+            self.health.more = device.health
         return outcome
 
     def _dismantle(self) -> None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.errors import ConfigError, DeviceError, FulmarError
+from fulmar_core.errors import ConfigError, DeviceError, FulmarError, shortened
 from fulmar_core.own_class import construct, load_class, one_line
 from fulmar_core.robot import Robot
 from hardware_drivers.driver import MEMBERS, DeviceDriver
-from hardware_drivers.driver_backend import DriverBackend, FloatingDriverBackend
+from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.feedback import Report
 from hardware_drivers.settings import UNARMED, Driver, OwnDriver
 from hardware_drivers.wiring import channel_velocity, channels
@@ -47,10 +47,8 @@ def make_own_driver(robot: Robot, settings: OwnDriver, *, patience_s: float) -> 
     cls = _driver_class(settings)
     call = f"{cls.__name__}(robot, settings, patience_s={patience_s:g})"
     driver = construct(cls, call, ROLE, robot, settings, patience_s=patience_s)
-    wired = _WiredDriver(robot, settings, driver)
-    if settings.air_bearing:
-        return FloatingDriverBackend(robot, wired, driver)
-    return DriverBackend(robot, wired)
+    wired = _FloatingDriver if settings.air_bearing else _WiredDriver
+    return backend_of(robot, wired(robot, settings, driver))
 
 
 def _driver_class(settings: OwnDriver) -> type[Any]:
@@ -67,7 +65,7 @@ def _driver_class(settings: OwnDriver) -> type[Any]:
 class _WiredDriver(DeviceDriver):
     """Hands commands over in the order of the wires; whatever the user's class raises becomes one line."""
 
-    def __init__(self, robot: Robot, settings: OwnDriver, driver: DeviceDriver) -> None:
+    def __init__(self, robot: Robot, settings: OwnDriver, driver: Any) -> None:
         self._name, self._module = settings.kind, type(driver).__module__
         self._driver, self._count = driver, len(robot.actuators.names)
         self._safe, self._unarmed = robot.actuators.safe_command, settings.arm is False
@@ -86,28 +84,29 @@ class _WiredDriver(DeviceDriver):
         applied = self._call("write", lambda: self._driver.write(sent))
         if applied is None:
             return command
-        values = self._call("write", lambda: np.asarray(applied, dtype=float))
+        values = self._call("write", lambda: np.array(applied, dtype=float))
         if values.shape != (self._count,) or not np.isfinite(values).all():
+            found = shortened(str(values.tolist()))
             raise self._wrong(
-                "write", f"returned {values.tolist()}, which must be None or {self._count} finite numbers"
+                "write", f"returned {found}, which must be None or {self._count} finite numbers"
             )
         return values if self._as_named else self._from_wires @ values
 
     def read(self) -> Report | None:
         report = self._call("read", self._driver.read)
         if report is not None and not isinstance(report, Report):
-            raise self._wrong("read", f"returned a {type(report).__name__}, which must be a Report or None")
+            raise self._wrong("read", f"returned {type(report).__name__}, which must be a Report or None")
         return report
 
     def health(self) -> dict[str, str]:
         unarmed = {"warning": UNARMED} if self._unarmed else {}
         try:
             found = self._call("health", self._driver.health)
+            if not isinstance(found, Mapping):
+                raise self._wrong("health", f"returned {type(found).__name__}, which must be a mapping")
             return {str(name): str(value) for name, value in found.items()} | unarmed
-        except DeviceError as error:
+        except FulmarError as error:
             return {"warning": str(error)}
-        except AttributeError:
-            return {"warning": str(self._wrong("health", "returned no mapping"))}
 
     def close(self) -> None:
         self._call("close", self._driver.close)
@@ -122,6 +121,23 @@ class _WiredDriver(DeviceDriver):
 
     def _wrong(self, method: str, what: str) -> DeviceError:
         return DeviceError(f"{ROLE} '{self._name}': {method} {what}.")
+
+
+class _FloatingDriver(_WiredDriver):
+    """The same with an air bearing, which counts as off where the class fails to say."""
+
+    @property
+    def bearing_on(self) -> bool:
+        try:
+            return self._call("bearing_on", lambda: bool(self._driver.bearing_on))
+        except FulmarError:
+            return False
+
+    def set_bearing(self, on: bool) -> str:
+        try:
+            return str(self._call("set_bearing", lambda: self._driver.set_bearing(on)) or "")
+        except FulmarError as error:
+            return str(error)
 
 
 def _matrix(robot: Robot, settings: OwnDriver) -> np.ndarray:

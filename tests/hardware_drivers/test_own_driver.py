@@ -158,7 +158,7 @@ WRONG = (
     ("write(self, command)", "return command + np.nan", "write returned .* must be None or 8 finite numbers"),
     ("write(self, command)", "return 'sent'", "write raised ValueError: could not convert"),
     ("read(self)", "raise OSError('two\\nlines')", r"read raised OSError: two lines \(.*own_board.py:14\)"),
-    ("read(self)", "return 3.0", "read returned a float, which must be a Report or None"),
+    ("read(self)", "return 3.0", "read returned float, which must be a Report or None"),
 )
 
 
@@ -172,7 +172,10 @@ def test_whatever_it_does_wrong_in_a_step_is_one_line_with_its_name(folder, meth
 
 @pytest.mark.parametrize(
     ("body", "says"),
-    [("1 / 0", "health raised ZeroDivisionError"), ("return 3", "health returned no mapping")],
+    [
+        ("1 / 0", "health raised ZeroDivisionError"),
+        ("return 3", "health returned int, which must be a mapping"),
+    ],
 )
 def test_health_that_fails_is_a_warning_and_no_end(folder, body, says):
     device, _ = made(folder, with_method("health(self)", body))
@@ -257,6 +260,21 @@ def test_a_device_that_may_not_be_armed_is_measured_and_never_written_to(folder,
     device.close()
     assert bool(board.sent) == written_to
     assert ("not armed" in device.health().get("warning", "")) != written_to
+
+
+@pytest.mark.parametrize(
+    ("sound", "broken", "refusal"),
+    [
+        ("self.bearing_on = on", "raise OSError('no air')", "set_bearing raised OSError: no air"),
+        ("bearing_on = False", "@property\n    def bearing_on(self): 1 / 0", "AttributeError"),
+    ],
+)
+def test_an_air_bearing_that_fails_keeps_the_valves_closed(folder, sound, broken, refusal):
+    code = BOARD + FLOATING.replace(sound, broken, 1)
+    device, _ = made(folder, code, more="  air_bearing: true\n")
+    assert refusal in device.set_bearing(True)
+    assert not device.bearing_on
+    assert not device.step(np.ones(8)).applied.any()
 
 
 def test_without_an_air_bearing_there_is_no_service_for_one(folder):
