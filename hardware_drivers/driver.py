@@ -23,8 +23,8 @@ class DeviceDriver(Protocol):
     e-stop and no clean-up of its own.
 
     Errors: whatever a method raises ends the node with exit code 1, after the safe command; raise `DeviceError` with
-    what a person should do. A `write` or `read` that blocks for more than 0.5 s is reported as hanging. Nothing is
-    written meanwhile, so only a watchdog of the device itself stops it: `device_timeout_s` in the hardware file.
+    what a person should do. A `write` or `read` that blocks for more than 0.5 s is reported as hanging. While
+    `write` blocks, only a watchdog of the device itself stops it: `device_timeout_s` in the hardware file.
     """
 
     def __init__(self, robot: Robot, settings: Any, *, patience_s: float) -> None:

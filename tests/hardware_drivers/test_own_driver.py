@@ -22,7 +22,7 @@ from hardware_drivers.presence import check_presence
 from hardware_drivers.settings import hardware_of, load_hardware
 from hardware_drivers.thruster_driver import ThrusterDriver
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
-from tests.hardware_drivers.bench import episode_at
+from tests.hardware_drivers.bench import episode_at, until
 from tests.own_files import own_folder
 
 BOARD = """
@@ -239,6 +239,18 @@ def test_a_write_that_hangs_is_an_error_is_never_entered_twice_and_the_device_is
     board.hold.set()
     hung.join()
     assert board.sent == [[1.0] * 8]
+
+
+def test_a_read_that_hangs_does_not_keep_the_safe_command_back(folder):
+    code = HANGS.replace("self.hold.wait(); ", "") + "    def read(self):\n        self.hold.wait()\n"
+    device, board = made(folder, code)
+    hung = threading.Thread(target=device.step, args=(np.ones(8),))
+    hung.start()
+    until(lambda: bool(board.sent))
+    device.make_safe()
+    assert board.sent == [[1.0] * 8, *[[0.0] * 8] * STOPS]
+    board.hold.set()
+    hung.join()
 
 
 def test_an_air_bearing_of_its_own_is_switched_and_holds_the_valves_closed_while_off(folder):
