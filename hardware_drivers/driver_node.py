@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from fulmar_core.backend import Backend, Device
+from fulmar_core.backend import Backend
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_sender
@@ -16,10 +16,12 @@ from fulmar_ros.plant_node import DONE, PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.devices import make_device
+from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.settings import (
     UNARMED,
     Hardware,
     MavlinkBoat,
+    OwnDriver,
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
@@ -75,8 +77,8 @@ class DriverNode(PlantNode):
         """Connect to the device."""
         outcome = super().on_configure(state)
         device = self._backend
-        if outcome == DONE and device is not None:
-            self.health.more = device.health  # type: ignore[attr-defined]
+        if outcome == DONE and isinstance(device, DriverBackend):
+            self.health.more = device.health
         return outcome
 
     def _dismantle(self) -> None:
@@ -98,6 +100,15 @@ class DriverNode(PlantNode):
     def _armed(self, hardware: Hardware, settings: DriverSettings) -> Hardware:
         """The hardware file with the parameter `arm`; logs what arming does before anything is sent."""
         driver = hardware.driver
+        if isinstance(driver, OwnDriver) and driver.arm is not None:
+            driver = replace(driver, arm=driver.arm or settings.arm)
+            will = (
+                "this driver may ARM THE DEVICE."
+                if driver.arm
+                else f"{UNARMED}. This driver sends no command."
+            )
+            self.get_logger().warning(f"{driver.kind}: {will}")
+            return replace(hardware, driver=driver)
         if not isinstance(driver, MavlinkBoat):
             return hardware
         driver = replace(driver, arm=driver.arm or settings.arm)
@@ -109,7 +120,7 @@ class DriverNode(PlantNode):
         )
         return replace(hardware, driver=driver)
 
-    def _by_topic(self, robot: Robot, hardware: Hardware) -> Device | None:
+    def _by_topic(self, robot: Robot, hardware: Hardware) -> DriverBackend | None:
         driver = hardware.driver
         if isinstance(driver, VelocityTopic):
             send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped)
@@ -119,22 +130,27 @@ class DriverNode(PlantNode):
                 speed, turn_rate = (float(value) for value in command)
                 send_velocity(np.array(channel_velocity(driver.wiring, track, speed, turn_rate)))
 
-            return TopicDriver(robot, send_wheels)
+            return backend_of(robot, TopicDriver(send_wheels))
         if isinstance(driver, ThrustTopic):
             send_thrust = thrust_sender(self, driver.topic)
-            return TopicDriver(
-                robot,
-                lambda command: send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command)))),
-            )
+
+            def send_shares(command: np.ndarray) -> None:
+                send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command))))
+
+            return backend_of(robot, TopicDriver(send_shares))
         if isinstance(driver, ValveTopic):
             publish = valve_sender(self, driver.topic, driver.message)
 
             def send(valves: np.ndarray, bearing: bool) -> None:
                 publish(to_message(valves, bearing=bearing, order=driver.order))
 
-            return ValveTopicDriver(
-                robot, send, bearing_on=driver.bearing_on_at_start, linger_s=driver.linger_s
+            valves = ValveTopicDriver(
+                send,
+                count=len(robot.actuators.names),
+                bearing_on=driver.bearing_on_at_start,
+                linger_s=driver.linger_s,
             )
+            return backend_of(robot, valves)
         return None
 
 

@@ -6,9 +6,6 @@ import threading
 import time
 from dataclasses import dataclass
 
-import numpy as np
-
-from fulmar_core.backend import Sample
 from fulmar_core.errors import DeviceError
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
@@ -72,11 +69,8 @@ class Feedback:
             assert self._newest is not None
             return self._newest
 
-    def sample(self, applied: np.ndarray) -> Sample:
-        """The newest report as a sample.
-
-        Args:
-            applied: What the actuators were told.
+    def read(self) -> Report:
+        """The newest report, if it is young enough.
 
         Raises:
             DeviceError: The device is gone.
@@ -90,4 +84,4 @@ class Feedback:
                 f"{self._device}: no report for {age_ns / 1e6:.0f} ms "
                 f"(limit {self._silent_ns / 1e6:.0f} ms). Is the cable in, and the device on?"
             )
-        return Sample(newest.odometry, newest.imu, None, stamp_ns=newest.stamp_ns, applied=applied)
+        return newest

@@ -1,20 +1,20 @@
-"""A Kingfisher behind the backend seam."""
+"""Driver of a Kingfisher."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
 from hardware_drivers import kingfisher_protocol as protocol
 from hardware_drivers.attitude import attitude
 from hardware_drivers.device_time import DeviceTime
+from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.local_frame import LocalFrame
 from hardware_drivers.nmea import Decoder
@@ -23,10 +23,9 @@ from hardware_drivers.settings import KingfisherNmea
 from hardware_drivers.wiring import channels
 
 DAY_MS = 86_400_000
-STOPS = 5
 
 
-class KingfisherDriver:
+class KingfisherDriver(DeviceDriver):
     """Drives by `$PYDIR`, measures by `$CPNVG`, `$CPNVR` and `$CPIMU`."""
 
     def __init__(self, robot: Robot, settings: KingfisherNmea, *, patience_s: float) -> None:
@@ -35,7 +34,7 @@ class KingfisherDriver:
         Raises:
             DeviceError: Nothing is there, or it has no fix.
         """
-        self.robot, self._settings = robot, settings
+        self._settings = settings
         self._shift = np.zeros(3)  # from where the frame begins to where `odom` does [m]
         self._feedback = Feedback(f"boat at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(DAY_MS)
@@ -49,39 +48,32 @@ class KingfisherDriver:
         try:
             self._feedback.wait(patience_s)
         except Exception:
+            with contextlib.suppress(OSError):
+                self.write(robot.actuators.safe_command)
             self.close()
             raise
 
-    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Without an origin, take the place of the episode for where the boat is; see `Backend.reset`."""
+    def begin(self, x: float, y: float, heading: float) -> None:
+        """Without an origin, take a place for where the boat is; see `DeviceDriver`."""
         if self._settings.origin is None:
             here = self._feedback.newest.odometry.position_in_world - self._shift
-            self._shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
-        return self.step(self.robot.actuators.safe_command)
+            self._shift = np.array([x, y, 0.0]) - here
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
-        """Send a command; see `Backend.step`."""
-        shares = np.asarray(command, dtype=float)
-        left, right = channels(self._settings.wiring, float(shares[0]), float(shares[1]))
+    def write(self, command: np.ndarray) -> None:
+        """Send a command; see `DeviceDriver`."""
+        left, right = channels(self._settings.wiring, float(command[0]), float(command[1]))
         self._port.write(protocol.drive(left, right))
-        return self._feedback.sample(shares)
 
-    def make_safe(self) -> None:
-        """Stop both propellers."""
-        for _ in range(STOPS):
-            self._port.write(protocol.drive(0.0, 0.0))
+    def read(self) -> Report:
+        """See `DeviceDriver`."""
+        return self._feedback.read()
 
     def close(self) -> None:
-        """Stop, and let go of the port."""
-        try:
-            self.make_safe()
-        except OSError:
-            pass  # it is gone; the boat stops by its own timeout
-        finally:
-            self._reader.stop()
+        """Let go of the port; see `DeviceDriver`."""
+        self._reader.stop()
 
     def health(self) -> dict[str, str]:
-        """Battery and lost sentences; see `Device.health`."""
+        """Battery and lost sentences; see `DeviceDriver`."""
         return {"battery_v": self._voltage, "lost_sentences": str(self._decoder.lost), "warning": ""}
 
     def _take(self, data: bytes) -> None:

@@ -1,19 +1,18 @@
-"""A Kobuki base behind the backend seam."""
+"""Driver of a Kobuki base."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 
 import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.slowdown import slowdown
-from fulmar_core.backend import Sample
-from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
 from hardware_drivers.device_time import DeviceTime
+from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.kobuki_protocol import (
     COUNT,
@@ -31,12 +30,10 @@ from hardware_drivers.wheel_odometry import WheelOdometry
 from hardware_drivers.wiring import channel_velocity
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous
-STOPS = 5  # the stop goes out this often on the way out
-STOP_PERIOD_S = 0.02  # between commands while it slows down
 ABSENT = np.full(3, np.nan)  # the base has no accelerometer
 
 
-class KobukiDriver:
+class KobukiDriver(DeviceDriver):
     """Drives by base control, measures by encoders and gyroscope.
 
     While a bumper or a cliff sensor answers, the base stands, or backs off straight; while a wheel hangs in the air, it
@@ -50,7 +47,7 @@ class KobukiDriver:
             DeviceError: Nothing is there, or it does not speak Kobuki's protocol.
         """
         assert isinstance(robot.actuators, DifferentialDrive)  # settings refuse any other
-        self.robot, self._wheels, self._wiring = robot, robot.actuators, settings.wiring
+        self._wheels, self._wiring = robot.actuators, settings.wiring
         self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
@@ -63,41 +60,35 @@ class KobukiDriver:
         try:
             self._feedback.wait(patience_s)
         except Exception:
+            with contextlib.suppress(OSError):
+                self.write(robot.actuators.safe_command)
             self.close()
             raise
 
-    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Take the pose of the episode for where the base stands; see `Backend.reset`."""
-        start = episode.start
-        self._begin = (float(start.x), float(start.y), float(start.yaw))  # taken by the reading thread
+    def begin(self, x: float, y: float, heading: float) -> None:
+        """Take a pose for where the base stands; see `DeviceDriver`."""
+        self._begin = (x, y, heading)  # taken by the reading thread
         deadline = time.monotonic() + 1.0
         while self._awaits_report() and time.monotonic() < deadline:
             time.sleep(0.002)
-        return self.step(self.robot.actuators.safe_command)
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
-        """Send a command, or a stop where something is in the way; see `Backend.step`."""
-        return self._feedback.sample(self._send(command))
+    def write(self, command: np.ndarray) -> np.ndarray:
+        """Send a command, or a stop where something is in the way; see `DeviceDriver`."""
+        self._sent = self._allowed(command)
+        speed, turn_rate = (float(value) for value in self._sent)
+        self._port.write(base_control(*channel_velocity(self._wiring, self._wheels.track, speed, turn_rate)))
+        return self._sent
 
-    def make_safe(self) -> None:
-        """Slow down as fast as the wheels may, and stop."""
-        for command in slowdown(self.robot.actuators, self._sent, STOP_PERIOD_S):
-            self._send(command)
-            time.sleep(STOP_PERIOD_S)
-        for _ in range(STOPS):
-            self._send(self.robot.actuators.safe_command)
+    def read(self) -> Report:
+        """See `DeviceDriver`."""
+        return self._feedback.read()
 
     def close(self) -> None:
-        """Stop, and let go of the port."""
-        try:
-            self.make_safe()
-        except OSError:
-            pass  # it is gone; the base stops by its own timeout
-        finally:
-            self._reader.stop()
+        """Let go of the port; see `DeviceDriver`."""
+        self._reader.stop()
 
     def health(self) -> dict[str, str]:
-        """Battery and what touches; see `Device.health`."""
+        """Battery and what touches; see `DeviceDriver`."""
         core = self._core
         if core is None:
             return {}
@@ -114,13 +105,6 @@ class KobukiDriver:
 
     def _awaits_report(self) -> bool:
         return self._begin is not None
-
-    def _send(self, command: np.ndarray) -> np.ndarray:
-        """Send what is allowed of a command, shape (2,), and return it."""
-        self._sent = self._allowed(np.asarray(command, dtype=float))
-        speed, turn_rate = (float(value) for value in self._sent)
-        self._port.write(base_control(*channel_velocity(self._wiring, self._wheels.track, speed, turn_rate)))
-        return self._sent
 
     def _allowed(self, command: np.ndarray) -> np.ndarray:
         core = self._core

@@ -1,7 +1,8 @@
-"""A boat with ArduPilot behind the backend seam, by MAVLink."""
+"""Driver of a boat with ArduPilot, by MAVLink."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 import time
@@ -14,11 +15,10 @@ os.environ.setdefault("MAVLINK20", "1")
 import numpy as np
 from pymavlink import mavutil
 
-from fulmar_core.backend import Sample
-from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
 from fulmar_core.robot import Robot
-from hardware_drivers.feedback import Feedback
+from hardware_drivers.driver import DeviceDriver
+from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.ports import patiently, write_at_once
 from hardware_drivers.settings import UNARMED, MavlinkBoat
@@ -29,11 +29,10 @@ Address = tuple[int, int]  # system and component
 HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
 HEARTBEAT_S = 1.0
 NO_CHANGE = 65535  # of a channel in an override
-STOPS = 5
 RATES_HZ = {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 50.0, "RAW_IMU": 25.0}
 
 
-class MavlinkDriver:
+class MavlinkDriver(DeviceDriver):
     """Drives by overriding two RC channels in MANUAL mode, measures by the autopilot's own estimate.
 
     Without `arm: true` in its settings it measures only: it sets no mode, arms nothing and sends no override.
@@ -47,7 +46,7 @@ class MavlinkDriver:
         Raises:
             DeviceError: Nobody answers.
         """
-        self.robot, self._settings = robot, settings
+        self._safe, self._settings = robot.actuators.safe_command, settings
         self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
         self._heard = Telemetry()
         self._sending = threading.Lock()
@@ -67,35 +66,34 @@ class MavlinkDriver:
         try:
             self._feedback.wait(patience_s)
         except Exception:
+            with contextlib.suppress(OSError):
+                self.write(self._safe)
             self.close()
             raise
 
-    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Take the place of the episode for where the boat is, and arm if allowed; see `Backend.reset`."""
+    def begin(self, x: float, y: float, heading: float) -> None:
+        """Take a place for where the boat is, and arm if allowed; see `DeviceDriver`."""
         here = self._feedback.newest.odometry.position_in_world - self._heard.shift
-        self._heard.shift = np.array([float(episode.start.x), float(episode.start.y), 0.0]) - here
+        self._heard.shift = np.array([x, y, 0.0]) - here
         if self._settings.arm:
             self._drive(0.0, 0.0)
             self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-        return self.step(self.robot.actuators.safe_command)
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
-        """Send a command, nothing if the boat must not arm; see `Backend.step`."""
+    def write(self, command: np.ndarray) -> np.ndarray:
+        """Send a command, nothing if the boat must not arm; see `DeviceDriver`."""
         if not self._settings.arm:
-            return self._feedback.sample(self.robot.actuators.safe_command)
+            return self._safe
         left, right = (float(share) for share in command)
         self._drive(left, right)
-        return self._feedback.sample(np.array([left, right]))
+        return command
 
-    def make_safe(self) -> None:
-        """Stop both propellers."""
-        for _ in range(STOPS if self._settings.arm else 0):
-            self._drive(0.0, 0.0)
+    def read(self) -> Report:
+        """See `DeviceDriver`."""
+        return self._feedback.read()
 
     def close(self) -> None:
-        """Stop, disarm, and let go of the link."""
+        """Disarm, and let go of the link; see `DeviceDriver`."""
         try:
-            self.make_safe()
             if self._settings.arm:
                 self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         except OSError:
@@ -106,7 +104,7 @@ class MavlinkDriver:
             self._link.close()
 
     def health(self) -> dict[str, str]:
-        """Battery and arming; see `Device.health`."""
+        """Battery and arming; see `DeviceDriver`."""
         heard = self._heard
         warning = "" if heard.armed else "the autopilot is not armed: its propellers stand"
         if not self._settings.arm:

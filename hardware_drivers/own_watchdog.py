@@ -10,6 +10,7 @@ from hardware_drivers.settings import (
     KingfisherNmea,
     Kobuki,
     MavlinkBoat,
+    OwnDriver,
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
@@ -33,11 +34,18 @@ WATCHDOGS: dict[type, OwnWatchdog] = {
     VelocityTopic: OwnWatchdog("kobuki_node, without a velocity; another node may have no timeout", 0.6),
 }
 # The chip's pins and the lab's node keep the valves as they are; RoboRAN's bridge to /action is not public.
-MOVES_ON: dict[type, str] = {GpioValves: "VALVES", ValveTopic: "VALVES", ThrustTopic: "PROPELLERS"}
+MOVES_ON: dict[type, str] = {
+    GpioValves: "VALVES",
+    ValveTopic: "VALVES",
+    ThrustTopic: "PROPELLERS",
+    OwnDriver: "ACTUATORS",
+}
 
 
 def own_watchdog(driver: Driver) -> OwnWatchdog | None:
     """What stops the device when the driver dies; None if nothing is known to."""
+    if isinstance(driver, OwnDriver) and driver.device_timeout_s:
+        return OwnWatchdog("the device, says its hardware file", driver.device_timeout_s)
     return WATCHDOGS.get(type(driver))
 
 

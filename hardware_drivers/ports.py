@@ -1,4 +1,4 @@
-"""Byte streams to devices: a serial port or a TCP connection, read in a thread of its own, written without waiting."""
+"""Byte streams to devices: serial ports, TCP and UDP, read in a thread of their own, written without waiting."""
 
 from __future__ import annotations
 
@@ -84,11 +84,41 @@ class TcpPort:
         self._socket.close()
 
 
+class UdpPort:
+    """A UDP link to a device: each write is one datagram, and datagrams of the device alone are read."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Choose the device; raises OSError for an unknown host."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.settimeout(READ_S)
+        try:
+            self._socket.connect((host, port))
+        except OSError:
+            self._socket.close()
+            raise
+
+    def read(self) -> bytes:
+        """See `Port`."""
+        try:
+            return self._socket.recv(CHUNK)
+        except (TimeoutError, ConnectionRefusedError):  # a device that is switched on late refuses until then
+            return b""
+
+    def write(self, data: bytes) -> None:
+        """See `Port`."""
+        with contextlib.suppress(ConnectionRefusedError):
+            self._socket.send(data)
+
+    def close(self) -> None:
+        """See `Port`."""
+        self._socket.close()
+
+
 def open_port(address: str, baud: int, patience_s: float) -> Port:
     """Open a device's port, and wait for it if it is not there yet.
 
     Args:
-        address: Path of a serial port, or `tcp://host:port`.
+        address: Path of a serial port, `tcp://host:port` or `udp://host:port`.
         baud: Of a serial port.
         patience_s: Try again for so long [s].
 
@@ -136,14 +166,18 @@ def write_at_once(descriptor: int, data: bytes) -> None:
 
 
 def _maker(address: str, baud: int) -> Callable[[], Port]:
-    if not address.startswith("tcp://"):
+    scheme, _, place = address.partition("://")
+    if scheme not in SCHEMES:
         return lambda: SerialPort(address, baud)
-    host, _, number = address.removeprefix("tcp://").rpartition(":")
+    host, _, number = place.rpartition(":")
     if not host or not number.isdecimal() or not 0 < int(number) < 65536:
         raise ConfigError(
-            f"port = '{address}' must be a serial port such as /dev/ttyUSB0, or tcp://host:port."
+            f"port = '{address}' must be a serial port such as /dev/ttyUSB0, tcp://host:port or udp://host:port."
         )
-    return lambda: TcpPort(host, int(number))
+    return lambda: SCHEMES[scheme](host, int(number))
+
+
+SCHEMES: dict[str, type[TcpPort] | type[UdpPort]] = {"tcp": TcpPort, "udp": UdpPort}
 
 
 class Reader:

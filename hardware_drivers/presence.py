@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fulmar_core.errors import DeviceError
 from hardware_drivers.gpio import FILE_CHIP, line_of
-from hardware_drivers.settings import Driver, GpioValves, KingfisherNmea, Kobuki, MavlinkBoat
+from hardware_drivers.settings import Driver, GpioValves, KingfisherNmea, Kobuki, MavlinkBoat, OwnDriver
 
 CONNECT_S = 0.7  # a host that has not accepted a connection by then is reported as absent [s]
 TCP = ("tcp://", "tcp:")
@@ -31,7 +31,9 @@ def check_presence(driver: Driver, port: str = "") -> None:
     """
     if isinstance(driver, GpioValves):
         _check_chip(port or driver.port, (*driver.lines, driver.bearing.line))
-    elif isinstance(driver, (Kobuki, KingfisherNmea, MavlinkBoat)):
+    elif isinstance(driver, OwnDriver) and "/gpiochip" in (port or driver.port):
+        _check_chip(port or driver.port, ())
+    elif isinstance(driver, (Kobuki, KingfisherNmea, MavlinkBoat, OwnDriver)) and (port or driver.port):
         address = port or driver.port
         if address.startswith(TCP):
             _check_host(address)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fulmar_core.config import Named, load_config
 from fulmar_core.errors import ConfigError
+from fulmar_core.own_class import check_class_path
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Actuators, load_robot
 from hardware_drivers.valve_orders import VALVE_ORDERS
@@ -18,7 +19,7 @@ ValveOrder = Annotated[tuple[int, ...], Named(VALVE_ORDERS)]  # a list, or the n
 
 # A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
 LONGEST_LINGER_S = 2.0
-UNARMED = "not armed: arm: true or --arm"  # what a boat says that may not arm
+UNARMED = "not armed: arm: true or --arm"  # what a device reports that may not be armed
 
 
 def check_linger(linger_s: float) -> None:
@@ -199,7 +200,42 @@ class MavlinkBoat:
             raise ValueError("trim_us ± span_us must lie within 800 and 2200 µs.")
 
 
-Driver = GpioValves | ValveTopic | Kobuki | VelocityTopic | KingfisherNmea | MavlinkBoat | ThrustTopic
+@dataclass(frozen=True)
+class OwnDriver:
+    """A class of the user's own, by its dotted path; see `hardware_drivers.driver.DeviceDriver`."""
+
+    kind: str  # mypackage.mymodule:MyDriver, found in the current folder, then on PYTHONPATH
+    # Serial port, tcp://host:port, udp://host:port or GPIO chip; empty: the class opens what it needs.
+    port: str = ""
+    baud: int = 115200  # of a serial port
+    order: ValveOrder = ()  # of valves: which thruster, counted from 0, each channel opens; empty: 0, 1, 2, ...
+    wiring: tuple[str, ...] = AS_NAMED  # wheel or propeller that each channel turns, `-left` where backwards
+    # Who knows where the robot is: motion capture, the device itself by `read`, or another node that publishes `odom`.
+    odometry: Literal["motion_capture", "device", "other_node"] = "motion_capture"
+    air_bearing: bool = False  # the class has `bearing_on` and `set_bearing` of `AirBearing`
+    # Whether the device may be armed: without it, or --arm, nothing is written. None: it has nothing to arm.
+    arm: bool | None = None
+    device_timeout_s: float = 0.0  # after the last command, when the device itself stops; 0: it does not [s]
+    options: dict[str, Any] = field(default_factory=dict)  # whatever else the class reads
+
+    def __post_init__(self) -> None:
+        """Refuse what is no dotted path, a wiring that leaves a side out, and times without meaning."""
+        try:
+            check_class_path(self.kind)
+        except ConfigError as error:
+            raise ValueError(str(error)) from error
+        check_wiring(self.wiring)
+        if sorted(self.order) != list(range(len(self.order))):
+            raise ValueError(f"'order' must hold each of 0 to {len(self.order) - 1} once.")
+        if not self.device_timeout_s >= 0.0:
+            raise ValueError("device_timeout_s must not be negative.")
+        if self.baud <= 0:
+            raise ValueError(f"baud = {self.baud} must be greater than 0.")
+
+
+Driver = (
+    GpioValves | ValveTopic | Kobuki | VelocityTopic | KingfisherNmea | MavlinkBoat | ThrustTopic | OwnDriver
+)
 NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
     GpioValves: ("gpiod",),
     Kobuki: ("serial",),
@@ -231,18 +267,34 @@ class Hardware:
         return NEEDS.get(type(self.driver), ())
 
     @property
+    def arms(self) -> bool:
+        """Whether the device has to be armed, which a person allows."""
+        return getattr(self.driver, "arm", None) is not None
+
+    @property
+    def opens_valves(self) -> bool:
+        """Whether its wires open valves, which can be heard without any motion."""
+        return load_robot(self.robot).actuators.kind == "thrusters"
+
+    @property
     def measures_odometry(self) -> bool:
         """Whether the device knows where it is; if not, motion capture or another node says so."""
+        if isinstance(self.driver, OwnDriver):
+            return self.driver.odometry == "device"
         return isinstance(self.driver, MEASURES)
 
     @property
     def has_bearing(self) -> bool:
         """Whether the driver switches an air bearing, without which nothing may move."""
+        if isinstance(self.driver, OwnDriver):
+            return self.driver.air_bearing
         return isinstance(self.driver, FLOATS)
 
     @property
     def seen_from_outside(self) -> bool:
         """Whether motion capture alone knows where the robot is."""
+        if isinstance(self.driver, OwnDriver):
+            return self.driver.odometry == "motion_capture"
         return isinstance(self.driver, SEEN_FROM_OUTSIDE)
 
 
@@ -270,7 +322,9 @@ def load_hardware(name: str) -> Hardware:
     path = hardware_path(name)
     hardware = load_config(Hardware, path)
     actuators = load_robot(hardware.robot).actuators
-    if not isinstance(hardware.driver, FITS.get(actuators.kind, ())):
+    if isinstance(hardware.driver, OwnDriver):
+        hardware = replace(hardware, driver=_with_order(hardware.driver, actuators))
+    elif not isinstance(hardware.driver, FITS.get(actuators.kind, ())):
         raise ConfigError(
             f"{path}: driver '{hardware.driver.kind}' cannot move '{hardware.robot}', which has {actuators.kind}."
         )
@@ -292,9 +346,20 @@ def hardware_of(robot: str) -> list[str]:
     )
 
 
+def _with_order(driver: OwnDriver, actuators: Actuators) -> OwnDriver:
+    """The driver of valves with an order, where the file has none."""
+    if actuators.kind != "thrusters" or driver.order:
+        return driver
+    return replace(driver, order=tuple(range(len(actuators.names))))
+
+
 def _count_problem(driver: Driver, actuators: Actuators) -> str:
     count = len(actuators.names)
     order = getattr(driver, "order", None)
+    if isinstance(driver, OwnDriver) and actuators.kind != "thrusters":
+        return "'order' is for thrusters; wheels and propellers have a 'wiring'." if order else ""
+    if isinstance(driver, OwnDriver) and driver.wiring != AS_NAMED:
+        return "'wiring' is for wheels and propellers; thrusters have an 'order'."
     if order is not None and len(order) != count:
         return f"'order' has {len(order)} entries, the robot has {count} thrusters."
     if isinstance(driver, GpioValves) and len(driver.lines) != count:

@@ -1,4 +1,4 @@
-"""Valves and air bearing of a floating platform behind the backend seam."""
+"""Driver of the valves and the air bearing of a floating platform."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import time
 import numpy as np
 from gpiod.line import Value
 
-from fulmar_core.backend import Sample
-from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
+from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.gpio import LineRequest, line_of, output_lines
 from hardware_drivers.settings import GpioValves
 from hardware_drivers.valve_timing import ValveTiming
@@ -18,12 +17,11 @@ from hardware_drivers.valve_timing import ValveTiming
 STATES = {False: Value.INACTIVE, True: Value.ACTIVE}
 
 
-class ThrusterDriver:
+class ThrusterDriver(DeviceDriver):
     """Opens and closes valves by GPIO; knows nothing of where the platform is.
 
     The bearing is a line like the others, but no command of thrust reaches it: it is switched by its service, by the
-    start and the end of the driver, and by a long idle time. While it is off, the valves stay closed: a platform that
-    stands on the floor would only waste its air.
+    start and the end of the driver, and by a long idle time.
     """
 
     def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
@@ -32,7 +30,7 @@ class ThrusterDriver:
         Raises:
             DeviceError: The chip or a line is not there.
         """
-        self.robot, self._settings = robot, settings
+        self._settings = settings
         self._order = np.array(settings.order)
         self._valves = [line_of(line) for line in settings.lines]
         self._bearing = line_of(settings.bearing.line)
@@ -45,33 +43,23 @@ class ThrusterDriver:
         self._bearing_on = False
         self._used_ns = time.monotonic_ns()
 
-    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Begin with closed valves, on air where the hardware file says so; see `Backend.reset`."""
+    def begin(self, x: float, y: float, heading: float) -> None:
+        """Switch the bearing on where the hardware file says so; see `DeviceDriver`."""
         if self._settings.bearing.on_at_start:
             self.set_bearing(True)
-        return self.step(self.robot.actuators.safe_command)
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
-        """Set the valves; see `Backend.step`."""
+    def write(self, command: np.ndarray) -> np.ndarray:
+        """Set the valves; see `DeviceDriver`."""
         now_ns = time.monotonic_ns()
         with self._lock:
-            wanted = np.asarray(command, dtype=float) if self._bearing_on else np.zeros(len(self._valves))
-            applied = self._timing.allowed(wanted, now_ns)
+            applied = self._timing.allowed(command, now_ns)
             self._set(applied)
             self._watch_idleness(bool(applied.any()), now_ns)
-        return Sample(None, None, None, applied=applied)
-
-    def make_safe(self) -> None:
-        """Close every valve; the bearing stays as it is."""
-        with self._lock:
-            self._set(self._timing.allowed(np.zeros(len(self._valves)), time.monotonic_ns()))
+        return applied
 
     def close(self) -> None:
-        """Close every valve, let the platform down after a while, and give the lines back."""
-        with self._lock:
-            carried = self._bearing_on and self._lines is not None
-        if carried:
-            self.make_safe()
+        """Let the platform down after a while, and give the lines back; see `DeviceDriver`."""
+        if self._bearing_on:
             time.sleep(self._settings.bearing.linger_s)
         with self._lock:
             if self._lines is not None:
@@ -81,7 +69,7 @@ class ThrusterDriver:
                 self._lines = None
 
     def health(self) -> dict[str, str]:
-        """Whether it floats; see `Device.health`."""
+        """Whether it floats; see `DeviceDriver`."""
         return {
             "air_bearing": "on" if self._bearing_on else "off",
             "warning": "" if self._bearing_on else "the air bearing is off: the valves stay closed",

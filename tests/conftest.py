@@ -7,6 +7,7 @@ import os
 import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
@@ -19,6 +20,12 @@ class RosDomain:
 
     id: int
     env: dict[str, str]  # environment of every process that shall see it
+
+
+def pytest_collection_finish() -> None:
+    """Exempt every imported module from the garbage collection between tests of ROS nodes."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -37,10 +44,11 @@ def unlogged_learners(tmp_path_factory: pytest.TempPathFactory) -> None:
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosDomain]:
     """Give this test a domain; the test's own process gets its variables too.
 
-    Lifecycle nodes that ended in this process are seen in their domain until they are collected, and nodes that began
-    their loop have frozen all that there was; whoever gets that domain next would find them.
+    Lifecycle nodes that ended in this process are seen in their domain until they are collected: nodes of this process
+    freeze nothing. Where no other plant lives, a plant need not look for one before it starts.
     """
-    gc.unfreeze()
+    monkeypatch.setattr("fulmar_ros.runtime.gc", SimpleNamespace(collect=lambda: None, freeze=lambda: None))
+    monkeypatch.setattr("fulmar_ros.plant_node.BRIEFLY_S", 0.0)
     gc.collect()
     with reserved_domains(1) as (number,):
         own = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}

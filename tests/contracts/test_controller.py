@@ -24,6 +24,7 @@ from fulmar_core.tasks import load_task
 from policy_server.controllers import CONTROLLERS, Choice, load_controller
 from policy_server.shipped import shipped_policies
 from tests.inputs import some_of
+from tests.pairs import covering
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 TASKS = {name: load_task(name) for name in config_names("tasks")}
@@ -31,7 +32,7 @@ LEARNED = {
     (passport.robot, passport.task): str(folder)
     for folder, passport in ((folder, read_passport(folder)) for folder in shipped_policies())
 }
-WORLDS = 40
+WORLDS = 12
 
 
 def has_one(name, robot, task):
@@ -52,9 +53,22 @@ CASES = [
     for task in TASKS.values()
     if has_one(name, robot, task)
 ]
+# Each bundle is a controller of its own; of the others, each robot and each task comes once with every one.
+QUICK = {
+    (name, *pair)
+    for name in CONTROLLERS
+    for pair in covering((robot.name, task.name) for other, robot, task in CASES if other == name)
+} | {("policy", *pair) for pair in LEARNED}
 
 
-@pytest.fixture(params=CASES, ids=lambda case: f"{case[0]}-{case[1].name}-{case[2].name}", scope="module")
+def marked(name, robot, task):
+    """A case as a parameter; slow where the quick ones do without it."""
+    names = (name, robot.name, task.name)
+    marks = () if names in QUICK else pytest.mark.slow
+    return pytest.param((name, robot, task), id="-".join(names), marks=marks)
+
+
+@pytest.fixture(params=[marked(*case) for case in CASES], scope="module")
 def case(request):
     name, robot, task = request.param
     policy = LEARNED.get((robot.name, task.name), "")
@@ -176,15 +190,15 @@ def test_its_metadata_is_json_and_names_who_and_what_with_a_hash(case):
 
 
 @pytest.mark.parametrize("name", ["lqr", "classical"])
-@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
-@pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
-def test_a_pair_without_a_law_is_refused_with_what_to_use_instead(name, robot, task):
-    if has_one(name, robot, task):
-        return
-    with pytest.raises(ConfigError, match="Use --controller") as told:
-        load_controller(name, robot, task, Choice(robot.timing.control_hz))
-    assert f"'{robot.name}'" in str(told.value)
-    assert "is for robots with thrusters" in str(told.value) or "there is one for: go_to_" in str(told.value)
+def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
+    lacking = [(r, t) for r in ROBOTS.values() for t in TASKS.values() if not has_one(name, r, t)]
+    assert lacking
+    for robot, task in lacking:
+        with pytest.raises(ConfigError, match="Use --controller") as told:
+            load_controller(name, robot, task, Choice(robot.timing.control_hz))
+        words = str(told.value)
+        assert f"'{robot.name}'" in words
+        assert "is for robots with thrusters" in words or "there is one for: go_to_" in words
 
 
 def test_the_table_of_laws_knows_every_family():

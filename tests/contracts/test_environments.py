@@ -18,12 +18,14 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from tests.pairs import each_pair
 from training.environments import environment_id
 from training.gym_env import TaskEnv
 from training.vec_env import BatchVecEnv
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 TASKS = {name: load_task(name) for name in config_names("tasks")}
+EACH_PAIR = each_pair(ROBOTS, TASKS)
 RANDOMISED = load_scenario("randomised")
 
 
@@ -35,22 +37,14 @@ def one_thread():
     torch.set_num_threads(before)
 
 
-@pytest.fixture(params=TASKS.values(), ids=TASKS)
-def task(request):
-    return request.param
-
-
-@pytest.fixture(params=ROBOTS.values(), ids=ROBOTS)
-def robot(request):
-    return request.param
-
-
+@EACH_PAIR
 def test_the_checker_of_stable_baselines_accepts_it(robot, task):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gymnasium.make(environment_id(task.name), robot=robot.name).unwrapped)
 
 
+@EACH_PAIR
 def test_two_updates_of_ppo_run_and_stay_finite(robot, task):
     env = BatchVecEnv(robot, task, RANDOMISED, worlds=4, seed=1)
     model = PPO(

@@ -21,21 +21,13 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.topics import GOAL_WIRES
+from tests.pairs import each_pair
 
 TASKS = {name: load_task(name) for name in config_names("tasks")}
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 RANDOMISED = load_scenario("randomised")
+EACH_PAIR, EACH_TASK = each_pair(ROBOTS, TASKS), pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
 COUNT = 50
-
-
-@pytest.fixture(params=TASKS.values(), ids=TASKS)
-def task(request):
-    return request.param
-
-
-@pytest.fixture(params=ROBOTS.values(), ids=ROBOTS)
-def robot(request):
-    return request.param
 
 
 def draw(task, robot, *, training=False, count=COUNT):
@@ -59,6 +51,7 @@ def test_every_kind_of_task_has_a_file():
     assert {type(task) for task in TASKS.values()} == set(get_args(Task))
 
 
+@EACH_PAIR
 @pytest.mark.parametrize("training", [False, True])
 def test_what_is_drawn_is_finite_at_rest_and_within_the_geofence(task, robot, training):
     start, goal = draw(task, robot, training=training, count=300)
@@ -80,6 +73,7 @@ def test_what_is_drawn_is_finite_at_rest_and_within_the_geofence(task, robot, tr
     assert touching is None or not touching.any()
 
 
+@EACH_PAIR
 def test_it_sees_as_many_terms_as_it_has_names_and_no_name_twice(task, robot):
     _, state, goal = on_the_way(task, robot)
     terms = task.observe(state, goal)
@@ -91,6 +85,7 @@ def test_it_sees_as_many_terms_as_it_has_names_and_no_name_twice(task, robot):
     assert len(set(observer.names)) == len(observer.names)
 
 
+@EACH_PAIR
 def test_at_its_target_itself_everything_is_finite(task, robot):
     _, goal = draw(task, robot)
     x, y, yaw = np.moveaxis(goal.targets[:, 0], -1, 0)
@@ -121,6 +116,7 @@ def everything(task, robot, before, after, goal):
     return values
 
 
+@EACH_PAIR
 def test_a_batch_is_treated_like_its_members(task, robot):
     before, after, goal = on_the_way(task, robot)
     together = everything(task, robot, before, after, goal)
@@ -130,12 +126,14 @@ def test_a_batch_is_treated_like_its_members(task, robot):
             np.testing.assert_allclose(one, np.asarray(many)[i], rtol=0, atol=1e-12)
 
 
+@EACH_PAIR
 def test_the_floating_type_is_kept(task, robot):
     before, after, goal = (cast(value, np.float32) for value in on_the_way(task, robot))
     values = everything(task, robot, before, after, goal)
     assert {np.asarray(value).dtype for value in values} <= {np.dtype(np.float32), np.dtype(bool)}
 
 
+@EACH_PAIR
 def test_torch_makes_of_it_what_numpy_does(task, robot):
     torch = pytest.importorskip("torch")
     before, after, goal = on_the_way(task, robot)
@@ -145,6 +143,7 @@ def test_torch_makes_of_it_what_numpy_does(task, robot):
         np.testing.assert_allclose(other.numpy(), one, rtol=0, atol=1e-9)
 
 
+@EACH_PAIR
 def test_fifty_random_steps_stay_finite_with_worlds_that_begin_anew(task, robot):
     simulation = BatchSimulation(robot, task, RANDOMISED, worlds=20, seed=4, training=True)
     rng = np.random.default_rng(5)
@@ -157,6 +156,7 @@ def test_fifty_random_steps_stay_finite_with_worlds_that_begin_anew(task, robot)
             simulation.reset(rng.integers(0, 20, 3))
 
 
+@EACH_PAIR
 def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, robot):
     _, state, goal = on_the_way(task, robot)
     turn, dx, dy = 2.0, 3.0, -1.0
@@ -181,6 +181,7 @@ def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, r
         np.testing.assert_allclose(there, here, rtol=0, atol=1e-9)
 
 
+@EACH_PAIR
 def test_who_is_large_has_room_to_start(task, robot):
     start, goal = draw(task, robot, count=300)
     if goal.obstacles.shape[1]:
@@ -189,13 +190,16 @@ def test_who_is_large_has_room_to_start(task, robot):
         assert np.all((away - goal.obstacles[..., 2])[there] > outline_of(robot).extent)
 
 
+@EACH_TASK
 def test_its_closing_window_fits_into_its_episode(task):
     assert task.tolerance.hold_s < task.episode_s
 
 
+@EACH_TASK
 def test_its_goal_arrives_on_a_wire(task):
     assert task.goal_topic in GOAL_WIRES
 
 
+@EACH_TASK
 def test_it_can_be_written_into_a_record(task):
     json.dumps(asdict(task), allow_nan=False)

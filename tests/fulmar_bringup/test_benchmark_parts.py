@@ -157,14 +157,14 @@ def test_waypoints_are_counted_over_an_episode_over_a_thousand_steps_and_over_as
 def test_a_bound_is_computed_once_and_kept(tmp_path, monkeypatch):
     trial = unit_of(tmp_path, robot="turtlebot2", task="go_through_positions").trial
     drawn = trial.drawn(np.arange(2))
-    first = bound_file.cached_bound(trial, drawn, 20.0, tmp_path)
+    first = bound_file.cached_bound(trial, drawn, 5.0, tmp_path)
     monkeypatch.setattr(bound_file, "waypoint_bound", lambda *_: pytest.fail("computed again"))
-    again = bound_file.cached_bound(trial, drawn, 20.0, tmp_path)
+    again = bound_file.cached_bound(trial, drawn, 5.0, tmp_path)
     np.testing.assert_array_equal(again.goals, first.goals)
     np.testing.assert_array_equal(again.goals_at_top_speed, first.goals_at_top_speed)
     assert (again.name, again.rule) == (first.name, first.rule)
     with pytest.raises(pytest.fail.Exception):
-        bound_file.cached_bound(trial, drawn, 21.0, tmp_path)
+        bound_file.cached_bound(trial, drawn, 6.0, tmp_path)
 
 
 def test_the_hash_of_the_code_knows_the_simulator_only_where_it_is_used():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from fulmar_bringup.cli import app
@@ -28,6 +29,7 @@ def test_a_boat_that_nobody_drove_gives_no_calibration(tmp_path):
     assert not (tmp_path / "calibration.yaml").exists()
 
 
+@pytest.mark.slow
 def test_what_is_known_is_kept_and_what_the_run_does_not_tell_is_named_and_left_out(tmp_path):
     out = tmp_path / "calibration.yaml"
     done = identify(boat(tmp_path, driven_s=3.0), "--known", "mass=35.0+-0.5", "--out", out, "--json")

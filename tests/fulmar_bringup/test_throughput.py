@@ -28,6 +28,9 @@ SMALL = "--robots", "turtlebot2", "--worlds", "6", "--seconds", "0.05"
 LIBRARY = {"numpy": ("--library", "numpy"), "compiled": ("--library", "compiled"), None: ()}
 
 
+ONE_OR_TWO_CORES = pytest.mark.parametrize("cores", ["1", pytest.param("2", marks=pytest.mark.slow)])
+
+
 @pytest.fixture(scope="module")
 def command():
     app = typer.Typer()
@@ -35,7 +38,7 @@ def command():
     return lambda *words, library="numpy": CliRunner().invoke(app, (*words, *LIBRARY[library]))
 
 
-@pytest.mark.parametrize("cores", ["1", "2"])
+@ONE_OR_TWO_CORES
 def test_the_json_has_both_paces_of_each_robot_and_their_ratio(command, cores):
     done = command(
         "--robots", "kingfisher,turtlebot2", "--worlds", "16", "--seconds", "0.05", "--cores", cores, "--json"
@@ -104,7 +107,7 @@ def test_without_a_compiler_numpy_computes_the_batch_and_says_so(command, monkey
     assert "nothing is compiled" in done.stderr
 
 
-@pytest.mark.parametrize("cores", ["1", "2"])
+@ONE_OR_TWO_CORES
 def test_whoever_asks_for_compiled_steps_is_told_that_a_compiler_is_missing(command, monkeypatch, cores):
     pytest.importorskip("torch")
     monkeypatch.setenv("CXX", "no-such-compiler")

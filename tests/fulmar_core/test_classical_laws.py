@@ -21,6 +21,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
 from tests.inputs import inputs_at
+from tests.pairs import covering
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 TASKS = {name: load_task(name) for name in config_names("tasks")}
@@ -44,7 +45,24 @@ def command(robot, task, state, *targets, previous=None):
     return load_classical(robot, task).act(inputs)[0]
 
 
-@pytest.mark.parametrize(("robot", "task"), PAIRS, ids=lambda value: value.name)
+# Robots of a family take turns at its tasks.
+QUICK = {
+    pair for kind in LAWS for pair in covering((r.name, t.name) for r, t in PAIRS if r.actuators.kind == kind)
+}
+
+
+@pytest.mark.parametrize(
+    ("robot", "task"),
+    [
+        pytest.param(
+            robot,
+            task,
+            id=f"{robot.name}-{task.name}",
+            marks=() if (robot.name, task.name) in QUICK else pytest.mark.slow,
+        )
+        for robot, task in PAIRS
+    ],
+)
 def test_it_does_its_task_in_nine_of_ten_episodes(robot, task):
     law = load_classical(robot, task)
     run = roll_out_in_batch(law, robot, task, load_scenario("nominal"), episodes=64, seed=7)

@@ -139,9 +139,17 @@ def test_going_to_a_position_ignores_the_heading():
         assert answers[0] == answers[1] == answers[2]
 
 
-@pytest.mark.parametrize("task", [POSE, POSITION], ids=lambda task: task.name)
-@pytest.mark.parametrize(("hz", "episodes"), [(5.0, 256), (50.0, 16)])
-def test_it_brings_every_platform_home_at_either_rate(task, hz, episodes):
+@pytest.mark.parametrize(
+    ("hz", "episodes", "task"),
+    [
+        (5.0, 256, POSE),
+        (5.0, 256, POSITION),
+        (50.0, 16, POSE),
+        pytest.param(50.0, 16, POSITION, marks=pytest.mark.slow),
+    ],
+    ids=lambda value: getattr(value, "name", str(value)),
+)
+def test_it_brings_every_platform_home_at_either_rate(hz, episodes, task):
     lqr = load_lqr(ROBOT, task, control_hz=hz)
     run = roll_out_in_batch(lqr, ROBOT, task, load_scenario("nominal"), episodes=episodes, seed=5)
     assert successes(run, task).mean() >= 0.99

@@ -20,7 +20,7 @@ TASK = load_task("go_to_position_with_obstacles")
 RULE = TASK.obstacles
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 EACH_ROBOT = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
-MANY = 1000
+MANY = 500
 
 
 def draw(robot, *, training=False):

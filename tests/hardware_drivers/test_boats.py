@@ -19,6 +19,7 @@ from pymavlink import mavutil
 from fulmar_core.errors import ConfigError, DeviceError
 from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
+from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kingfisher_driver import KingfisherDriver
 from hardware_drivers.mavlink_driver import NO_CHANGE, MavlinkDriver, override_of
 from hardware_drivers.mavlink_telemetry import state_of
@@ -67,6 +68,7 @@ def driver(bench, kind):
     else:
         settings = KingfisherNmea("kingfisher_nmea", bench.device.address, THRUST)
         made = KingfisherDriver(bench.robot, settings, patience_s=5.0)
+    made = backend_of(bench.robot, made)
     made.reset(episode_at(bench.robot, *START), seed=0)
     yield made
     made.close()
@@ -123,8 +125,8 @@ def test_a_connection_that_ends_is_told_at_once(bench, driver):
 @pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
 def test_an_autopilot_without_its_host_holds_by_its_own_failsafe(bench, driver):
     drive(driver, (1.0, 1.0), 0.5)
-    driver._over.set()  # as a process that was killed: neither heartbeats nor overrides
-    driver._thread.join()
+    driver._driver._over.set()  # as a process that was killed: neither heartbeats nor overrides
+    driver._driver._thread.join()
     silent = time.monotonic()
     until(lambda: not bench.command.any())
     assert time.monotonic() - silent < 3.2
@@ -137,7 +139,7 @@ def test_an_autopilot_that_may_not_arm_is_measured_and_sent_no_command(bench):
     take = bench.device._take
     bench.device._take = lambda message, now_s: received.append(describe(message)) or take(message, now_s)
     settings = MavlinkBoat("mavlink_boat", bench.device.address, THRUST)
-    driver = MavlinkDriver(bench.robot, settings, patience_s=5.0)
+    driver = backend_of(bench.robot, MavlinkDriver(bench.robot, settings, patience_s=5.0))
     driver.reset(episode_at(bench.robot, *START), seed=0)
     sample = drive(driver, (1.0, 1.0), 0.3)
     assert sample.odometry is not None
@@ -200,7 +202,8 @@ def test_a_serial_autopilot_is_waited_for_and_a_cable_that_takes_no_more_is_an_e
 ):
     threading.Timer(0.5, cable).start()
     boat = MavlinkBoat("mavlink_boat", str(tmp_path / "serial"), THRUST, arm=True)
-    driver = MavlinkDriver(load_robot("kingfisher"), boat, patience_s=5.0)
+    robot = load_robot("kingfisher")
+    driver = backend_of(robot, MavlinkDriver(robot, boat, patience_s=5.0))
     began = time.monotonic()
     with pytest.raises(OSError, match=r"more bytes|unavailable"):
         for _ in range(5000):

@@ -10,6 +10,7 @@ import pytest
 
 from fulmar_core.errors import DeviceError
 from fulmar_core.planar import planar_of
+from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kobuki_driver import KobukiDriver
 from hardware_drivers.settings import Kobuki
 from sim_nodes.emulators.kobuki import TIMEOUT_S, KobukiEmulator
@@ -50,7 +51,8 @@ def bench(tmp_path):
 
 @pytest.fixture
 def driver(bench):
-    driver = KobukiDriver(bench.robot, Kobuki("kobuki", bench.device.address), patience_s=5.0)
+    settings = Kobuki("kobuki", bench.device.address)
+    driver = backend_of(bench.robot, KobukiDriver(bench.robot, settings, patience_s=5.0))
     driver.reset(episode_at(bench.robot, *START), seed=0)
     yield driver
     driver.close()

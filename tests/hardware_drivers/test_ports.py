@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from hardware_drivers.ports import Reader, TcpPort
+from fulmar_core.errors import DeviceError
+from hardware_drivers.ports import Reader, TcpPort, open_port
 from tests.hardware_drivers.bench import until
 
 Read = Callable[[Callable[[bytes], None]], tuple[socket.socket, list[str]]]
@@ -54,3 +55,23 @@ def test_what_cannot_be_taken_is_told_and_does_not_end_the_reading_in_silence(re
     device.sendall(b"x")
     until(lambda: bool(ends))
     assert ends == ["what it said cannot be read (ZeroDivisionError: by a decoder)"]
+
+
+def test_a_udp_device_is_written_to_and_read_from_and_may_be_late():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as device:
+        device.bind(("127.0.0.1", 0))
+        port = open_port(f"udp://127.0.0.1:{device.getsockname()[1]}", 0, 0.0)
+        port.write(b"on")
+        data, driver = device.recvfrom(16)
+        assert data == b"on"
+        device.sendto(b"done", driver)
+        assert port.read() == b"done"
+    for _ in range(3):  # its own end refuses now, as a device that is off does
+        port.write(b"off")
+        assert port.read() == b""
+    port.close()
+
+
+def test_a_host_that_is_unknown_is_refused():
+    with pytest.raises(DeviceError, match="cannot be opened"):
+        open_port("udp://no.such.host.invalid:5", 0, 0.0)

@@ -10,6 +10,7 @@ import pytest
 
 from fulmar_core.errors import DeviceError
 from fulmar_core.robot import load_robot
+from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.gpio import output_lines
 from hardware_drivers.settings import Bearing, GpioValves, load_hardware
 from hardware_drivers.thruster_driver import ThrusterDriver
@@ -34,8 +35,8 @@ def rig(tmp_path, request):
     bank.close()
 
 
-def started(settings) -> ThrusterDriver:
-    driver = ThrusterDriver(ROBOT, settings, patience_s=0.0)
+def started(settings) -> DriverBackend:
+    driver = backend_of(ROBOT, ThrusterDriver(ROBOT, settings, patience_s=0.0))
     driver.reset(episode_at(ROBOT, 0.0, 0.0, 0.0), seed=0)
     return driver
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fulmar_core.robot import load_robot
+from hardware_drivers.driver_backend import STOPS, DriverBackend, backend_of
 from hardware_drivers.settings import LONGEST_LINGER_S, Bearing, ValveTopic
-from hardware_drivers.topic_driver import STOPS, TopicDriver, ValveTopicDriver
+from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
 
 ROBOT = load_robot("floating_platform")
 
@@ -24,11 +25,16 @@ class Listener:
         self.heard.append((time.monotonic(), command, bearing))
 
 
+def floating(listener: Listener, *, bearing_on: bool, linger_s: float) -> DriverBackend:
+    driver = ValveTopicDriver(listener, count=8, bearing_on=bearing_on, linger_s=linger_s)
+    return backend_of(ROBOT, driver)
+
+
 def test_stops_come_one_by_one_and_the_last_has_time_to_arrive():
     """A publisher that keeps one message would send of a burst only the last, and of that one nothing if the process
     ends with it."""
     listener = Listener()
-    driver = TopicDriver(ROBOT, listener)
+    driver = backend_of(ROBOT, TopicDriver(listener))
     driver.step(np.ones(8))
     driver.make_safe()
     times = [at for at, _, _ in listener.heard[1:]] + [time.monotonic()]
@@ -39,7 +45,7 @@ def test_stops_come_one_by_one_and_the_last_has_time_to_arrive():
 
 def test_wheels_of_another_node_slow_down_first():
     listener, base = Listener(), load_robot("turtlebot2")
-    driver = TopicDriver(base, listener)
+    driver = backend_of(base, TopicDriver(listener))
     driver.step(np.array([0.3, -0.6]))
     driver.make_safe()
     sent = np.array([command for _, command, _ in listener.heard])
@@ -50,7 +56,7 @@ def test_wheels_of_another_node_slow_down_first():
 
 def test_at_the_end_the_valves_close_first_and_the_platform_is_let_down_later():
     listener = Listener()
-    driver = ValveTopicDriver(ROBOT, listener, bearing_on=True, linger_s=0.3)
+    driver = floating(listener, bearing_on=True, linger_s=0.3)
     driver.step(np.ones(8))
     driver.close()
     assert not driver.bearing_on
@@ -62,7 +68,7 @@ def test_at_the_end_the_valves_close_first_and_the_platform_is_let_down_later():
 
 def test_a_bearing_that_is_off_needs_no_time():
     listener = Listener()
-    driver = ValveTopicDriver(ROBOT, listener, bearing_on=False, linger_s=1.0)
+    driver = floating(listener, bearing_on=False, linger_s=1.0)
     began = time.monotonic()
     driver.close()
     assert time.monotonic() - began < 0.5

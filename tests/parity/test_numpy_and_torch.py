@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from fulmar_core.planar import COLUMNS
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task, sees_obstacles
+from tests.pairs import covering
 
 torch = pytest.importorskip("torch")
 
@@ -19,6 +22,7 @@ RANDOMISED = load_scenario("randomised")
 WORLDS, STEPS = 32, 60
 # Rounding of some thousand operations on numbers of up to ten; a thruster robot that nobody steers spins fast.
 CLOSE = {"float64": 1e-11, "float32": 2e-4}
+CASES = list(itertools.product(ROBOTS, CLOSE))
 
 
 def trajectory(robot, task, library, dtype, device=None):
@@ -57,8 +61,10 @@ def assert_alike(robot, task, dtype, device):
     np.testing.assert_allclose(theirs, ours, rtol=0, atol=close)
 
 
-@pytest.mark.parametrize("dtype", CLOSE)
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(
+    ("name", "dtype"),
+    [pytest.param(*case, marks=() if case in covering(CASES) else pytest.mark.slow) for case in CASES],
+)
 def test_torch_moves_every_robot_as_numpy_does(name, dtype):
     assert_alike(load_robot(name), load_task("go_to_position_with_obstacles"), dtype, "cpu")
 

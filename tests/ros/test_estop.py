@@ -23,6 +23,7 @@ from fulmar_bringup import robot_operator
 from fulmar_bringup.commands.estop import estop
 from fulmar_bringup.reset_robots import release_without_node
 from fulmar_bringup.running_robots import running_robots, unfit_publishers
+from fulmar_bringup.stop_robots import Stopped, stop_robots
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER, TELEOP
 from fulmar_ros.estop_node import EstopNode
@@ -31,7 +32,7 @@ from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar
-from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, open_valves, until
+from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, open_valves, until
 
 pytestmark = pytest.mark.real_time
 
@@ -160,7 +161,7 @@ def test_one_message_of_any_publisher_stops_the_robot_until_its_node_is_reset(
     assert said[-2:] == [False] * 2  # its own last "pressed" does not press it again
 
 
-@pytest.mark.parametrize("latched", [False, True])
+@pytest.mark.parametrize("latched", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_one_message_stops_a_robot_without_an_e_stop_node_until_a_reset(
     neighbour: Neighbour, plant: PlantNode, latched: bool
 ) -> None:
@@ -238,12 +239,12 @@ def test_the_command_stops_a_robot_and_resets_it(
     until(lambda: drive(neighbour))
 
 
-def test_the_command_stops_a_robot_that_has_no_e_stop_node(
-    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain, tmp_path: Path
+def test_a_robot_that_has_no_e_stop_node_is_stopped_too(
+    neighbour: Neighbour, plant: PlantNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("fulmar_bringup.stop_robots.MISS_S", 0.5)
     until(lambda: drive(neighbour))
-    done = fulmar("estop", "floating_platform", env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    assert stop_robots(neighbour.node, ROBOT, find_s=5.0) == [Stopped(NAMESPACE, heard=True, answer=None)]
     until(lambda: not drive(neighbour))
     time.sleep(0.6)
     assert not drive(neighbour)
@@ -276,7 +277,7 @@ def test_an_e_stop_node_that_hangs_keeps_neither_its_robot_nor_another_from_bein
         until(lambda: not drive(neighbour) and "e-stop: pressed" in neighbour.said["plant"][0])
         for node in nodes:
             node.send_signal(signal.SIGCONT)
-        for _ in range(60):  # they still say "released"
+        for _ in range(30):  # they still publish "released", 20 times a second
             time.sleep(0.02)
             assert not drive(neighbour)
     finally:
@@ -292,8 +293,9 @@ def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain
 
 
 def test_a_publisher_of_another_type_or_quality_of_service_is_a_warning_that_names_it(
-    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain
+    neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("fulmar_ros.wire_watch.LOOK_S", 0.2)
     context = rclpy.Context()  # of one process: a topic has one type there
     rclpy.init(context=context, domain_id=ros_domain.id)
     panel = rclpy.create_node("panel", namespace="/desk", context=context)

@@ -21,8 +21,7 @@ from tests.ros.cli import fulmar, json_of
 pytestmark = pytest.mark.real_time
 
 ROBOTS = ("floating_platform", "turtlebot2", "kingfisher")
-QUICK = {"floating_platform": "controller_killed"}
-THROUGH_THE_COMMAND = ("turtlebot2", "bundle_refused")
+THROUGH_THE_COMMAND = ("floating_platform", "controller_killed")
 KEYS = [
     "name",
     "detected_by",
@@ -36,8 +35,7 @@ KEYS = [
 
 
 def others() -> list:
-    """Every fault of every robot that no quicker test does; those that cannot be done here say why."""
-    done = {*QUICK.items(), THROUGH_THE_COMMAND}
+    """Every fault of every robot but that of the quick test; those that cannot be done here say why."""
     cases = []
     for robot in ROBOTS:
         possible, skipped = faults_of(robot)
@@ -46,7 +44,7 @@ def others() -> list:
             pytest.param(robot, None, id=f"{robot}-{one.name}", marks=pytest.mark.skip(one.reason))
             for one in skipped
         ]
-    return [case for case in cases if tuple(case.id.split("-")) not in done]
+    return [case for case in cases if tuple(case.id.split("-")) != THROUGH_THE_COMMAND]
 
 
 def test_a_robot_has_the_faults_that_mean_something_to_it():
@@ -109,7 +107,9 @@ def test_a_fault_that_cannot_be_done_says_so_and_loses_no_other(ros_domain: RosD
     assert found[0].reaction == "ZeroDivisionError: no way"
 
 
-def test_the_command_tells_everything_in_json(ros_domain: RosDomain, tmp_path: Path) -> None:
+def test_a_fault_is_survived_and_the_command_reports_all_of_it_in_json(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
     robot, fault = THROUGH_THE_COMMAND
     asked = ("faults", "--robot", robot, "--only", fault, "--json")
     done = fulmar(*asked, env=ros_domain.env, cwd=tmp_path)
@@ -120,13 +120,6 @@ def test_the_command_tells_everything_in_json(ros_domain: RosDomain, tmp_path: P
     assert list(found) == KEYS
     assert found["passed"], found
     assert done.returncode == 0
-
-
-@pytest.mark.parametrize(("robot", "name"), QUICK.items())
-def test_a_fault_is_survived(robot: str, name: str, ros_domain: RosDomain) -> None:
-    faults, _ = faults_of(robot, [name])
-    (found,) = run_faults(robot, faults, lambda _done: None)
-    assert found.passed, found
 
 
 @pytest.mark.slow

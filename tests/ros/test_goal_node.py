@@ -239,6 +239,7 @@ def test_with_robot_and_controller_the_node_goes_on(tmp_path, neighbour: Neighbo
     assert codes == []
 
 
+@pytest.mark.slow  # the node itself ends in half a second, above
 def test_goals_for_a_robot_that_is_not_up_end_with_one_line(tmp_path, ros_domain: RosDomain) -> None:
     words = ("goals", "lab_pose", "--robot", "floating_platform")
     done = fulmar(*words, env=ros_domain.env, cwd=tmp_path, timeout_s=30.0)

@@ -158,7 +158,7 @@ def valves(neighbour: Neighbour, tmp_path: Path) -> Iterator[tuple[ValveBank, ps
 
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize(
-    "number", ["SIGTERM", "SIGHUP", *(pytest.param(n, marks=pytest.mark.slow) for n in ("SIGINT", "SIGQUIT"))]
+    "number", ["SIGHUP", *(pytest.param(n, marks=pytest.mark.slow) for n in ("SIGTERM", "SIGINT", "SIGQUIT"))]
 )
 def test_a_driver_that_is_told_to_end_closes_its_valves_first(valves, number: str) -> None:
     """SIGHUP is what a driver hears whose ssh connection drops."""

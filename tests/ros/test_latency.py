@@ -14,6 +14,7 @@ from fulmar_core.errors import ConfigError
 pytestmark = pytest.mark.real_time
 
 
+@pytest.mark.slow
 def test_a_cell_tells_latency_errors_of_the_period_and_what_each_node_uses() -> None:
     """rclpy's own executor, whose figures nothing is asked of, at 100 Hz."""
     figures = measure([Cell(100.0, False, "default")], 1.0, lambda _done: None)

@@ -39,7 +39,7 @@ from tests.ros.neighbour import NAMESPACE, Neighbour
 from tests.states import planar_state
 
 FUZZ = settings(
-    max_examples=60,
+    max_examples=40,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

@@ -43,6 +43,7 @@ def test_poses_come_at_200_hz_beside_odometry_at_50_hz(neighbour: Neighbour) -> 
     assert np.median(np.diff(measured)) == pytest.approx(0.02, abs=0.001)
 
 
+@pytest.mark.slow
 def test_a_run_with_a_remapped_motion_capture_estimates_from_it_and_records_it(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

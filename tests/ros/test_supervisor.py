@@ -93,9 +93,11 @@ def reason(overseer: Supervisor) -> str:
     return overseer.controller.values.get("reason", "")
 
 
-def give(overseer: Supervisor, failures: list[Exception], listeners: int = 1) -> threading.Thread:
-    """Give a goal from a thread, for at most 5 s."""
-    until_s = time.monotonic() + 5.0
+def give(
+    overseer: Supervisor, failures: list[Exception], listeners: int = 1, within_s: float = 5.0
+) -> threading.Thread:
+    """Give a goal from a thread."""
+    until_s = time.monotonic() + within_s
 
     def alive() -> None:
         if time.monotonic() > until_s:
@@ -151,7 +153,7 @@ def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_told_again_by_itsel
     button.pressed = True
     until(lambda: "e-stop: pressed" in reason(overseer))
     failures: list[Exception] = []
-    giving = give(overseer, failures)
+    giving = give(overseer, failures, within_s=2.5)
     until(lambda: overseer.controller.values.get("goal_refused", "").startswith("e-stop: pressed"))
     button.pressed = False
     released = other.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))

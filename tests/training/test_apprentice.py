@@ -53,6 +53,7 @@ def error(learner, env):
     return float(np.mean((actions - teacher_of(env.unwrapped).actions(raw)) ** 2))
 
 
+@pytest.mark.slow
 def test_lessons_bring_a_policy_near_to_what_the_lqr_does(settings):
     many = replace(settings.algorithm, lessons=60)
     assert error(*learned(replace(settings, algorithm=many), 60)) < 0.3 * error(*learned(settings, 1))
@@ -71,9 +72,8 @@ def test_lessons_leave_the_noise_of_exploration_as_it_was(settings):
     np.testing.assert_allclose(learner.policy.log_std.detach().numpy(), -2.0)
 
 
-@pytest.mark.parametrize(
-    "first", [pytest.param(5, marks=pytest.mark.slow), LESSONS + 1], ids=["within the lessons", "after them"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("first", [5, LESSONS + 1], ids=["within the lessons", "after them"])
 def test_a_resumed_apprentice_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_path, settings, first):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     train(ROBOT, TASK, settings, seed=1, out=whole, updates=LESSONS + 2)

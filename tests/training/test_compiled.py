@@ -16,6 +16,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from tests.pairs import each_pair
 from training import kernel
 from training.compiled import CompiledStep
 from training.kernel import compiler_found
@@ -30,6 +31,10 @@ pytestmark = pytest.mark.skipif(
 RANDOMISED = load_scenario("randomised")
 ROBOT, TASK = load_robot("turtlebot2"), load_task("track_velocities")  # quick to compile
 WORLDS = 24
+EACH_PAIR = each_pair(
+    {name: load_robot(name) for name in config_names("robots")},
+    {name: load_task(name) for name in config_names("tasks")},
+)
 
 
 def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None):
@@ -76,10 +81,9 @@ def traced(monkeypatch):
     return graphs
 
 
-@pytest.mark.parametrize("task", config_names("tasks"))
-@pytest.mark.parametrize("robot", config_names("robots"))
+@EACH_PAIR
 def test_one_trace_moves_worlds_of_every_pair_as_in_numpy(robot, task, traced):
-    assert_moves_as_in_numpy(load_robot(robot), load_task(task), steps=12)
+    assert_moves_as_in_numpy(robot, task, steps=12)
     assert len(traced) == 1
     (made,) = traced[0].graph.output_node().args
     assert len(set(made)) == len(made)  # nothing is copied, neither what stays nor what two names have

@@ -183,7 +183,9 @@ def test_a_loaded_learner_is_the_one_that_was_saved(tmp_path):
     assert again.num_timesteps == 256
 
 
-@pytest.mark.parametrize("space", [MULTI_BINARY, ORDERS, BOX])
+@pytest.mark.parametrize(
+    "space", [MULTI_BINARY, *(pytest.param(space, marks=pytest.mark.slow) for space in (ORDERS, BOX))]
+)
 def test_it_learns(space):
     fast = learner(FastPPO, space, learning_rate=3e-3, precision=fast_precision())
     fast.learn(6_000)

@@ -73,6 +73,7 @@ def test_making_all_of_them_takes_under_ninety_minutes():
     assert expected_s(jobs, table.at_once) + judging < 90.0 * 60.0
 
 
+@pytest.mark.slow
 def test_how_long_a_policy_takes_is_known_from_its_bundle_and_guessed_without_one(small_job, monkeypatch):
     monkeypatch.setattr(policies, "UPDATES_A_SECOND", 1e-4)  # so slow that no run takes as long as is guessed
     assert expected_s([], 2) == 0.0
@@ -140,7 +141,7 @@ def small_job(small_settings, tmp_path) -> Job:
     )
 
 
-def test_a_policy_is_made_once_and_again_only_when_it_is_made_from_something_else(
+def test_a_policy_is_made_once_and_again_only_when_it_is_made_from_something_else_or_damaged(
     small_job, robot, task, tmp_path
 ):
     table, executor = PolicyTable(2, 2, (ONE,)), Here()
@@ -153,11 +154,15 @@ def test_a_policy_is_made_once_and_again_only_when_it_is_made_from_something_els
     (second,) = make_policies(table, [small_job], executor, lambda *_: None)
     assert second == first | {"made": False}
     changed = replace(small_job, recipe="other", out=tmp_path / "other")
+    assert not is_made(changed)
+    (small_job.bundle / "policy.onnx").write_bytes(b"")
+    assert not is_made(small_job)
     (third,) = make_policies(table, [changed], executor, lambda *_: None)
     assert third["made"] is True
     assert executor.names == [ONE.name] * 2
 
 
+@pytest.mark.slow
 def test_a_policy_that_is_set_aside_is_kept_and_made_again_to_the_last_bit(small_job):
     table, executor = PolicyTable(2, 2, (ONE,)), Here()
     assert set_aside(small_job) is None
@@ -171,12 +176,6 @@ def test_a_policy_that_is_set_aside_is_kept_and_made_again_to_the_last_bit(small
     bundles = [small_job.bundle, *(folder / "bundle" for folder in folders)]
     assert len({(bundle / "policy.onnx").read_bytes() for bundle in bundles}) == 1
     assert all((folder / "run.json").is_file() for folder in folders)
-
-
-def test_a_damaged_bundle_is_made_again(small_job):
-    make_policies(PolicyTable(1, 2, (ONE,)), [small_job], Here(), lambda *_: None)
-    (small_job.bundle / "policy.onnx").write_bytes(b"")
-    assert not is_made(small_job)
 
 
 def test_a_policy_that_could_not_be_made_is_reported(small_job):

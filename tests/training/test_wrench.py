@@ -26,7 +26,9 @@ from training.vec_env import BatchVecEnv
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 
 
-@pytest.fixture(scope="module", params=[True, False], ids=["told", "not told"])
+@pytest.fixture(
+    scope="module", params=[True, pytest.param(False, marks=pytest.mark.slow)], ids=["told", "not told"]
+)
 def learner(request, small_settings):
     worlds = BatchVecEnv(
         ROBOT, TASK, load_scenario("drift_training"), worlds=32, seed=3, told=request.param, wrench=True

@@ -36,7 +36,8 @@ from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
-from fulmar_core.errors import FulmarError, RunFailed
+from fulmar_core.errors import ConfigError, FulmarError, RunFailed
+from fulmar_core.exit_codes import BAD_USAGE
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import HOLDS
@@ -77,7 +78,8 @@ def conduct(request: RunRequest) -> RunOutcome:
         The outcome; a failed run has one too, with whatever was recorded.
 
     Raises:
-        ConfigError: Another run goes on in this ROS domain, or a plant of this name lives in it.
+        ConfigError: Another run goes on in this ROS domain, a plant of this name lives in it, or the plant refused its
+            configuration.
         DeviceError: The device is not there.
     """
     if request.plan.hardware and not request.plan.emulated:
@@ -103,6 +105,9 @@ def _run(request: RunRequest) -> tuple[str, int]:
 
     Returns:
         Why the run failed, empty if it did not; and how many commands the plant was given in lock step.
+
+    Raises:
+        ConfigError: The plant refused its configuration.
     """
     plan = replace(request.plan, supervised=True)
     group = ProcessGroup()
@@ -128,6 +133,9 @@ def _run(request: RunRequest) -> tuple[str, int]:
     finally:
         ends += group.stop_all()
         folders.close()
+    if any(end.name == "plant" and end.returncode == BAD_USAGE for end in ends):
+        shutil.rmtree(request.record, ignore_errors=True)  # nothing has run
+        raise ConfigError(failure)
     return _with_ends(failure, ends), int(plant.values.get("steps", 0))
 
 

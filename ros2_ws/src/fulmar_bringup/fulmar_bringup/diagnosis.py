@@ -57,9 +57,10 @@ def diagnose_hardware(name: str | None) -> list[Finding]:
     Raises:
         ConfigError: There is no such file, or it has a mistake.
     """
+    from hardware_drivers.own_driver import check_own_driver
     from hardware_drivers.own_watchdog import own_watchdog, when_the_driver_dies
     from hardware_drivers.presence import check_presence
-    from hardware_drivers.settings import load_hardware
+    from hardware_drivers.settings import OwnDriver, load_hardware
 
     findings = []
     for each in [name] if name else config_names("hardware"):
@@ -67,6 +68,12 @@ def diagnose_hardware(name: str | None) -> list[Finding]:
         findings += [_part(module, "hardware") for module in hardware.needs]
         unprotected = own_watchdog(hardware.driver) is None
         findings.append(Finding(each, True, when_the_driver_dies(hardware.driver), warning=unprotected))
+        if isinstance(hardware.driver, OwnDriver):
+            try:
+                check_own_driver(hardware.driver)
+                findings.append(Finding(f"{each}: driver", True, f"{hardware.driver.kind}, your own class"))
+            except FulmarError as error:
+                findings.append(Finding(f"{each}: driver", False, str(error), "See docs/own-driver.md."))
         if name:
             try:
                 check_presence(hardware.driver)

@@ -7,12 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fulmar_core.errors import ConfigError
 from hardware_drivers.settings import (
+    Driver,
     GpioValves,
     Hardware,
     KingfisherNmea,
     Kobuki,
     MavlinkBoat,
+    OwnDriver,
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
@@ -31,14 +34,32 @@ class Emulation:
     more: Parameters = field(default_factory=dict)  # parameters of the emulator
 
 
+def check_emulated(driver: Driver) -> None:
+    """Refuse a driver whose device no emulator speaks for.
+
+    Raises:
+        ConfigError: It is a class of the user's own.
+    """
+    if isinstance(driver, OwnDriver):
+        raise ConfigError(
+            f"no emulator speaks for the device of your own driver '{driver.kind}'. Leave --emulate out, and let "
+            "`port:` of the hardware file name an emulator of your own, such as a pseudo-terminal."
+        )
+
+
 def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
     """What stands in for a hardware file's device.
 
     Args:
         hardware: The file.
         folder: Where wires that are files are made.
+
+    Raises:
+        ConfigError: There is none for it.
     """
     driver = hardware.driver
+    check_emulated(driver)
+    assert not isinstance(driver, OwnDriver)
     if isinstance(driver, ValveTopic):
         takes: Parameters = {"order": list(driver.order), "message": driver.message}
         return Emulation(driver.kind, driver.topic, "", takes)

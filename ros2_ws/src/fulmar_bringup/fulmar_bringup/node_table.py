@@ -25,6 +25,7 @@ from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
+from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
 
@@ -338,6 +339,7 @@ def list_nodes(
     plan = RunPlan(*chosen, control_hz=hz, policy=policy or "", guards=base.guards, recording=base.recorder)
     if plan.backend == "hardware":
         path = default_hardware(plan.robot, hardware)
+        check_own_driver(load_hardware(path).driver)
         guards = (
             base.guards if base.backend == "hardware" else default_guards(plan.controller, "hardware", path)
         )

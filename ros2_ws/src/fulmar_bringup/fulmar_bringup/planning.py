@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from fulmar_bringup.emulation import check_emulated
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.remapping import read_remappings
@@ -38,6 +39,7 @@ from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
+from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import UNARMED, MavlinkBoat, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry
 from policy_server.shipped import shipped_policies, shipped_policy
@@ -201,7 +203,12 @@ def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: b
         raise ConfigError(
             "a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate."
         )
-    return default_hardware(robot, asked)
+    path = default_hardware(robot, asked)
+    driver = load_hardware(path).driver
+    if emulate:
+        check_emulated(driver)
+    check_own_driver(driver)
+    return path
 
 
 def check_arming(hardware: str, *, arm: bool) -> None:
@@ -214,14 +221,19 @@ def check_arming(hardware: str, *, arm: bool) -> None:
     Raises:
         ConfigError: One of the two.
     """
-    driver = load_hardware(hardware).driver if hardware else None
-    if not isinstance(driver, MavlinkBoat):
+    file = load_hardware(hardware) if hardware else None
+    if file is None or not file.arms:
         if arm:
-            raise ConfigError("--arm is for boats with an autopilot (driver 'mavlink_boat'); leave it out.")
-    elif not (arm or driver.arm):
+            raise ConfigError(
+                "--arm is for boats with an autopilot (driver 'mavlink_boat') and own drivers with `arm`; leave it out."
+            )
+    elif not (arm or getattr(file.driver, "arm", None)):
+        driver, does = file.driver, "arms the device"
+        if isinstance(driver, MavlinkBoat):
+            channels = f"{driver.steering_channel} and {driver.throttle_channel}"
+            does = f"sets MANUAL, arms the boat and overrides RC channels {channels}"
         raise ConfigError(
-            f"{hardware}: {UNARMED}. Driving sets MANUAL, arms the boat and overrides RC channels "
-            f"{driver.steering_channel} and {driver.throttle_channel}. Write arm: true into the file, or give --arm, "
+            f"{hardware}: {UNARMED}. Driving {does}. Write arm: true into the file, or give --arm, "
             "once the propellers are clear."
         )
 

@@ -130,7 +130,8 @@ def default_hardware(robot: str, asked: str | None = None) -> str:
     if not mine:
         known = ", ".join(sorted({load_hardware(name).robot for name in config_names("hardware")}))
         raise ConfigError(
-            f"there is no hardware driver for '{robot}' (there is one for: {known}). Use --backend mujoco or mock."
+            f"there is no hardware driver for '{robot}' (there is one for: {known}). "
+            "Use --backend mujoco or mock, or write a driver of your own: docs/own-driver.md."
         )
     return str(hardware_path(mine[0]).absolute())
 

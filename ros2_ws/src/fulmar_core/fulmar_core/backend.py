@@ -77,14 +77,6 @@ class Backend(Protocol):
         ...
 
 
-class Device(Backend, Protocol):
-    """A backend that is a machine: it has a state of its own to tell."""
-
-    def health(self) -> dict[str, str]:
-        """What people should know, by name: battery, bumpers, lost bytes; `warning` holds what is wrong, or nothing."""
-        ...
-
-
 @runtime_checkable
 class AirBearing(Protocol):
     """What keeps a platform afloat: supervised apart from thrust, and never dropped by a command's absence."""

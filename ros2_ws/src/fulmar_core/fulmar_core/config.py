@@ -2,7 +2,8 @@
 
 Knows types and files, not what a robot or a task is. The supported field types are
 bool, int, float, str, `X | None`, `Literal`, `tuple[X, ...]`, `tuple[X, Y, Z]`, `dict[str, X]`,
-nested dataclasses, unions of dataclasses told apart by a field `kind`, and `Annotated[X, Named({...})]`.
+nested dataclasses, unions of dataclasses told apart by a field `kind`, `Annotated[X, Named({...})]`, and `Any` for
+plain values of any shape. A member of a union whose `kind` is text stands for every dotted path of a class.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any, TypeVar
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.own_class import EXAMPLE, SEPARATOR
 from fulmar_core.yaml_text import YamlError, compose, plain
 
 T = TypeVar("T")
@@ -113,6 +115,8 @@ class _Builder:
             if names and isinstance(node, ScalarNode):
                 return names[0][self._choice(tuple(names[0]), self._scalar(node, where), node, where)]
             return self.build(kind, node, where)
+        if kind is Any:
+            return self._plain(node, where)
         if dataclasses.is_dataclass(kind) and isinstance(kind, type):
             return self._dataclass(kind, node, where)
         if origin is tuple:
@@ -126,6 +130,19 @@ class _Builder:
         if origin is typing.Literal:
             return self._choice(typing.get_args(kind), value, node, where)
         return self._checked(kind, value, node, where)
+
+    def _plain(self, node: Node, where: str) -> Any:
+        """Mappings with text for keys, lists, and single values of JSON's types."""
+        if isinstance(node, MappingNode):
+            return {key: self.build(Any, value, f"'{key}'") for key, _, value in self._pairs(node, where)}
+        if isinstance(node, SequenceNode):
+            return [self.build(Any, item, f"{where} entry {i + 1}") for i, item in enumerate(node.value)]
+        value = self._scalar(node, where)
+        if not isinstance(value, str | bool | int | float | None):
+            self.fail(
+                node, f"{where} = {node.value!r} must be text, a number, true or false; quote it for text."
+            )
+        return value
 
     def _pairs(self, node: Node, where: str) -> list[tuple[str, Node, Node]]:
         if not isinstance(node, MappingNode):
@@ -181,11 +198,17 @@ class _Builder:
 
     def _member(self, members: list[Any], node: Node, where: str) -> Any:
         """The member of a union of dataclasses that the key `kind` names."""
-        kinds = {typing.get_args(typing.get_type_hints(member)["kind"])[0]: member for member in members}
+        hints = {member: typing.get_type_hints(member)["kind"] for member in members}
+        kinds = {typing.get_args(hint)[0]: member for member, hint in hints.items() if hint is not str}
+        own = next((member for member, hint in hints.items() if hint is str), None)
+        more = f" Or name a class of your own: {EXAMPLE}." if own else ""
         for name, _, value in self._pairs(node, where):
             if name == "kind":
-                return kinds[self._choice(tuple(kinds), self._scalar(value, "'kind'"), value, "'kind'")]
-        self.fail(node, f"{where} lacks the key 'kind' (one of: {', '.join(sorted(kinds))}).")
+                kind = self._scalar(value, "'kind'")
+                if own and isinstance(kind, str) and SEPARATOR in kind:
+                    return own
+                return kinds[self._choice(tuple(kinds), kind, value, "'kind'", more)]
+        self.fail(node, f"{where} lacks the key 'kind' (one of: {', '.join(sorted(kinds))}).{more}")
 
     def _scalar(self, node: Node, where: str) -> Any:
         if not isinstance(node, ScalarNode):
@@ -195,9 +218,10 @@ class _Builder:
         except YamlError as error:
             self.fail(node, f"{where} = {node.value!r} cannot be read: {error}.")
 
-    def _choice(self, allowed: tuple[Any, ...], value: Any, node: Node, where: str) -> Any:
+    def _choice(self, allowed: tuple[Any, ...], value: Any, node: Node, where: str, more: str = "") -> Any:
         if value not in allowed:
-            self.fail(node, f"{where} = {value!r} is not known.{did_you_mean(str(value), map(str, allowed))}")
+            near = did_you_mean(str(value), map(str, allowed))
+            self.fail(node, f"{where} = {value!r} is not known.{near}{more}")
         return value
 
     def _checked(self, kind: Any, value: Any, node: Node, where: str) -> Any:

@@ -86,8 +86,10 @@ def can_hold(
     """
     working = np.ones(len(_valves(robot).nozzles))
     working[list(lost)] = 0.0
-    tried = np.arange(HEADINGS) * 2.0 * np.pi / HEADINGS if heading is None else np.array([heading])
     push = np.asarray(force, dtype=float)
+    # Without a force from outside every heading is alike.
+    headings = HEADINGS if np.any(push) else 1
+    tried = np.arange(headings) * 2.0 * np.pi / headings if heading is None else np.array([heading])
     return any(hold_margin(robot, working, push, torque, float(yaw)) > LEAST_MARGIN for yaw in tried)
 
 

@@ -37,7 +37,7 @@ class PlantHealth:
         mode: inactive, waiting, running, stopping, finished or fault.
         reason: Why it is in fault, or could not be configured.
         awaited: Subscribers without whom it does not begin.
-        more: What a device has to tell by itself; see `Device.health`.
+        more: Health that a device reports; see `hardware_drivers.driver.DeviceDriver`.
     """
 
     def __init__(self, robot: str) -> None:

@@ -12,8 +12,8 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
-from fulmar_core.errors import FulmarError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.exit_codes import BAD_USAGE, FAILED
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopWatch
@@ -78,6 +78,7 @@ class PlantNode(LifecycleNode):
         load_task(self.settings.task)
         self._make_backend, self._request_exit, self._simulated = make_backend, request_exit, simulated
         self._backend: Backend | None = None
+        self._exit_code = 0
         self._air: AirBearingWires | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
@@ -119,8 +120,10 @@ class PlantNode(LifecycleNode):
             self._backend = self._make_backend(self.robot, self.settings)
         except (FulmarError, ValueError, ImportError) as error:
             self.health.reason = str(error)
+            self._exit_code = BAD_USAGE if isinstance(error, ConfigError) else 0
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
+        self._exit_code = 0
         self.wires = PlantWires(
             self,
             self.robot,
@@ -173,8 +176,12 @@ class PlantNode(LifecycleNode):
         self._dismantle()
         return DONE
 
-    def stop(self) -> None:
-        """Last words before the process ends: the safe command, several times."""
+    def stop(self) -> int:
+        """Last words before the process ends: the safe command, several times.
+
+        Returns:
+            Exit code: 2 where the last configuration was refused for a mistake in a file.
+        """
         self._halt()
         if self._backend is not None:
             try:
@@ -183,6 +190,7 @@ class PlantNode(LifecycleNode):
                 self._backend.close()
                 if self._air is not None:
                     self._air.tell()
+        return self._exit_code
 
     def run_episode(self, episode: Episode, *, number: int, seed: int, steps: int, on_step: OnStep) -> None:
         """Run one episode in lock step, from the caller's thread, on a configured node.

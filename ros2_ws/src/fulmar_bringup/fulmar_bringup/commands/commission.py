@@ -59,24 +59,28 @@ def commission(
     from fulmar_bringup.commissioning.commission import WIRINGS, Request
     from fulmar_bringup.commissioning.commission import commission as conduct
     from fulmar_bringup.commissioning.hardware_file import line_of, write_line
+    from fulmar_bringup.emulation import check_emulated
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import check_arming
+    from hardware_drivers.own_driver import check_own_driver
     from hardware_drivers.presence import check_presence
-    from hardware_drivers.settings import GpioValves, ValveTopic, hardware_path, load_hardware
+    from hardware_drivers.settings import hardware_path, load_hardware
 
     file = load_hardware(hardware)
     if wiring not in WIRINGS:
         raise UnknownNameError("wiring", wiring, WIRINGS)
     if not emulate and wiring != "as_written":
         raise ConfigError("--wiring goes with --emulate: a real robot has the wiring that it has.")
-    valves = isinstance(file.driver, (GpioValves, ValveTopic))
-    if not valves and not yes:
+    if not file.opens_valves and not yes:
         raise ConfigError(
             f"'{file.robot}' has no valves to click: each pulse moves it. Give --yes once 0.5 m around it are free."
         )
     if (write or out) and not yes:
         raise ConfigError("clicks find no order to write: --write and --out need --yes.")
     check_arming(hardware, arm=arm)
+    if emulate:
+        check_emulated(file.driver)
+    check_own_driver(file.driver)
     require(*(("mujoco",) if emulate else ()), *file.needs)
     if not emulate:
         check_presence(file.driver, port)

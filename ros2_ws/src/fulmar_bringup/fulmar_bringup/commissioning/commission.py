@@ -28,7 +28,7 @@ from fulmar_core.commissioning.match import indistinct, left_over
 from fulmar_core.robot import Robot, load_robot
 from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.runtime import spinning
-from hardware_drivers.settings import GpioValves, Hardware, ValveTopic, hardware_path, load_hardware
+from hardware_drivers.settings import GpioValves, Hardware, hardware_path, load_hardware
 from hardware_drivers.wiring import SIDES
 
 WIRINGS = ("as_written", "shuffled", "inverted", "dead")  # of an emulated device
@@ -111,7 +111,7 @@ def _session(
                 node,
                 robot,
                 from_outside=hardware.seen_from_outside,
-                bearing=isinstance(hardware.driver, (GpioValves, ValveTopic)),
+                bearing=hardware.has_bearing,
                 ended=ended,
             )
             session.needs_poses = request.pulses
@@ -246,7 +246,7 @@ def rewired(hardware: Hardware, wiring: str, seed: int) -> Mapping[str, Any]:
         seed: Which shuffle, which dead wire.
     """
     rng, count = random.Random(seed), len(wires_of(hardware))
-    valves = isinstance(hardware.driver, (GpioValves, ValveTopic))
+    valves = hardware.opens_valves
     if wiring == "dead":
         return {"dead": [rng.randrange(count)]}
     if wiring == "shuffled" and valves:

@@ -10,7 +10,7 @@ import numpy as np
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.robot import Robot
-from hardware_drivers.settings import GpioValves, Hardware, ValveTopic
+from hardware_drivers.settings import GpioValves, Hardware, OwnDriver, ValveTopic
 from hardware_drivers.wiring import SIDES
 
 WHEEL_SPEED = 0.1  # of the rim of one wheel, our value: a step of some centimetres [m/s]
@@ -32,6 +32,8 @@ def wires_of(hardware: Hardware) -> list[Wire]:
         return [Wire(f"line {line}", nozzle) for line, nozzle in zip(driver.lines, driver.order, strict=True)]
     if isinstance(driver, ValveTopic):
         return [Wire(f"value {number}", nozzle) for number, nozzle in enumerate(driver.order, start=1)]
+    if isinstance(driver, OwnDriver) and driver.order:
+        return [Wire(f"channel {number}", nozzle) for number, nozzle in enumerate(driver.order)]
     return [
         Wire(f"{channel} channel", SIDES.index(side.removeprefix("-")), -1.0 if side.startswith("-") else 1.0)
         for channel, side in zip(SIDES, driver.wiring, strict=True)

@@ -1,0 +1,137 @@
+"""A device driver behind the backend seam: stops it in order, and never calls it twice at once."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+
+from fulmar_core.actuators.slowdown import slowdown
+from fulmar_core.backend import AirBearing, Sample
+from fulmar_core.episode import Episode
+from fulmar_core.errors import DeviceError
+from fulmar_core.robot import Robot
+from hardware_drivers.driver import DeviceDriver
+
+STOPS = 5  # the safe command goes out this often: one may be lost
+# Between them, and after the last: publishers keep one message, and the process may end right after it.
+STOP_PERIOD_S = 0.02
+HANGS_S = 0.5  # a write that takes longer than this will not come back
+
+
+class DriverBackend:
+    """Drives one robot by its driver."""
+
+    def __init__(self, robot: Robot, driver: DeviceDriver) -> None:
+        """Take over a driver that is connected."""
+        self.robot, self._driver = robot, driver
+        self._sent = robot.actuators.safe_command
+        self._writing = threading.Lock()
+        self._closed = False
+
+    def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
+        """Take the pose of the episode for where the robot stands, and send the safe command; see `Backend.reset`."""
+        start = episode.start
+        self._driver.begin(float(start.x), float(start.y), float(start.yaw))
+        return self.step(self.robot.actuators.safe_command)
+
+    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+        """Send a command and take the newest measurement; see `Backend.step`."""
+        applied = self._write(np.asarray(command, dtype=float))
+        report = self._driver.read()
+        if report is None:
+            return Sample(None, None, None, applied=applied)
+        return Sample(report.odometry, report.imu, None, stamp_ns=report.stamp_ns, applied=applied)
+
+    def make_safe(self) -> None:
+        """Let wheels slow down, and send the safe command several times, with time for each to arrive.
+
+        Raises:
+            Exception: None of them could be sent; what the last one raised.
+        """
+        safe = self.robot.actuators.safe_command
+        for command in slowdown(self.robot.actuators, self._sent, STOP_PERIOD_S):
+            if self._failure(command) is not None:
+                break
+            time.sleep(STOP_PERIOD_S)
+        stopped, failure = False, None
+        for _ in range(STOPS):
+            failure = self._failure(safe)
+            stopped = stopped or failure is None
+            time.sleep(STOP_PERIOD_S)
+        if failure is not None and not stopped:
+            raise failure
+
+    def close(self) -> None:
+        """Stop, and let go of the device; what is gone already stops by its own timeout."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self.make_safe()
+        except OSError:
+            pass
+        finally:
+            self._driver.close()
+
+    def health(self) -> dict[str, str]:
+        """See `DeviceDriver`."""
+        return self._driver.health()
+
+    def _failure(self, command: np.ndarray) -> Exception | None:
+        """Send a command; what that raised, so that another try can follow.
+
+        Raises:
+            DeviceError: The driver hangs, and no try can follow.
+        """
+        try:
+            self._write(command)
+        except _HangsError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a link that fails once may take the next command
+            return error
+        return None
+
+    def _write(self, command: np.ndarray) -> np.ndarray:
+        if not self._writing.acquire(timeout=HANGS_S):
+            raise _HangsError("the driver has not finished a write: it hangs. Stop the device by hand.")
+        try:
+            applied = self._driver.write(command)
+        finally:
+            self._writing.release()
+        self._sent = command if applied is None else applied
+        return self._sent
+
+
+class FloatingDriverBackend(DriverBackend):
+    """The same for a driver that switches an air bearing; see `AirBearing`."""
+
+    def __init__(self, robot: Robot, driver: DeviceDriver, bearing: AirBearing) -> None:
+        """Take over a driver that is connected, and its bearing."""
+        super().__init__(robot, driver)
+        self._bearing = bearing
+
+    @property
+    def bearing_on(self) -> bool:
+        """See `AirBearing`."""
+        return self._bearing.bearing_on
+
+    def set_bearing(self, on: bool) -> str:
+        """See `AirBearing`."""
+        return self._bearing.set_bearing(on)
+
+    def _write(self, command: np.ndarray) -> np.ndarray:
+        """Send a command, or the safe one while the bearing is off: a platform on the floor only wastes its air."""
+        return super()._write(command if self.bearing_on else self.robot.actuators.safe_command)
+
+
+class _HangsError(DeviceError):
+    """A write that does not come back."""
+
+
+def backend_of(robot: Robot, driver: DeviceDriver) -> DriverBackend:
+    """The backend of a driver, with its air bearing where it has one."""
+    if isinstance(driver, AirBearing):
+        return FloatingDriverBackend(robot, driver, driver)
+    return DriverBackend(robot, driver)

@@ -1,0 +1,152 @@
+"""A driver of the user's own class: loaded, wired, and kept to the interface whatever it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.errors import ConfigError, DeviceError, FulmarError, shortened
+from fulmar_core.own_class import construct, load_class, one_line
+from fulmar_core.robot import Robot
+from hardware_drivers.driver import MEMBERS, DeviceDriver
+from hardware_drivers.driver_backend import DriverBackend, backend_of
+from hardware_drivers.feedback import Report
+from hardware_drivers.settings import UNARMED, Driver, OwnDriver
+from hardware_drivers.wiring import channel_velocity, channels
+
+T = TypeVar("T")
+BEARING_MEMBERS = ("bearing_on", "set_bearing")
+ROLE = "driver"  # in messages
+
+
+def check_own_driver(driver: Driver) -> None:
+    """Import the class of a user's own driver; nothing for a shipped one.
+
+    Raises:
+        ConfigError: The class is not there, lacks a method, or has a bearing that its hardware file does not name.
+    """
+    if isinstance(driver, OwnDriver):
+        _driver_class(driver)
+
+
+def make_own_driver(robot: Robot, settings: OwnDriver, *, patience_s: float) -> DriverBackend:
+    """Build a user's own driver.
+
+    Args:
+        robot: The robot.
+        settings: What the hardware file says of it.
+        patience_s: Wait so long for the device [s].
+
+    Raises:
+        ConfigError: As of `check_own_driver`; or the constructor raised.
+        DeviceError: The device is not there, says the class.
+    """
+    cls = _driver_class(settings)
+    call = f"{cls.__name__}(robot, settings, patience_s={patience_s:g})"
+    driver = construct(cls, call, ROLE, robot, settings, patience_s=patience_s)
+    wired = _FloatingDriver if settings.air_bearing else _WiredDriver
+    return backend_of(robot, wired(robot, settings, driver))
+
+
+def _driver_class(settings: OwnDriver) -> type[Any]:
+    wanted = (*MEMBERS, *BEARING_MEMBERS) if settings.air_bearing else MEMBERS
+    cls = load_class(settings.kind, members=wanted, what=ROLE)
+    if not settings.air_bearing and all(hasattr(cls, member) for member in BEARING_MEMBERS):
+        raise ConfigError(
+            f"{ROLE} '{settings.kind}' switches an air bearing: write air_bearing: true into its hardware file, so "
+            "that controllers wait for the air."
+        )
+    return cls
+
+
+class _WiredDriver(DeviceDriver):
+    """Hands commands over in the order of the wires; whatever the user's class raises becomes one line."""
+
+    def __init__(self, robot: Robot, settings: OwnDriver, driver: Any) -> None:
+        self._name, self._module = settings.kind, type(driver).__module__
+        self._driver, self._count = driver, len(robot.actuators.names)
+        self._safe, self._unarmed = robot.actuators.safe_command, settings.arm is False
+        self._to_wires = _matrix(robot, settings)
+        self._from_wires = np.linalg.inv(self._to_wires)
+        self._as_named = bool((self._to_wires == np.eye(self._count)).all())
+
+    def begin(self, x: float, y: float, heading: float) -> None:
+        self._call("begin", lambda: self._driver.begin(x, y, heading))
+
+    def write(self, command: np.ndarray) -> np.ndarray:
+        if self._unarmed:
+            return self._safe
+        # A copy: what a user's class does to it must not reach the guard's own.
+        sent = command.copy() if self._as_named else self._to_wires @ command
+        applied = self._call("write", lambda: self._driver.write(sent))
+        if applied is None:
+            return command
+        values = self._call("write", lambda: np.array(applied, dtype=float))
+        if values.shape != (self._count,) or not np.isfinite(values).all():
+            found = shortened(str(values.tolist()))
+            raise self._wrong(
+                "write", f"returned {found}, which must be None or {self._count} finite numbers"
+            )
+        return values if self._as_named else self._from_wires @ values
+
+    def read(self) -> Report | None:
+        report = self._call("read", self._driver.read)
+        if report is not None and not isinstance(report, Report):
+            raise self._wrong("read", f"returned {type(report).__name__}, which must be a Report or None")
+        return report
+
+    def health(self) -> dict[str, str]:
+        unarmed = {"warning": UNARMED} if self._unarmed else {}
+        try:
+            found = self._call("health", self._driver.health)
+            if not isinstance(found, Mapping):
+                raise self._wrong("health", f"returned {type(found).__name__}, which must be a mapping")
+            return {str(name): str(value) for name, value in found.items()} | unarmed
+        except FulmarError as error:
+            return {"warning": str(error)}
+
+    def close(self) -> None:
+        self._call("close", self._driver.close)
+
+    def _call(self, method: str, call: Callable[[], T]) -> T:
+        try:
+            return call()
+        except FulmarError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise self._wrong(method, f"raised {one_line(error, self._module)}") from error
+
+    def _wrong(self, method: str, what: str) -> DeviceError:
+        return DeviceError(f"{ROLE} '{self._name}': {method} {what}.")
+
+
+class _FloatingDriver(_WiredDriver):
+    """The same with an air bearing, which counts as off where the class fails to say."""
+
+    @property
+    def bearing_on(self) -> bool:
+        try:
+            return self._call("bearing_on", lambda: bool(self._driver.bearing_on))
+        except FulmarError:
+            return False
+
+    def set_bearing(self, on: bool) -> str:
+        try:
+            return str(self._call("set_bearing", lambda: self._driver.set_bearing(on)) or "")
+        except FulmarError as error:
+            return str(error)
+
+
+def _matrix(robot: Robot, settings: OwnDriver) -> np.ndarray:
+    """What a command is multiplied with to give the values of the channels, shape (n, n)."""
+    actuators, unit = robot.actuators, np.eye(len(robot.actuators.names))
+    if settings.order:
+        return unit[list(settings.order)]
+    if isinstance(actuators, DifferentialDrive):
+        return np.array([channel_velocity(settings.wiring, actuators.track, *one) for one in unit]).T
+    if len(unit) == len(settings.wiring):
+        return np.array([channels(settings.wiring, *one) for one in unit]).T
+    return unit
