@@ -15,8 +15,10 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.own_class import load_class
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+from policy_server.own_controller import MEMBERS, OwnController, is_own
 from policy_server.shipped import shipped_policy
 
 
@@ -82,6 +84,14 @@ def _check_excite(robot: Robot, task: Task) -> None:
         )
 
 
+def _load_own(name: str, robot: Robot, task: Task, choice: Choice) -> Controller:
+    return OwnController(name, robot, task, choice.control_hz)
+
+
+def _check_own(name: str, robot: Robot, task: Task) -> None:
+    load_class(name, members=MEMBERS, what="controller")
+
+
 _LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
 CONTROLLERS = {
     "policy": ControllerEntry(
@@ -97,11 +107,18 @@ FALLBACKS = tuple(name for name, entry in CONTROLLERS.items() if entry.may_follo
 
 
 def controller_entry(name: str) -> ControllerEntry:
-    """The line of a controller.
+    """The line of a controller, or one for a user's own class.
+
+    Args:
+        name: Of the table, or the dotted path of a class, `mypackage.mymodule:MyController`.
 
     Raises:
         UnknownNameError: There is none of this name.
     """
+    if is_own(name):
+        return ControllerEntry(
+            "a controller of your own", partial(_load_own, name), partial(_check_own, name)
+        )
     if name not in CONTROLLERS:
         raise UnknownNameError("controller", name, CONTROLLERS)
     return CONTROLLERS[name]
@@ -111,7 +128,7 @@ def load_controller(name: str, robot: Robot, task: Task, choice: Choice) -> Cont
     """Load a controller by its name.
 
     Args:
-        name: Of the table.
+        name: As of `controller_entry`.
         robot: The robot.
         task: What it does.
         choice: Rate and bundle.

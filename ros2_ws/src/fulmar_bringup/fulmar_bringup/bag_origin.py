@@ -16,6 +16,7 @@ from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
 from fulmar_ros.provenance import fulmar_version, git_revision
 from policy_server.controllers import controller_entry
+from policy_server.own_controller import is_own
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def effective_system(plan: RunPlan) -> System:
 
 def _of_controller(plan: RunPlan) -> dict[str, Path]:
     """The passport of a policy, which has the hash of its weights; the gains of a law."""
-    if plan.controller == "excite":
+    if plan.controller == "excite" or is_own(plan.controller):
         return {}
     if not controller_entry(plan.controller).runs_bundle:
         law = None if plan.controller == "classical" else plan.controller

@@ -113,8 +113,15 @@ class ProcessGroup:
         """Stop every child that is left: newest first, so that the recorder sees the others' last words."""
         return [end for name in reversed(list(self._children)) for end in self.stop(name)]
 
-    def last_words(self, name: str) -> str:
-        """The last line that a child has printed so far, without what ROS puts before a log message."""
+    def last_words(self, name: str, *, ended: bool = False) -> str:
+        """The last line that a child has printed, without what ROS puts before a log message.
+
+        Args:
+            name: Of the child.
+            ended: It has ended, and what it left in the pipe is waited for.
+        """
+        if ended:
+            self._relays[name].join(LAST_WORDS_S)
         text = self._relays[name].last_line
         return text.partition("]: ")[2] if text.startswith("[") and "]: " in text else text
 

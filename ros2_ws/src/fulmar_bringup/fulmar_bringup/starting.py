@@ -16,11 +16,12 @@ def raise_if_ended(group: ProcessGroup) -> None:
     """Give up where a process has ended.
 
     Raises:
-        RunFailed: With its name and how it ended.
+        RunFailed: With its name, how it ended and, where it gave up by itself, its last words.
     """
     end = group.ended()
     if end is not None:
-        raise RunFailed(f"{end.text} before the run was over")
+        words = group.last_words(end.name, ended=True) if (end.returncode or 0) > 0 else ""
+        raise RunFailed(f"{end.text} before the run was over" + (f": {words}" if words else ""))
 
 
 def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], None]:

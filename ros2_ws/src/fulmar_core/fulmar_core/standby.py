@@ -12,7 +12,9 @@ from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
+from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_in_float64
+from fulmar_core.own_class import SEPARATOR, one_line
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
@@ -36,13 +38,20 @@ def ready(controller: Controller, robot: Robot, task: Task, *, said: dict[str, A
         robot: The robot.
         task: What it does.
         said: More entries of its metadata.
+
+    Raises:
+        ConfigError: It raised.
     """
     episode = draw_episodes(robot, task, load_scenario("nominal"), seed=0, numbers=np.zeros(1, dtype=int))
     loop = ControlLoop(robot, task, controller)
     loop.begin(goal_in_float64(episode.goal))
-    for number in range(WARM_UP):
-        loop.step(episode.start, round(1e9 * number * loop.dt))
-    controller.reset()
+    try:
+        for number in range(WARM_UP):
+            loop.step(episode.start, round(1e9 * number * loop.dt))
+        controller.reset()
+    except Exception as error:
+        module = controller.name.partition(SEPARATOR)[0]
+        raise ConfigError(f"controller '{controller.name}' raised {one_line(error, module)}.") from error
     metadata = {**controller.metadata(), **(said or {})}
     text = json.dumps(metadata, sort_keys=True)
     return Standby(controller, text, str(metadata.get("sha256", "")))

@@ -15,7 +15,12 @@ RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from
 TaskArgument = Annotated[str, typer.Argument(metavar="TASK", help="A name from `fulmar list tasks`.")]
 TaskOption = Annotated[str, typer.Option("--task", metavar="T", help="A name from `fulmar list tasks`.")]
 ControllerOption = Annotated[
-    str, typer.Option("--controller", metavar="C", help="policy, or a classical controller such as lqr.")
+    str,
+    typer.Option(
+        "--controller",
+        metavar="C",
+        help="policy, a classical controller such as lqr, or your own class: mypackage.mymodule:MyController.",
+    ),
 ]
 PolicyOption = Annotated[
     Path | None, typer.Option("--policy", metavar="DIR", help="A policy bundle; the shipped one by default.")

@@ -176,11 +176,16 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
     """Name of the controller and folder of its bundle, empty where it has none."""
     from fulmar_bringup.bags.course import policy_folder
     from policy_server.controllers import controller_entry
+    from policy_server.own_controller import is_own
     from policy_server.shipped import shipped_policy
 
     name = controller or ("policy" if policy else (bag.info or {}).get("controller"))
     if not isinstance(name, str):
         raise ConfigError(f"{bag.path}: the bag does not say which controller drove. Give --controller.")
+    if is_own(name) and controller is None:  # a bag from elsewhere must not have its code run
+        raise ConfigError(
+            f"{bag.path}: '{name}' drove, a class that only this bag names. To run it: --controller {name}."
+        )
     if not controller_entry(name).runs_bundle:
         if policy is not None:
             raise ConfigError(

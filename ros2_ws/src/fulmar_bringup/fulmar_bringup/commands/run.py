@@ -279,7 +279,7 @@ def asked_limits(area: Area | None, max_run_time: float | None) -> dict[str, Any
 
 def default_record(robot: str, controller: str) -> Path:
     """A folder below `runs/` that says when and what."""
-    return Path("runs") / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{controller}"
+    return Path("runs") / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{controller.rpartition(':')[2]}"
 
 
 TOLD = {
