@@ -60,14 +60,14 @@ def differing(scenario):
 class OneByOne:
     """Opens one valve after the other."""
 
-    name, control_hz = "one after the other", 5.0
+    name, control_hz, estimator = "one after the other", 5.0, None
 
     def reset(self):
         self.k = 0
 
-    def act(self, observation):
+    def act(self, inputs):
         self.k += 1
-        return np.tile(np.eye(8)[self.k // 3 % 8], (len(observation), 1))
+        return np.tile(np.eye(8)[self.k // 3 % 8], (len(inputs.previous), 1))
 
 
 @EACH

@@ -146,6 +146,8 @@ def test_robots_on_wheels_drive_alike_within_a_few_per_cent_of_the_way(name, way
 class Swaying:
     """Commands that depend on the episode alone, so that every simulator gets the same ones."""
 
+    name, estimator = "swaying", None
+
     def __init__(self, robot):
         self.robot, self.control_hz = robot, robot.timing.control_hz
         self.k = 0
@@ -153,10 +155,10 @@ class Swaying:
     def reset(self):
         self.k = 0
 
-    def act(self, observation):
+    def act(self, inputs):
         self.k += 1
         n = np.arange(len(self.robot.actuators.names))
-        episodes = np.arange(len(observation))[:, None]
+        episodes = np.arange(len(inputs.previous))[:, None]
         return np.sin(0.5 * self.k / self.control_hz + 1.3 * n + 0.3 * episodes) * self.robot.actuators.scale
 
 
@@ -193,10 +195,10 @@ OF_DRIFT = [name for name in config_names("scenarios") if name.startswith(("drif
 class Bursts(Swaying):
     """Two or three valves at a time, others from second to second."""
 
-    def act(self, observation):
+    def act(self, inputs):
         self.k += 1
         rng = np.random.default_rng(self.k // 5)
-        return (rng.uniform(size=(len(observation), 8)) > 0.7).astype(float)
+        return (rng.uniform(size=(len(inputs.previous), 8)) > 0.7).astype(float)
 
 
 @pytest.mark.parametrize("scenario", OF_DRIFT)
@@ -226,8 +228,8 @@ def test_valves_that_open_by_degrees_do_not_suck_in_mujoco_either():
 class Closed(Swaying):
     """Every valve closed."""
 
-    def act(self, observation):
-        return np.zeros((len(observation), len(self.robot.actuators.names)))
+    def act(self, inputs):
+        return np.zeros((len(inputs.previous), len(self.robot.actuators.names)))
 
 
 @pytest.mark.parametrize("scenario", ["nominal", "randomised", "drift_velocity_noise_4", "lab_mocap"])
@@ -252,8 +254,8 @@ def test_odometry_errs_in_mujoco_as_in_the_batch_number_by_number(scenario):
 class Reflex(Swaying):
     """Commands that depend on what is seen alone."""
 
-    def act(self, observation):
-        return (observation[:, : len(self.robot.actuators.names)] > 0.0).astype(float)
+    def act(self, inputs):
+        return (inputs.observation[:, : len(self.robot.actuators.names)] > 0.0).astype(float)
 
 
 def test_more_episodes_than_simulators_are_run_in_turns(monkeypatch):
