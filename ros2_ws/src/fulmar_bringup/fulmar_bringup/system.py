@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fulmar_core.config import load_config
-from fulmar_core.controllers.classical import LAWS, check_pair, load_classical, load_lqr
+from fulmar_core.controllers.classical import LAWS, check_pair, default_gains_note, load_classical, load_lqr
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
 from fulmar_core.controllers.excite import Excite
@@ -227,6 +227,21 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
         raise UnknownNameError("backend", backend, BACKENDS)
     if backend == "hardware":
         default_hardware(robot)
+
+
+def gains_note(robot: str, controller: str | None) -> str:
+    """What to say where a law drives a robot with default gains; empty where none does.
+
+    Args:
+        robot: The robot.
+        controller: Name of a controller; None where there is none.
+
+    Raises:
+        ConfigError: As of `gains_of`.
+    """
+    if controller is None or CONTROLLERS[controller].runs_bundle or not CONTROLLERS[controller].strives:
+        return ""
+    return default_gains_note(load_robot(robot), controller)
 
 
 def default_hardware(robot: str, asked: str | None = None) -> str:

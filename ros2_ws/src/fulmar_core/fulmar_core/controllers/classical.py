@@ -133,7 +133,7 @@ def gains_of(robot: Robot, law: str | None = None) -> Any:
 
     Args:
         robot: The robot.
-        law: Name of the law; by default the one of the robot's family.
+        law: Name of the law; any other name and None mean the one of the robot's family.
 
     Returns:
         The law's dataclass of gains.

@@ -33,7 +33,7 @@ Gains = TypeVar("Gains")
 PRECISION, HEADING_PRECISION = 0.05, math.radians(5.0)
 # A faster outer loop gains nothing on the tasks' scale of metres and passes the noise of the heading on [1/s].
 FASTEST = 4.0
-# `Suspicion` was chosen on a platform of 1 N and 0.31 N·m (configs/robots/floating_platform.yaml).
+# `Suspicion` was chosen for valves of so much each, those of configs/robots/floating_platform.yaml [N], [N·m].
 SUSPECTED_FORCE, SUSPECTED_TORQUE = 1.0, 0.31
 DIRECTIONS = np.stack([(np.cos(angle), np.sin(angle)) for angle in np.radians(np.arange(360))])
 
@@ -53,9 +53,9 @@ def lqr_weights(robot: Robot) -> LqrWeights:
     """
     thrusters = robot.actuators
     assert isinstance(thrusters, Thrusters)
-    force, most_force = _span(thrusters, [0, 1], DIRECTIONS)
-    torque, most_torque = _span(thrusters, [5], np.array([[1.0], [-1.0]]))
-    if force < 1e-3 * most_force or torque < 1e-3 * most_torque:
+    force = _least(thrusters, [0, 1], DIRECTIONS)
+    torque = _least(thrusters, [5], np.array([[1.0], [-1.0]]))
+    if force < 1e-3 * thrusters.thrust or torque < 1e-3 * thrusters.thrust * robot.body.radius:
         raise ValueError("the valves do not push in every direction and turn both ways.")
     step = robot.timing.control_s
     settling = max(3.0 * step, math.sqrt(2.0 * PRECISION * robot.body.mass / force))
@@ -74,37 +74,29 @@ def lqr_weights(robot: Robot) -> LqrWeights:
         overshoot=1.0,
         braking=0.6,  # the rest is for pushes, and for a body that is heavier than written down
         least_open_s=0.04 if thrusters.binary else 0.0,
-        observer=_suspicion(robot, most_force, most_torque) if can_be_watched(robot) else None,
+        observer=_suspicion(robot, thrusters) if can_be_watched(robot) else None,
         speed_around=0.4,
     )
 
 
-def _span(thrusters: Thrusters, columns: list[int], directions: np.ndarray) -> tuple[float, float]:
-    """What the valves bring up in the direction in which that is least, and in that in which it is most.
+def _least(thrusters: Thrusters, columns: list[int], directions: np.ndarray) -> float:
+    """What the valves bring up in the direction in which they do least: the largest circle inside of what they reach.
 
     Args:
         thrusters: The bank.
         columns: Of the wrench [N, N, N, N·m, N·m, N·m].
         directions: Unit vectors of these columns, shape (k, columns).
-
-    Returns:
-        Radius of the largest circle inside of all wrenches that they reach, and of the smallest around them.
     """
     along = np.maximum(thrusters.thrust * thrusters.wrench_per_newton[:, columns] @ directions.T, 0.0)
     most = along.max(axis=0) if thrusters.shared_pressure else along.sum(axis=0)
-    return float(most.min()), float(most.max())
+    return float(most.min())
 
 
-def _suspicion(robot: Robot, force: float, torque: float) -> Suspicion:
-    """The observer's own defaults, in proportion to the thrust, and no less noise than the robot's sensors have.
-
-    Args:
-        robot: A robot that can be watched.
-        force: The most that its valves bring up [N].
-        torque: Same [N·m].
-    """
+def _suspicion(robot: Robot, thrusters: Thrusters) -> Suspicion:
+    """The observer's own defaults, in proportion to one valve, and no less noise than the robot's sensors have."""
     usual, sensors = Suspicion(), robot.sensors.odometry
-    pushes, turns = force / SUSPECTED_FORCE, torque / SUSPECTED_TORQUE
+    pushes = thrusters.thrust / SUSPECTED_FORCE
+    turns = thrusters.thrust * float(np.abs(thrusters.wrench_per_newton[:, 5]).max()) / SUSPECTED_TORQUE
     return Suspicion(
         position=max(usual.position, 1.5 * sensors.position.std),
         heading=max(usual.heading, 1.5 * sensors.heading.std),
@@ -221,7 +213,7 @@ def pure_pursuit_gains(robot: Robot) -> PurePursuitGains:
 
 
 def _reaction_s(robot: Robot) -> float:
-    """From an error to the actuators' answer: a control step, delays, the lag, and a slew of a boat's propellers [s]."""
+    """From an error to the actuators' answer: a control step, delays, the lag, and the slew of propellers [s]."""
     response = robot.actuators.response
     slew = 1.0 / min(response.slew) if response.slew and isinstance(robot.actuators, Propellers) else 0.0
     return robot.timing.control_s + response.latest_s + response.lag_s + slew
