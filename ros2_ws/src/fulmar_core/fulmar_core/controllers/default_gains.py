@@ -71,6 +71,8 @@ def lqr_weights(robot: Robot) -> LqrWeights:
         open_valve_far=2.0,
         position_error_limit=1.5,
         heading_error_limit_deg=180.0,
+        # One control step of an on/off valve spins a light body up by more than the tasks tolerate.
+        tracking_torque=20.0 / torque**2,
         overshoot=1.0,
         braking=0.6,  # the rest is for pushes, and for a body that is heavier than written down
         least_open_s=0.04 if thrusters.binary else 0.0,
