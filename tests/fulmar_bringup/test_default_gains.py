@@ -29,6 +29,7 @@ def own(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("robot", "task"), TASKS.items())
 def test_a_new_robot_succeeds_in_mujoco_without_a_gains_file(fulmar, robot, task):
     asked = ("--controller", "classical", "--through", "mujoco", "--episodes", "256", "--json")

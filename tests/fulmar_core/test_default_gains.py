@@ -57,6 +57,7 @@ PAIRS = [
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize(("name", "task"), PAIRS, ids=[f"{name}-{task.name}" for name, task in PAIRS])
 def test_default_gains_do_as_well_as_the_gains_of_the_shipped_robots(name, task):
     robot = SHIPPED[name]
