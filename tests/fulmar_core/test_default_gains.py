@@ -110,9 +110,13 @@ def test_a_robot_that_cannot_be_watched_has_no_observer():
 
 def test_slow_actuators_make_slow_laws():
     slow_wheels = replace(BASE.actuators, response=replace(BASE.actuators.response, lag_s=0.5))
+    weak_wheels = replace(BASE.actuators, wheel_force=0.4)
     slow_car = replace(CAR.actuators, response=replace(CAR.actuators.response, lag_s=0.5))
     slow_boat = replace(BOAT.actuators, response=replace(BOAT.actuators.response, slew=(0.2, 0.2)))
     assert gains_of(without_file(BASE, actuators=slow_wheels)).bearing < gains_of(without_file(BASE)).bearing
+    assert (
+        gains_of(without_file(BASE, actuators=weak_wheels)).distance < gains_of(without_file(BASE)).distance
+    )
     assert gains_of(without_file(CAR, actuators=slow_car)).approach < gains_of(without_file(CAR)).approach
     assert gains_of(without_file(BOAT, actuators=slow_boat)).heading < gains_of(without_file(BOAT)).heading
 

@@ -72,7 +72,7 @@ def lqr_weights(robot: Robot) -> LqrWeights:
         position_error_limit=1.5,
         heading_error_limit_deg=180.0,
         # One control step of an on/off valve spins a light body up by more than the tasks tolerate.
-        tracking_torque=20.0 / torque**2,
+        tracking_torque=20.0 / torque**2 if thrusters.binary else 0.0,
         overshoot=1.0,
         braking=0.6,  # the rest is for pushes, and for a body that is heavier than written down
         least_open_s=0.04 if thrusters.binary else 0.0,
@@ -82,7 +82,7 @@ def lqr_weights(robot: Robot) -> LqrWeights:
 
 
 def _least(thrusters: Thrusters, columns: list[int], directions: np.ndarray) -> float:
-    """What the valves bring up in the direction in which they do least: the largest circle inside of what they reach.
+    """Largest force or torque that the valves bring up in every direction.
 
     Args:
         thrusters: The bank.
@@ -114,19 +114,18 @@ def _suspicion(robot: Robot, thrusters: Thrusters) -> Suspicion:
 
 
 def polar_gains(robot: Robot) -> PolarGains:
-    """Gains of the polar law: turning is as fast as the wheels follow, driving a third of that.
+    """Gains of the polar law: turning is as fast as wheels and body follow, driving a third of that.
 
     Args:
         robot: A robot with a differential drive.
     """
     drive = robot.actuators
     assert isinstance(drive, DifferentialDrive)
-    bearing = min(FASTEST, 0.8 / _reaction_s(robot))
-    distance = 0.35 * bearing
-    if drive.response.slew:
-        acceleration, angular = drive.response.slew
-        bearing = min(bearing, 2.0 * angular / drive.max_yaw_rate)
-        distance = min(0.35 * bearing, 0.8 * acceleration / drive.max_speed)
+    slew = drive.response.slew or (math.inf, math.inf)
+    acceleration = min(slew[0], 2.0 * drive.wheel_force / robot.body.mass)
+    angular = min(slew[1], drive.wheel_force * drive.track / robot.body.inertia[2])
+    bearing = min(FASTEST, 0.8 / _reaction_s(robot), 2.0 * angular / drive.max_yaw_rate)
+    distance = min(0.35 * bearing, 0.8 * acceleration / drive.max_speed)
     return PolarGains(
         distance=distance,
         bearing=bearing,
