@@ -41,7 +41,7 @@ class ControllerEntry:
     needs: tuple[str, ...] = ()  # modules that an extra brings
     strives: bool = True  # whether it means to meet the goal
     runs_bundle: bool = False  # whether a learned policy drives
-    may_follow: bool = False  # whether it may take over from a policy that is refused
+    is_law: bool = False  # whether it has gains, and may take over from a policy that is refused
 
 
 def _load_policy(robot: Robot, task: Task, choice: Choice) -> Controller:
@@ -69,7 +69,7 @@ def _check_law(law: str | None, robot: Robot, task: Task) -> None:
 
 
 def _law(title: str, law: str | None) -> ControllerEntry:
-    return ControllerEntry(title, partial(_load_law, law), partial(_check_law, law), may_follow=True)
+    return ControllerEntry(title, partial(_load_law, law), partial(_check_law, law), is_law=True)
 
 
 def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
@@ -103,7 +103,7 @@ CONTROLLERS = {
     "classical": _law(f"the law of the robot's family: {_LAWS}", None),
     "excite": ControllerEntry(Excite.title, _load_excite, _check_excite, strives=False),
 }
-FALLBACKS = tuple(name for name, entry in CONTROLLERS.items() if entry.may_follow)
+FALLBACKS = tuple(name for name, entry in CONTROLLERS.items() if entry.is_law)
 
 
 def controller_entry(name: str) -> ControllerEntry:

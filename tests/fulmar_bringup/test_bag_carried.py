@@ -9,7 +9,8 @@ import pytest
 
 from fulmar_bringup.bags.carried import knowing_what_it_carries, knowing_what_they_carry
 from fulmar_bringup.bags.contents import open_bag
-from fulmar_core.errors import UnknownNameError
+from fulmar_core.controllers.classical import gains_of, gains_path
+from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import OWN_FOLDERS, config_names, config_path
 from fulmar_core.robot import load_robot
 from fulmar_ros.bag_writer import BagWriter
@@ -17,9 +18,12 @@ from fulmar_ros.bag_writer import BagWriter
 TURTLEBOT = config_path("robots", "turtlebot2").read_text()
 
 
-def bag_of(folder: Path, robot: str, carried: str) -> Path:
-    files = {"robot.yaml": carried.encode()}
-    BagWriter(folder, run_info={"robot": robot, "task": "go_to_pose"}, attachments=files).close()
+def bag_of(
+    folder: Path, robot: str, carried: str, *, gains: bytes = b"", controller: str = "classical"
+) -> Path:
+    files = {"robot.yaml": carried.encode()} | ({"controller.yaml": gains} if gains else {})
+    info = {"robot": robot, "task": "go_to_pose", "controller": controller}
+    BagWriter(folder, run_info=info, attachments=files).close()
     return folder
 
 
@@ -38,6 +42,24 @@ def test_within_it_the_robot_is_known_and_afterwards_it_is_not(tmp_path, monkeyp
         assert not os.environ.get(OWN_FOLDERS)
         with pytest.raises(UnknownNameError):
             load_robot("mybot")
+
+
+def test_a_law_drives_an_unknown_robot_with_the_gains_that_its_bag_carries(tmp_path):
+    carried = TURTLEBOT.replace("name: turtlebot2", "name: mybot")
+    gains = config_path("controllers", "turtlebot2_polar").read_bytes().replace(b"turn: 4.0", b"turn: 3.9")
+    with knowing_what_it_carries(open_bag(bag_of(tmp_path / "with", "mybot", carried, gains=gains))):
+        assert gains_of(load_robot("mybot")).turn == 3.9
+    with knowing_what_it_carries(open_bag(bag_of(tmp_path / "without", "mybot", carried))):
+        assert gains_path(load_robot("mybot")) is None
+    bag = bag_of(tmp_path / "planner", "mybot", carried, gains=gains, controller="planner")
+    with knowing_what_it_carries(open_bag(bag)):  # what a planner carries are no gains of a law
+        assert gains_path(load_robot("mybot")) is None
+
+
+def test_a_carried_robot_that_does_not_load_is_refused_when_it_is_asked_for(tmp_path):
+    bag = bag_of(tmp_path / "bag", "mybot", "name: [", gains=b"turn: 4.0\n")
+    with knowing_what_it_carries(open_bag(bag)), pytest.raises(ConfigError, match="not valid YAML"):
+        load_robot("mybot")
 
 
 def test_folders_of_one_s_own_stay_in_front(tmp_path, monkeypatch):

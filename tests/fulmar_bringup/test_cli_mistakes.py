@@ -189,7 +189,7 @@ def test_a_geofence_smaller_than_the_starts_is_refused_before_anything_runs(fulm
 
 
 def test_a_robot_of_one_s_own_is_one_file_beside_those_that_come_with_fulmar(fulmar, tmp_path, monkeypatch):
-    """It runs at once with a law whose gains are another; what is missing is told with an example."""
+    """It runs at once with default gains, and then with those of a file."""
     monkeypatch.chdir(tmp_path)
     shipped = config_directory()
     (tmp_path / "mine" / "robots").mkdir(parents=True)
@@ -201,17 +201,13 @@ def test_a_robot_of_one_s_own_is_one_file_beside_those_that_come_with_fulmar(ful
     monkeypatch.setenv("FULMAR_CONFIGS", "mine")
     assert {"mybot", "turtlebot2"} <= set(json.loads(fulmar("list", "robots", "--json")[1])["robots"])
     words = ("evaluate", "mybot", "go_to_position", "--through", "batch", "--episodes", "4")
-    told = complaint(fulmar(*words))
-    assert (
-        "train one with `fulmar train mybot go_to_position`." in told
-    )  # there is no law with gains for it yet
-    told = complaint(fulmar(*words, "--controller", "classical"))
-    assert "controllers/mybot_polar.yaml beside robots/ of your own, as " in told
+    code, out, err = fulmar(*words, "--controller", "classical", "--json")
+    assert (code, json.loads(out)["success_rate"]) == (0, 1.0)
+    assert "info: no gains file: default gains of 'polar'" in err
     (tmp_path / "mine" / "controllers").mkdir()
     shutil.copy(shipped / "controllers" / "turtlebot2_polar.yaml", "mine/controllers/mybot_polar.yaml")
-    code, out, _ = fulmar(*words, "--controller", "classical", "--json")
-    assert code == 0
-    assert json.loads(out)["success_rate"] == 1.0
+    code, out, err = fulmar(*words, "--controller", "classical", "--json")
+    assert (code, json.loads(out)["success_rate"], "gains" in err) == (0, 1.0, False)
     assert "or use --controller classical." in complaint(fulmar(*words))
 
 

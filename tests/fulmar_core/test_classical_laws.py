@@ -187,14 +187,6 @@ def test_the_metadata_hash_changes_with_every_gain(robot, name):
     assert told["sha256"] != entry.law(robot, task, gains).metadata()["sha256"]
 
 
-@pytest.mark.parametrize("name", ["kingfisher", "turtlebot2", "leatherback"])
-def test_a_robot_without_gains_is_told_which_file_to_write(name):
-    robot = replace(ROBOTS[name], name="other")
-    law = LAWS[robot.actuators.kind].law.law
-    with pytest.raises(ConfigError, match=rf"Write configs/controllers/other_{law}\.yaml"):
-        load_classical(robot, TASKS["go_to_position"])
-
-
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 def test_a_rate_that_the_physics_cannot_keep_is_refused(robot):
     with pytest.raises(ConfigError, match=rf"'{robot.name}' at 7 Hz: control_hz = 7 must divide"):

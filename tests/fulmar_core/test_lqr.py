@@ -233,12 +233,6 @@ def test_weights_without_a_solution_are_refused(change, words):
         replace(WEIGHTS, **change)
 
 
-def test_a_robot_without_weights_is_told_which_file_to_write():
-    words = r"no gains of 'lqr' for 'other'. Write configs/controllers/other_lqr\.yaml"
-    with pytest.raises(ConfigError, match=words):
-        load_lqr(replace(ROBOT, name="other"), POSE)
-
-
 def test_weights_without_a_word_on_obstacles_are_refused_where_some_stand():
     with pytest.raises(ValueError, match="'speed_around' is missing"):
         Lqr(ROBOT, load_task("go_to_position_with_obstacles"), replace(WEIGHTS, speed_around=0.0))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fulmar_bringup.system import System
 from fulmar_core.calibration import calibration_path
-from fulmar_core.controllers.classical import gains_path
+from fulmar_core.controllers.classical import gains_of, gains_path
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
@@ -60,8 +60,8 @@ def attachments(plan: RunPlan) -> str:
         **({CALIBRATION: calibration} if calibration else {}),
         **_of_controller(plan),
     }
-    paths = {name: str(path.absolute()) for name, path in files.items()}
-    return json.dumps({**paths, "system.yaml": asdict(effective_system(plan))})
+    carried = {name: str(what.absolute()) if isinstance(what, Path) else what for name, what in files.items()}
+    return json.dumps({**carried, "system.yaml": asdict(effective_system(plan))})
 
 
 def effective_system(plan: RunPlan) -> System:
@@ -75,12 +75,12 @@ def effective_system(plan: RunPlan) -> System:
     )
 
 
-def _of_controller(plan: RunPlan) -> dict[str, Path]:
+def _of_controller(plan: RunPlan) -> dict[str, Path | dict[str, Any]]:
     """The passport of a policy, which has the hash of its weights; the gains of a law."""
     if plan.controller == "excite" or is_own(plan.controller):
         return {}
     if not controller_entry(plan.controller).runs_bundle:
-        law = None if plan.controller == "classical" else plan.controller
-        return {"controller.yaml": gains_path(load_robot(plan.robot), law)}
+        robot, law = load_robot(plan.robot), plan.controller
+        return {"controller.yaml": gains_path(robot, law) or asdict(gains_of(robot, law))}
     folder = Path(plan.policy) if plan.policy else shipped_policy(plan.robot, plan.task)
     return {"passport.json": folder / PASSPORT} if folder else {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fulmar_core.config import load_config
+from fulmar_core.controllers.classical import default_gains_note
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
@@ -109,6 +110,21 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
         raise UnknownNameError("backend", backend, BACKENDS)
     if backend == "hardware":
         default_hardware(robot)
+
+
+def gains_note(robot: str, controller: str | None) -> str:
+    """What to say where a law drives a robot with default gains; empty where none does.
+
+    Args:
+        robot: The robot.
+        controller: Name of a controller; None where there is none.
+
+    Raises:
+        ConfigError: As of `gains_of`.
+    """
+    if controller is None or not controller_entry(controller).is_law:
+        return ""
+    return default_gains_note(load_robot(robot), controller)
 
 
 def default_hardware(robot: str, asked: str | None = None) -> str:

@@ -174,9 +174,9 @@ class ControlLoop:
 
     def _estimate(self, state: PlanarState, stamp_ns: int) -> None:
         """Update the estimate by what moved the robot since the last one."""
-        if self._estimator is None:
-            return
         passed_ns = stamp_ns - self._estimated_ns
+        if self._estimator is None or passed_ns == 0:  # by the clock, one measurement may serve twice
+            return
         applied: np.ndarray | Applied | None = None
         passed_s = self.dt
         if 0 < passed_ns <= self._pause_ns:

@@ -39,13 +39,13 @@ def line_up(
     """
     fallback = _fallback(robot, task, settings)
     try:
-        controller = make_controller(robot, task, settings)
+        first = ready(make_controller(robot, task, settings), robot, task)
     except (FulmarError, ImportError) as error:
         if fallback is None:
             raise
         complain(f"falling back to {settings.fallback}: {error}")
         return Succession(None, fallback, refused=str(error))
-    return Succession(ready(controller, robot, task), fallback)
+    return Succession(first, fallback)
 
 
 def load_other(

@@ -19,7 +19,7 @@ from fulmar_bringup.commands.arguments import (
     SeedOption,
     TaskArgument,
 )
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
 from fulmar_core.episode import JUDGE_SEED, episode_steps
@@ -106,7 +106,7 @@ def evaluate(
     )
     from fulmar_bringup.extras import require
     from fulmar_bringup.planning import checked_rate, chosen_policy
-    from fulmar_bringup.system import check_names, modules_of
+    from fulmar_bringup.system import check_names, gains_note, modules_of
     from fulmar_core.calibration import use_calibration
     from fulmar_core.disturbances.scenario import check_delays, load_scenario
     from fulmar_core.robot import load_robot
@@ -133,6 +133,8 @@ def evaluate(
             "Make it longer."
         )
     policy = chosen_policy(controller, policy, the_robot, the_task, hz)
+    if note := gains_note(robot, controller):
+        console.print(f"info: {note}", markup=False, soft_wrap=True)
     require(*modules_of(controller, "mock" if through == "batch" else "mujoco"))
     plan = RunPlan(
         robot=robot,

@@ -201,7 +201,7 @@ def run(
     from fulmar_bringup.extras import require
     from fulmar_bringup.goal_plan import default_task as task_of_goals
     from fulmar_bringup.planning import plan_run
-    from fulmar_bringup.system import modules_of
+    from fulmar_bringup.system import gains_note, modules_of
     from fulmar_core.calibration import use_calibration
     from policy_server.controllers import controller_entry
 
@@ -244,6 +244,9 @@ def run(
         remap=remap or (),
     )
     plan = request.plan
+    for note in {gains_note(robot, name): None for name in (controller, plan.guards.fallback)}:
+        if note:
+            console.print(f"info: {note}", markup=False, soft_wrap=True)
     require(  # the nodes would fail for want of them one by one
         *modules_of(controller, backend, guards=plan.guards, hardware=plan.hardware, emulated=emulate)
     )

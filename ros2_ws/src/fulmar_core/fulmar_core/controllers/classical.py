@@ -5,11 +5,19 @@ The explicit table. A law for another family or task is one file here and one en
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fulmar_core.config import load_config
+from fulmar_core.controllers.default_gains import (
+    line_of_sight_gains,
+    lqr_weights,
+    polar_gains,
+    pure_pursuit_gains,
+    rounded,
+)
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.line_of_sight import LineOfSight, LineOfSightGains
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
@@ -34,13 +42,15 @@ class Entry:
     law: type[Law]
     gains: type[Any]  # what its YAML is read into
     tasks: tuple[str, ...]  # kinds that it does
+    defaults: Callable[[Robot], Any] | None = None  # gains of a robot without a YAML; None: it needs one
 
 
 LAWS = {
-    "thrusters": Entry(Lqr, LqrWeights, POSITIONS + POSES + VELOCITIES),
-    "differential_drive": Entry(Polar, PolarGains, POSITIONS + POSES + VELOCITIES),
-    "propellers": Entry(LineOfSight, LineOfSightGains, POSITIONS + POSES + VELOCITIES),
-    "ackermann": Entry(PurePursuit, PurePursuitGains, POSITIONS + VELOCITIES),  # no law here parks a car
+    "thrusters": Entry(Lqr, LqrWeights, POSITIONS + POSES + VELOCITIES, lqr_weights),
+    "differential_drive": Entry(Polar, PolarGains, POSITIONS + POSES + VELOCITIES, polar_gains),
+    "propellers": Entry(LineOfSight, LineOfSightGains, POSITIONS + POSES + VELOCITIES, line_of_sight_gains),
+    # No law here parks a car.
+    "ackermann": Entry(PurePursuit, PurePursuitGains, POSITIONS + VELOCITIES, pure_pursuit_gains),
 }
 
 # Laws beside that of the family, by their own names.
@@ -82,20 +92,19 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
             f"no classical law does '{task.name}' on '{robot.name}' ({family}); there is one for: "
             f"{', '.join(entry.tasks)}. Use --controller policy, which `fulmar train {robot.name} {task.name}` makes."
         )
-    if law in OTHERS:
-        _gains_of(robot, entry)
+    if _find_gains(robot, entry) is None:
+        gains_of(robot, law)
 
 
 def has_law(robot: Robot, task: Task) -> bool:
-    """Whether there is a classical law for a pair, and gains of it for the robot."""
-    entry = LAWS[robot.actuators.kind]
-    return task.kind in entry.tasks and f"{robot.name}_{entry.law.law}" in config_names("controllers")
+    """Whether there is a classical law for a pair."""
+    return task.kind in LAWS[robot.actuators.kind].tasks
 
 
 def load_classical(
     robot: Robot, task: Task, *, control_hz: float | None = None, law: str | None = None
 ) -> Law:
-    """The law for a robot and a task, with the gains of `configs/controllers/<robot>_<law>.yaml`.
+    """The law for a robot and a task, with the gains that `gains_of` finds.
 
     Args:
         robot: The robot.
@@ -112,29 +121,66 @@ def load_classical(
     """
     check_pair(robot, task, law=law)
     entry = entry_of(robot, law)
-    gains = load_config(entry.gains, config_path("controllers", _gains_of(robot, entry)))
     try:
-        return entry.law(robot, task, gains, control_hz=control_hz, name=law or "classical")
+        return entry.law(robot, task, gains_of(robot, law), control_hz=control_hz, name=law or "classical")
     except ValueError as error:
         hz = control_hz or robot.timing.control_hz
         raise ConfigError(f"{entry.law.law} for '{robot.name}' at {hz:g} Hz: {error}") from error
 
 
-def gains_path(robot: Robot, law: str | None = None) -> Path:
-    """The file with the gains of a law for a robot; arguments and errors as of `load_classical`."""
-    return config_path("controllers", _gains_of(robot, entry_of(robot, law)))
+def gains_of(robot: Robot, law: str | None = None) -> Any:
+    """Gains of a law for a robot: those of `configs/controllers/<robot>_<law>.yaml`, or the default ones without it.
+
+    Args:
+        robot: The robot.
+        law: Name of the law; any other name and None mean the one of the robot's family.
+
+    Returns:
+        The law's dataclass of gains.
+
+    Raises:
+        ConfigError: A mistake in the file, no file where the law has no default gains, or a robot whose actuators
+            cannot do what they are computed for.
+    """
+    entry = entry_of(robot, law)
+    path = _find_gains(robot, entry)
+    if path is not None:
+        return load_config(entry.gains, path)
+    assert entry.defaults is not None
+    try:
+        return rounded(entry.defaults(robot))
+    except ValueError as error:
+        raise ConfigError(f"no default gains of '{entry.law.law}' for '{robot.name}': {error}") from error
 
 
-def _gains_of(robot: Robot, entry: Entry) -> str:
-    """Name of the file with a law's gains for a robot."""
+def gains_path(robot: Robot, law: str | None = None) -> Path | None:
+    """The file with the gains of a law for a robot; None where default gains are used; rest as of `gains_of`."""
+    return _find_gains(robot, entry_of(robot, law))
+
+
+def default_gains_note(robot: Robot, law: str | None = None) -> str:
+    """What to say of a robot that drives with default gains; empty where it has a file; rest as of `gains_of`."""
+    if gains_path(robot, law) is not None:
+        return ""
+    name = entry_of(robot, law).law.law
+    return (
+        f"no gains file: default gains of '{name}', computed from the limits of '{robot.name}'. "
+        f"controllers/{robot.name}_{name}.yaml would take their place."
+    )
+
+
+def _find_gains(robot: Robot, entry: Entry) -> Path | None:
+    """The file with a law's gains for a robot; None where it has none and the law has default gains."""
     name = f"{robot.name}_{entry.law.law}"
-    if name not in config_names("controllers"):
+    if name in config_names("controllers"):
+        return config_path("controllers", name)
+    if entry.defaults is None:
         others = [each for each in config_names("controllers") if each.endswith(f"_{entry.law.law}")]
         raise ConfigError(
             f"no gains of '{entry.law.law}' for '{robot.name}'. Write configs/controllers/{name}.yaml, or "
             f"controllers/{name}.yaml beside robots/ of your own, as {config_path('controllers', others[0])} is."
         )
-    return name
+    return None
 
 
 def load_lqr(robot: Robot, task: Task, *, control_hz: float | None = None) -> Law:
