@@ -103,6 +103,7 @@ def test_the_driver_of_the_first_hour_knows_a_line_for_every_nozzle(first_hour):
     assert len(hardware.driver.lines) == len(load_robot("hexbot").actuators.names)
 
 
+@pytest.mark.slow
 def test_the_gymnasium_example_runs_and_is_short():
     pytest.importorskip("stable_baselines3")
     import numpy as np

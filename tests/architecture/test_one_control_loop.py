@@ -17,6 +17,7 @@ WRITTEN = {
     "learning_step.py": "a step of a learner",
     "throughput.py": "measures that one",
     "policy.py": "inputs of a network beside its observation",
+    "own_controller.py": "a user's class behind the interface of controllers",
     "go_to_position_with_obstacles.py": "a part of what its task observes",
 }
 

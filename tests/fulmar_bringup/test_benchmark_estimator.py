@@ -48,6 +48,7 @@ def test_the_mean_tells_nothing_before_its_buffer_is_full():
     assert np.isfinite(told[8 * 30]).all()
 
 
+@pytest.mark.slow
 def test_the_estimator_is_at_least_twice_as_good_and_less_than_20_ms_late_at_both_rates():
     driven = drives(ROBOT, count=1, seconds=15.0, seed=3)
     settings = dataclasses.replace(load_estimator("mocap_imu"), latency_s=0.01)

@@ -154,6 +154,7 @@ def test_waypoints_are_counted_over_an_episode_over_a_thousand_steps_and_over_as
     assert outcome.about["thousand_steps_s"] == 200.0
 
 
+@pytest.mark.slow
 def test_a_bound_is_computed_once_and_kept(tmp_path, monkeypatch):
     trial = unit_of(tmp_path, robot="turtlebot2", task="go_through_positions").trial
     drawn = trial.drawn(np.arange(2))

@@ -23,6 +23,7 @@ def boat(folder: Path, *, driven_s: float) -> Path:
     return write_run(folder / "bag", plan)
 
 
+@pytest.mark.slow
 def test_a_boat_that_nobody_drove_gives_no_calibration(tmp_path):
     done = identify(boat(tmp_path, driven_s=0.0), "--out", tmp_path / "calibration.yaml")
     assert isinstance(done.exception, ConfigError), done.output

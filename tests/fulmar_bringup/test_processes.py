@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
 
@@ -133,16 +134,22 @@ def test_a_child_that_sleeps_is_asked_to_stop_and_does(start, tmp_path):
     ready = tmp_path / "ready"
     group = start(
         "sleeper",
-        "import time, pathlib\n"
-        "try:\n"
-        f"    pathlib.Path({str(ready)!r}).touch()\n"
-        "    time.sleep(60)\n"
-        "except KeyboardInterrupt:\n"
-        "    raise SystemExit(5)\n",
+        "import pathlib, signal, sys, time\n"
+        "signal.signal(signal.SIGTERM, lambda *_: sys.exit(5))\n"
+        f"pathlib.Path({str(ready)!r}).touch()\n"
+        "time.sleep(60)\n",
     )
     wait_for(ready.exists)
     assert group.stop("sleeper") == [Ended("sleeper", 5)]
     assert group.ended() is None
+
+
+def test_a_child_that_still_imports_its_modules_ends_without_a_word(start, tmp_path, capfd):
+    ready = tmp_path / "ready"
+    group = start("importer", f"import pathlib, time\npathlib.Path({str(ready)!r}).touch()\ntime.sleep(60)\n")
+    wait_for(ready.exists)
+    assert group.stop("importer") == [Ended("importer", -signal.SIGTERM)]
+    assert "Traceback" not in "".join(capfd.readouterr())
 
 
 def test_a_child_that_was_stopped_in_its_tracks_is_killed_without_delay(start, tmp_path):

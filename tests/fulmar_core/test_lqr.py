@@ -144,7 +144,7 @@ def test_going_to_a_position_ignores_the_heading():
     [
         (5.0, 256, POSE),
         (5.0, 256, POSITION),
-        (50.0, 16, POSE),
+        pytest.param(50.0, 16, POSE, marks=pytest.mark.slow),
         pytest.param(50.0, 16, POSITION, marks=pytest.mark.slow),
     ],
     ids=lambda value: getattr(value, "name", str(value)),

@@ -50,6 +50,7 @@ def test_valves_open_for_what_is_among_the_largest_and_for_nothing_small(law):
     np.testing.assert_array_equal(law._valves_of(np.array(inputs)), expected)
 
 
+@pytest.mark.slow
 def test_it_comes_near_the_goal_and_hardly_holds_its_heading_least_of_all_against_a_torque(law):
     ideal, torque = figures(law, "drift_ideal"), figures(law, "drift_torque")
     assert ideal["PT5_percent"] > 50.0

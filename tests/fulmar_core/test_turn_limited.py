@@ -167,7 +167,9 @@ def steered(robot: str, waypoints, *, gain: float, slow: float) -> np.ndarray:
     return np.stack(seen, axis=1)
 
 
-@pytest.mark.parametrize(("robot", "least"), [("turtlebot2", 0.65), ("kingfisher", 0.15)])
+@pytest.mark.parametrize(
+    ("robot", "least"), [("turtlebot2", 0.65), pytest.param("kingfisher", 0.15, marks=pytest.mark.slow)]
+)
 def test_no_steering_beats_the_bound(robot, least):
     waypoints = courses(4, seed=4)
     most = bound(waypoints, 60.0, motions_of(load_robot(robot)), start_yaw=np.zeros(4)).goals
@@ -177,7 +179,10 @@ def test_no_steering_beats_the_bound(robot, least):
     assert np.mean(best / most) > least  # the bound is no sky; boats need a better law than this one
 
 
-@pytest.mark.parametrize(("robot", "least", "passed"), [("turtlebot2", 0.9, 42), ("kingfisher", 0.8, 47)])
+@pytest.mark.parametrize(
+    ("robot", "least", "passed"),
+    [("turtlebot2", 0.9, 42), pytest.param("kingfisher", 0.8, 47, marks=pytest.mark.slow)],
+)
 def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least, passed):
     """Commands of the first judged episodes, in thousandths, as optimal control with all the dynamics found them."""
     with np.load(Path(__file__).with_name("time_optimal_drives.npz")) as drives:

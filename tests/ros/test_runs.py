@@ -193,6 +193,7 @@ def test_a_path_is_followed_the_same_way_twice_in_lock_step(ros_domain: RosDomai
         assert (summary["goals_progress"], summary["success"]) == ("0 of 1 rounds", False)
 
 
+@pytest.mark.slow
 def test_places_of_a_file_are_visited_one_after_another(ros_domain: RosDomain, tmp_path: Path) -> None:
     """The next one comes when the robot has been at one for a while."""
     (tmp_path / "mine.yaml").write_text(

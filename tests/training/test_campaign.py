@@ -112,6 +112,7 @@ def test_a_job_that_was_done_is_not_done_again(job):
     assert (job.out / "network.pt").stat().st_mtime_ns == stamp
 
 
+@pytest.mark.slow
 def test_a_job_goes_on_where_it_was_interrupted_then_judges_and_exports(job, tmp_path):
     run_job(job, Quiet())
     record = read_run_record(job.out)

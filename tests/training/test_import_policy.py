@@ -151,7 +151,9 @@ def test_skrl_agent_yaml_names_both_activations(tmp_path):
     assert (training["activation"], training["output_activation"]) == ("elu", "tanh")
 
 
-@pytest.mark.parametrize("save", [foreign.export_onnx, foreign.write_onnx])
+@pytest.mark.parametrize(
+    "save", [pytest.param(foreign.export_onnx, marks=pytest.mark.slow), foreign.write_onnx]
+)
 def test_onnx_policy_of_one_row_gives_the_same_commands_as_a_bundle(save, tmp_path):
     net = foreign.network(6 + 2, 2)
     path = save(tmp_path / "policy.onnx", net)

@@ -64,6 +64,7 @@ def test_every_number_that_is_logged_is_sent_and_the_run_is_ended(recorded, job)
     assert recorded["finished"] == 1
 
 
+@pytest.mark.slow
 def test_nobody_who_does_not_ask_imports_it():
     code = "import sys, training.train, training.jobs; sys.exit('wandb' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=100).returncode == 0
