@@ -168,6 +168,7 @@ def test_a_driver_that_is_told_to_end_closes_its_valves_first(valves, number: st
     assert driver.wait(10.0) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_node_that_was_started_by_nohup_goes_on_without_its_terminal(neighbour, tmp_path: Path) -> None:
     """Who says `nohup` means it."""

@@ -104,6 +104,7 @@ def test_a_paused_recorder_goes_on_where_it_was_and_sigterm_closes_its_bag(recor
     assert recorder.stamps_by_rosbags() == list(range(100))
 
 
+@pytest.mark.slow
 def test_in_lock_step_a_paused_recorder_is_waited_for_and_lacks_nothing(record, node):
     recorder = record()
     recorder.wait_until_recording()
@@ -241,6 +242,7 @@ def test_a_recorder_says_once_a_second_what_became_of_the_messages(record, node,
     assert said[0].status[0].name == "floating_platform: recorder"
 
 
+@pytest.mark.slow
 def test_a_recorder_splits_by_time(record, node):
     recorder = record("split_s:=0.5")
     recorder.wait_until_recording()

@@ -48,6 +48,7 @@ def test_a_ring_writes_the_goal_and_what_was_before_and_after_a_fault(record, no
     assert len(held) == 1
 
 
+@pytest.mark.slow
 def test_a_ring_on_a_full_disk_writes_its_fault_when_there_is_room(record, node, healths):
     recorder = record("mode:=ring", "before_fault_s:=5.0", "after_fault_s:=0.3")
     recorder.wait_until_recording("keeping 5 s for")
