@@ -61,7 +61,7 @@ def odometry(node, *, lockstep: bool = False):
     while not publisher.get_subscription_count():
         assert time.monotonic() < deadline, "the recorder never subscribed to the odometry"
         time.sleep(0.01)
-    time.sleep(0.3)  # a publisher knows of a match a moment before the subscriber does
+    time.sleep(0.5)  # a publisher knows of a match a moment before the subscriber does
     return publisher
 
 

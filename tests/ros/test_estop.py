@@ -307,8 +307,11 @@ def test_a_publisher_of_another_type_or_quality_of_service_is_a_warning_that_nam
 
     def warned() -> bool:
         drive(neighbour)
-        said = neighbour.said["plant"][1]["wire_warnings"]
-        return wrong_type in said and best_effort in said and neighbour.said["plant"][0].startswith("/desk")
+        if "plant" not in neighbour.said:
+            return False
+        message, values = neighbour.said["plant"][:2]
+        said = values["wire_warnings"]
+        return wrong_type in said and best_effort in said and message.startswith("/desk")
 
     until(warned)
     robots = running_robots(neighbour.node, find_s=0.5)
