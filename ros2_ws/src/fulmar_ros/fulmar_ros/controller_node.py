@@ -301,9 +301,10 @@ class ControllerNode(LifecycleNode):
         try:
             decision, inputs = guard.begin_step(measurement, time.monotonic_ns())
             if inputs is not None:
-                step = self._act(inputs)
+                step = self._act(guard, inputs)
                 command = step.command[0]
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
+            guard.loop.rest(stamp)
             self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
             return
         speaks = step is not None or decision.mode is not Mode.IDLE
@@ -317,9 +318,9 @@ class ControllerNode(LifecycleNode):
                 self._announce()
         self._tell_status(decision)
 
-    def _act(self, inputs: Inputs) -> Step:
+    def _act(self, guard: GuardedLoop, inputs: Inputs) -> Step:
         began = time.perf_counter_ns()
-        step = self._guarded.act(inputs)
+        step = guard.act(inputs)
         self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
         return step
 
@@ -329,7 +330,7 @@ class ControllerNode(LifecycleNode):
         What a controller that hung comes up with after all must not follow the safe command of the end.
         """
         with self._speaking:
-            activated = self._guarded.flags.activated
+            activated = self.guard is not None and self.guard.flags.activated  # a step may outlive its guard
             if activated:
                 publish()
             return activated
@@ -346,7 +347,6 @@ class ControllerNode(LifecycleNode):
 
     def _give_up(self, reason: str, stamp: int) -> None:
         """Command what is safe; let the fallback go on, or, where there is none, latch a fault and end the process."""
-        self._guarded.loop.rest(stamp)
         if not self._speak(partial(self.wires.publish_command, self.robot.actuators.safe_command, stamp)):
             return
         if self._guarded.fall_back(reason):
