@@ -23,7 +23,7 @@ from fulmar_bringup.run_record import Actuation, GivenGoal, HealthSample, Motion
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.paths import config_names
 from fulmar_core.rotation import rotate
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import load_recorded_task
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     BLOCK,
@@ -197,7 +197,7 @@ class _Reader:
 def _goal_wires_of(task: object) -> list[Wire]:
     """Where goals of a task are told; anywhere, of a task that nobody knows here."""
     try:
-        return list(goal_wires(load_task(str(task)).goal_topic))
+        return list(goal_wires(load_recorded_task(str(task)).goal_topic))
     except ConfigError:
         return [wire for topic in GOAL_WIRES for wire in goal_wires(topic)]
 

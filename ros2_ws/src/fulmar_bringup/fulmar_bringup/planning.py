@@ -25,7 +25,7 @@ from fulmar_bringup.system import (
     system_of,
 )
 from fulmar_core.bundle_signature import verify_bundle
-from fulmar_core.controllers.classical import has_law
+from fulmar_core.controllers.classical import OWN_CONTROLLER, has_law
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
@@ -33,6 +33,7 @@ from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.geofence import check_starts
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
+from fulmar_core.own_class import is_own
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.recording import MODES, Mode, Recording
@@ -426,6 +427,11 @@ def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: fl
         BundleError: None is shipped, or the bundle is damaged or made for something else.
     """
     folder = policy or shipped_policy(robot.name, task.name)
+    if folder is None and is_own(task.name):
+        raise BundleError(
+            f"no policy is shipped for '{robot.name}' and '{task.name}', whose observation is your own. "
+            f"{OWN_CONTROLLER}"
+        )
     if folder is None:
         otherwise = ", or use --controller classical" if has_law(robot, task) else ""
         raise BundleError(
