@@ -18,6 +18,7 @@ WRITTEN = {
     "throughput.py": "measures that one",
     "policy.py": "inputs of a network beside its observation",
     "go_to_position_with_obstacles.py": "a part of what its task observes",
+    "own_task.py": "tries a user's own task before anything moves",
 }
 
 

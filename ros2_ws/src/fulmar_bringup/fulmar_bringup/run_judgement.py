@@ -105,7 +105,7 @@ def judge(record: RunRecord) -> Judgement | None:
     motion = record.motion
     if len(motion) < 2 or motion.stamp_s[-1] <= motion.stamp_s[0]:
         return None
-    task = load_recorded_task(_text(record, "task"))
+    task = load_recorded_task(_text(record, "task"), record.path)
     goals = _goals(record, task)
     robot = load_robot(_text(record, "robot"))
     time_s, samples = _even(motion)

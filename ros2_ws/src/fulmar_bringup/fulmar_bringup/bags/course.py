@@ -118,7 +118,7 @@ def course_of(
     """
     info = bag.info or {}
     the_robot = load_robot(_name(bag, "robot", robot))
-    the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None))
+    the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None), bag.path)
     the_task.check(the_robot)
     warnings: list[str] = list(bag.warnings)
     limits = limits_of(info)

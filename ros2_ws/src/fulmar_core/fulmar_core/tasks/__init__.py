@@ -5,6 +5,7 @@ The explicit table of tasks. A new task is one file here, one line below and one
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import cast
 
 from fulmar_core.config import load_config
@@ -70,15 +71,18 @@ def load_task(name: str) -> Task:
     return shipped
 
 
-def load_recorded_task(name: str) -> Task:
+def load_recorded_task(name: str, bag: Path) -> Task:
     """Load the task that a bag names, without importing a class that nothing but the bag names.
 
     Args:
         name: As of `load_task`.
+        bag: The bag, for messages.
 
     Raises:
         ConfigError: As of `load_task`; or a class that this process has not loaded by `load_task` before.
     """
     if is_own(name) and name not in _asked_for:  # a bag from elsewhere must not have its code run
-        raise ConfigError(f"the task is '{name}', a class that only the bag names. To use it: --task {name}.")
+        raise ConfigError(
+            f"{bag}: the task is '{name}', a class that only this bag names. To use it: --task {name}."
+        )
     return load_task(name)

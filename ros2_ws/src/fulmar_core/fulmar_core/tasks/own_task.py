@@ -28,6 +28,14 @@ from fulmar_core.topics import GOAL_WIRES
 
 METHODS = ("draw", "observe", "reward", "errors")
 ATTRIBUTES = ("episode_s", "tolerance", "goal_topic", "observation_names")
+SHIPPED_ONLY = (
+    "pushes",
+    "pushed",
+    "step_s",
+    "judged",
+    "fitted",
+    "surveyed",
+)  # members that own tasks cannot have
 ROLE = "task"  # in messages
 TRIED = 3  # episodes that `check` draws
 
@@ -53,6 +61,11 @@ def load_own_task(path: str) -> OwnTask:
         raise ConfigError(
             f"{ROLE} '{path}': lacks {', '.join(lacking)}. A task needs: {', '.join(ATTRIBUTES)}."
         )
+    for name in SHIPPED_ONLY:
+        if getattr(cls, name, None) is not getattr(Task, name) and hasattr(cls, name):
+            raise ConfigError(
+                f"{ROLE} '{path}': has '{name}', which only shipped tasks can have. Leave it out."
+            )
     names, required = own.observation_names, getattr(own, "required", None)
     for right, name, must in (
         (
