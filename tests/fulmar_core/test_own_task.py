@@ -10,9 +10,11 @@ import pytest
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
-from fulmar_core.errors import ConfigError, TaskError
+from fulmar_core.errors import BundleError, ConfigError, TaskError
+from fulmar_core.learning_step import observed_step
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.simulation import BatchSimulation
 from fulmar_core.standby import ready
 from fulmar_core.tasks import load_recorded_task, load_task
 from tests.own_files import own_folder
@@ -97,6 +99,15 @@ def test_settings_come_from_the_yaml_beside_the_module_where_the_class_takes_the
     (tmp_path / "own_0.yaml").write_text("- 1\n")
     with pytest.raises(ConfigError, match=r"own_0\.yaml: must hold a mapping, found list\."):
         load_task(name)
+
+
+def test_learners_get_its_reward_in_single_precision(own):
+    simulation = BatchSimulation(ROBOT, load_task(own()), NOMINAL, worlds=4, seed=1, training=True)
+    before = simulation.truth, simulation.goal
+    reward, over, seen = observed_step(simulation, np.zeros((4, 2)), effort=0.0)
+    away = np.hypot(before[1].current[:, 0] - before[0].x, before[1].current[:, 1] - before[0].y)
+    np.testing.assert_allclose(reward, -away, atol=1e-3)
+    assert (reward.dtype, seen.dtype, over.any()) == (np.float32, np.float32, False)
 
 
 def test_targets_that_it_counts_make_an_episode_a_success(own):
@@ -218,13 +229,20 @@ def test_a_class_that_only_a_bag_names_is_never_imported(own, tmp_path):
     assert load_recorded_task(name, bag).name == name
 
 
-def test_no_law_and_no_excitation_knows_it(own):
+def test_no_law_no_excitation_and_no_shipped_bundle_knows_it(own):
+    from fulmar_bringup.planning import checked_policy
     from policy_server.controllers import controller_entry
+    from policy_server.shipped import shipped_policy
 
     task = load_task(own())
     with pytest.raises(
-        ConfigError, match=r"no classical law does 'own_0:Mine' .* Use a controller of your own: "
-    ):
+        BundleError, match="or use a controller of your own: --controller mypackage"
+    ) as caught:
+        checked_policy(None, ROBOT, task, 10.0)
+    assert "train one with `fulmar train turtlebot2 own_0:Mine`" in str(caught.value)
+    with pytest.raises(BundleError, match="was trained for task 'go_to_position', not 'own_0:Mine'"):
+        checked_policy(shipped_policy("turtlebot2", "go_to_position"), ROBOT, task, 10.0)
+    with pytest.raises(ConfigError, match=r"no classical law does 'own_0:Mine' on 'turtlebot2'"):
         controller_entry("classical").check(ROBOT, task)
     with pytest.raises(ConfigError, match=r"'own_0:Mine' has none"):
         controller_entry("excite").check(ROBOT, task)

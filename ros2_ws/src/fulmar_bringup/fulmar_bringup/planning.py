@@ -25,7 +25,7 @@ from fulmar_bringup.system import (
     system_of,
 )
 from fulmar_core.bundle_signature import verify_bundle
-from fulmar_core.controllers.classical import OWN_CONTROLLER, has_law
+from fulmar_core.controllers.classical import has_law
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
@@ -427,13 +427,10 @@ def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: fl
         BundleError: None is shipped, or the bundle is damaged or made for something else.
     """
     folder = policy or shipped_policy(robot.name, task.name)
-    if folder is None and is_own(task.name):
-        raise BundleError(
-            f"no policy is shipped for '{robot.name}' and '{task.name}', whose observation is your own. "
-            f"{OWN_CONTROLLER}"
-        )
     if folder is None:
         otherwise = ", or use --controller classical" if has_law(robot, task) else ""
+        if is_own(task.name):
+            otherwise = ", or use a controller of your own: --controller mypackage.mymodule:MyController"
         raise BundleError(
             f"no policy is shipped for '{robot.name}' and '{task.name}'. Give one with --policy, "
             f"train one with `fulmar train {robot.name} {task.name}`{otherwise}."

@@ -26,7 +26,6 @@ from fulmar_core.controllers.mpc import Mpc, MpcGains
 from fulmar_core.controllers.polar import Polar, PolarGains
 from fulmar_core.controllers.pure_pursuit import PurePursuit, PurePursuitGains
 from fulmar_core.errors import ConfigError
-from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -34,7 +33,6 @@ from fulmar_core.tasks import Task
 POSITIONS = ("go_to_position", "go_to_position_with_obstacles", "go_through_positions", "race_waypoints")
 POSES = ("go_to_pose", "go_through_poses", "race_wayposes")
 VELOCITIES = ("track_velocities",)
-OWN_CONTROLLER = "Use a controller of your own: --controller mypackage.mymodule:MyController."
 
 
 @dataclass(frozen=True)
@@ -90,10 +88,9 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
             "Use --controller classical."
         )
     if task.kind not in entry.tasks:
-        learned = f"Use --controller policy, which `fulmar train {robot.name} {task.name}` makes."
         raise ConfigError(
             f"no classical law does '{task.name}' on '{robot.name}' ({family}); there is one for: "
-            f"{', '.join(entry.tasks)}. {OWN_CONTROLLER if is_own(task.name) else learned}"
+            f"{', '.join(entry.tasks)}. Use --controller policy, which `fulmar train {robot.name} {task.name}` makes."
         )
     if _find_gains(robot, entry) is None:
         gains_of(robot, law)
