@@ -15,10 +15,10 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.own_class import load_class
+from fulmar_core.own_class import is_own, load_class
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from policy_server.own_controller import MEMBERS, OwnController, is_own
+from policy_server.own_controller import MEMBERS, OwnController
 from policy_server.shipped import shipped_policy
 
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,17 +16,11 @@ import numpy as np
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.suspicion import Suspicion
-from fulmar_core.own_class import SEPARATOR, construct, load_class
+from fulmar_core.own_class import construct, load_class, settings_beside, source_of
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from fulmar_core.yaml_text import YamlError, load
 
 MEMBERS = ("reset", "act")
-
-
-def is_own(name: str) -> bool:
-    """Whether a controller's name is the dotted path of a class."""
-    return SEPARATOR in name
 
 
 class OwnController:
@@ -53,8 +45,7 @@ class OwnController:
         self.name, self.control_hz = path, control_hz
         robot.timing.substeps(control_hz)  # refuses rates that the physics cannot keep
         cls = load_class(path, members=MEMBERS, what="controller")
-        self._source = Path(str(sys.modules[cls.__module__].__file__))
-        self._settings = _settings(self._source.with_suffix(".yaml"))
+        self._source, self._settings = source_of(cls), settings_beside(cls)
         self._own = construct(
             cls, "MyController(robot, task, settings)", "controller", robot, task, self._settings
         )
@@ -86,17 +77,3 @@ class OwnController:
         }
         text = json.dumps(said, sort_keys=True, default=str).encode() + self._source.read_bytes()
         return said | {"sha256": hashlib.sha256(text).hexdigest()}
-
-
-def _settings(path: Path) -> dict[str, Any]:
-    if not path.exists():
-        return {}
-    try:
-        values = load(path.read_text(encoding="utf-8"))
-    except YamlError as error:
-        raise ConfigError(f"{path}:{error.line}: {error}.") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}.") from error
-    if not isinstance(values, dict):
-        raise ConfigError(f"{path}: must hold a mapping, found {type(values).__name__}.")
-    return values

@@ -14,7 +14,6 @@ from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample, InertialUnit
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.push_block import PushBlock
 from sim_nodes.mujoco_model import Scene
 from sim_nodes.mujoco_model.obstacles import radii_for
 from sim_nodes.one_world import OneWorld
@@ -42,8 +41,7 @@ class MujocoBackend:
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> MujocoBackend:
         """The simulator that a task and a scenario ask for."""
-        block = task.block if isinstance(task, PushBlock) else None
-        return cls(robot, sensor_noise=scenario.sensor_noise, block=block)
+        return cls(robot, sensor_noise=scenario.sensor_noise, block=task.pushes)
 
     @property
     def model(self) -> mujoco.MjModel:

@@ -9,7 +9,6 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import load_task
-from fulmar_core.tasks.push_block import PushBlock
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node
@@ -34,7 +33,7 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
     if settings.backend == "mock":
         from sim_nodes.mock_backend import MockBackend
 
-        return MockBackend(robot, block=task.block if isinstance(task, PushBlock) else None)
+        return MockBackend(robot, block=task.pushes)
     raise UnknownNameError("simulated backend", settings.backend, BACKENDS)
 
 

@@ -22,7 +22,7 @@ from fulmar_core.planar import in_float64
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
-from fulmar_core.tasks import Task, fitted
+from fulmar_core.tasks import Task
 from training.compiled import step_of
 from training.coordinates import coordinate_terms, places_of, with_coordinates
 from training.orders import KINDS, check_orders, shares_asked
@@ -86,7 +86,7 @@ class BatchVecEnv(VecEnv):
             ConfigError: The robot cannot be mirrored so, or takes no orders, or the task has no path, or there is no
                 compiler.
         """
-        task = fitted(asked_for(task, scenario), robot)
+        task = asked_for(task, scenario).fitted(robot)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered

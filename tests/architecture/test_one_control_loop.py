@@ -19,6 +19,7 @@ WRITTEN = {
     "policy.py": "inputs of a network beside its observation",
     "own_controller.py": "a user's class behind the interface of controllers",
     "go_to_position_with_obstacles.py": "a part of what its task observes",
+    "own_task.py": "tries a user's own task before anything moves",
 }
 
 

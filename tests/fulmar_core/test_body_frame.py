@@ -13,14 +13,14 @@ from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.tasks import fitted, load_task
+from fulmar_core.tasks import load_task
 from fulmar_core.tasks.obstacles import FAR, SIGHT
 from fulmar_core.tasks.track_velocities import ERROR_TERMS
 from fulmar_core.tasks.ways import TOUCHING
 from tests.inputs import inputs_at, inputs_of
 
 ROBOT = load_robot("turtlebot2")
-TASKS = {name: fitted(load_task(name), ROBOT) for name in config_names("tasks")}
+TASKS = {name: load_task(name).fitted(ROBOT) for name in config_names("tasks")}
 
 
 @pytest.fixture(params=TASKS.values(), ids=TASKS)

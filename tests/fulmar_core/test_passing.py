@@ -13,7 +13,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.references.race_corners import draw_corners
 from fulmar_core.robot import load_robot
-from fulmar_core.tasks import fitted, load_task
+from fulmar_core.tasks import load_task
 from fulmar_core.tasks.passing import PassingTask
 from fulmar_core.tasks.race_gates import crossings
 from fulmar_core.tasks.race_track import RaceTrack
@@ -102,16 +102,16 @@ def knowing_its_place(std):
 @pytest.mark.parametrize("name", NAMES[:4])
 @pytest.mark.parametrize(("std", "reach"), [(0.0, 0.2), (0.002, 0.194), (0.01, 0.17), (0.05, 0.17)])
 def test_who_knows_its_place_better_takes_more_for_reached(name, std, reach):
-    assert fitted(TASKS[name], knowing_its_place(std)).reach == pytest.approx(reach)
+    assert TASKS[name].fitted(knowing_its_place(std)).reach == pytest.approx(reach)
 
 
 def test_everyone_keeps_as_far_off_the_posts_of_gates():
-    assert fitted(GATES, knowing_its_place(0.0)) == GATES
+    assert GATES.fitted(knowing_its_place(0.0)) == GATES
 
 
 def test_tasks_without_a_reach_are_the_same_for_everyone():
     task = load_task("go_to_pose")
-    assert fitted(task, BASE) is task
+    assert task.fitted(BASE) is task
 
 
 @WITH_HEADINGS
@@ -119,12 +119,8 @@ def test_a_pose_is_done_where_place_and_heading_are_right_at_once(name):
     task = TASKS[name]
     for degrees, done in ((0.0, 1.0), (11.0, 1.0), (-11.0, 1.0), (13.0, 0.0), (180.0, 0.0)):
         assert task.advance(square(), body(0.1, 0.0, np.deg2rad(degrees)), 0.0).done.tolist() == [done]
-    assert task.counted(
-        square(), body(0.18, 0.0, np.deg2rad(14.0)), task.tolerance.position
-    ).done.tolist() == [1.0]
-    assert task.counted(
-        square(), body(0.18, 0.0, np.deg2rad(16.0)), task.tolerance.position
-    ).done.tolist() == [0.0]
+    assert task.counted(square(), body(0.18, 0.0, np.deg2rad(14.0)), 0.0).done.tolist() == [1.0]
+    assert task.counted(square(), body(0.18, 0.0, np.deg2rad(16.0)), 0.0).done.tolist() == [0.0]
 
 
 @EACH
@@ -179,7 +175,7 @@ def test_gates_are_counted_step_by_step_and_once_each():
 def test_between_controller_and_post_is_a_margin_that_only_judges_count():
     near_the_post = square(place=(-0.1, 0.36))
     assert GATES.advance(near_the_post, body(0.1, 0.36), 0.0).done.tolist() == [0.0]
-    assert GATES.counted(near_the_post, body(0.1, 0.36), GATES.tolerance.position).done.tolist() == [1.0]
+    assert GATES.counted(near_the_post, body(0.1, 0.36), 0.0).done.tolist() == [1.0]
 
 
 def gate_reward(before, after):

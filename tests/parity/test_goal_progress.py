@@ -23,7 +23,7 @@ from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.safety.succession import Succession
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.standby import Standby
-from fulmar_core.tasks import fitted, load_task
+from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 
 ROBOT, SCENARIO = load_robot("turtlebot2"), load_scenario("nominal")
@@ -33,7 +33,7 @@ S = 1_000_000_000
 
 
 def drawn(task):
-    return draw_episodes(ROBOT, fitted(task, ROBOT), SCENARIO, seed=SEED, numbers=np.arange(EPISODES))
+    return draw_episodes(ROBOT, task.fitted(ROBOT), SCENARIO, seed=SEED, numbers=np.arange(EPISODES))
 
 
 def short(task):

@@ -12,7 +12,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.planar import COLUMNS
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.tasks import load_task, sees_obstacles
+from fulmar_core.tasks import load_task
 from tests.pairs import covering
 
 torch = pytest.importorskip("torch")
@@ -54,9 +54,7 @@ def assert_alike(robot, task, dtype, device):
     theirs = trajectory(robot, task, torch, dtype, device)
     assert np.isfinite(ours).all()
     close = CLOSE[dtype]
-    if sees_obstacles(
-        task
-    ):  # beside a disc its tangent turns with the root of the distance, and so does rounding
+    if task.sees_obstacles:  # beside a disc its tangent turns with the root of the distance, as does rounding
         close = max(close, float(np.sqrt(np.finfo(dtype).eps)))
     np.testing.assert_allclose(theirs, ours, rtol=0, atol=close)
 

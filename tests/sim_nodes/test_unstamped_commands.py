@@ -14,7 +14,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.tasks import fitted, load_task
+from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 
 BOAT, TASK = load_robot("kingfisher"), load_task("go_to_position")
@@ -51,7 +51,7 @@ def goals_met(rate: float, *, stamped: bool) -> int:
         episodes=GOALS,
         seed=0,
     )
-    return int(np.count_nonzero(successes(run, fitted(TASK, BOAT))))
+    return int(np.count_nonzero(successes(run, TASK.fitted(BOAT))))
 
 
 @pytest.mark.slow

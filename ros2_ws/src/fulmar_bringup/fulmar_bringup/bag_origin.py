@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 from fulmar_bringup.system import System
 from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_of, gains_path
+from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from fulmar_core.tasks.own_task import OwnTask
 from fulmar_ros.provenance import fulmar_version, git_revision
 from policy_server.controllers import controller_entry
-from policy_server.own_controller import is_own
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:
@@ -48,7 +50,7 @@ def attachments(plan: RunPlan) -> str:
     calibration = calibration_path()
     files = {
         "robot.yaml": config_path("robots", plan.robot),
-        "task.yaml": config_path("tasks", plan.task),
+        **_of_task(plan.task),
         "scenario.yaml": config_path("scenarios", plan.scenario),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
@@ -72,6 +74,14 @@ def effective_system(plan: RunPlan) -> System:
         control_hz=plan.control_hz,
         guards=plan.guards,
         recorder=plan.recording,
+    )
+
+
+def _of_task(name: str) -> dict[str, Path]:
+    """The file of a task; of a user's own class, its module."""
+    task = load_task(name)
+    return (
+        {"task.py": task.source} if isinstance(task, OwnTask) else {"task.yaml": config_path("tasks", name)}
     )
 
 

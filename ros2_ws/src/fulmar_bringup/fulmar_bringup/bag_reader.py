@@ -23,7 +23,7 @@ from fulmar_bringup.run_record import Actuation, GivenGoal, HealthSample, Motion
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.paths import config_names
 from fulmar_core.rotation import rotate
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import load_recorded_task
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     BLOCK,
@@ -162,7 +162,7 @@ class _Reader:
     def _goals(self, task: object) -> list[GivenGoal]:
         """What the controller was told; it hears the topic of its task alone."""
         goals = []
-        heard = _goal_wires_of(task)
+        heard = _goal_wires_of(task, self._bag.path)
         for wire in (wire for topic in GOAL_WIRES for wire in goal_wires(topic)):
             if wire not in heard:
                 self._warn_of_others(wire, task)
@@ -194,10 +194,10 @@ class _Reader:
         return nothing if discs is None else discs
 
 
-def _goal_wires_of(task: object) -> list[Wire]:
-    """Where goals of a task are told; anywhere, of a task that nobody knows here."""
+def _goal_wires_of(task: object, bag: Path) -> list[Wire]:
+    """Where goals of a task are published; anywhere, of a task that is not known here."""
     try:
-        return list(goal_wires(load_task(str(task)).goal_topic))
+        return list(goal_wires(load_recorded_task(str(task), bag).goal_topic))
     except ConfigError:
         return [wire for topic in GOAL_WIRES for wire in goal_wires(topic)]
 

@@ -16,8 +16,6 @@ from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
-from fulmar_core.tasks.push_block import PushBlock
 
 DEFAULT_TASKS = {Positions: "go_to_position", Poses: "go_to_pose"}  # all others are about velocities
 SHOWN = 400  # points of a path that a record carries along
@@ -55,9 +53,7 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
     as_path = is_path_of_places(task) and isinstance(file, Positions | Poses)
     fits = goal_sequence(file, robot, as_path=as_path).topic == task.goal_topic
     fits &= not (isinstance(file, Positions) and task.tolerance.heading_deg > 0.0)
-    if not fits or isinstance(
-        task, GoToPositionWithObstacles | PushBlock
-    ):  # whose surroundings the seed draws
+    if not fits or task.sees_obstacles or task.pushes:  # whose surroundings the seed draws
         raise ConfigError(
             f"the goals '{goals}' are no goals of task '{task.name}'. "
             f"Leave --task out: they are for '{default_task(goals)}'."

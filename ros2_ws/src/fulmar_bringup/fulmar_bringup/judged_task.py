@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.errors import ConfigError
@@ -20,7 +21,7 @@ def task_of(plan: RunPlan) -> Task:
     """
     task = load_task(plan.task)
     if plan.duration_s:
-        task = replace(task, episode_s=plan.duration_s)
+        task = cast(Task, replace(cast(Any, task), episode_s=plan.duration_s))  # every task is a dataclass
     if not plan.goals:
         return task
     file = load_goals(plan.goals)

@@ -33,6 +33,7 @@ from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.geofence import check_starts
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile
+from fulmar_core.own_class import is_own
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.recording import MODES, Mode, Recording
@@ -428,6 +429,8 @@ def checked_policy(policy: Path | None, robot: Robot, task: Task, control_hz: fl
     folder = policy or shipped_policy(robot.name, task.name)
     if folder is None:
         otherwise = ", or use --controller classical" if has_law(robot, task) else ""
+        if is_own(task.name):
+            otherwise = ", or use a controller of your own: --controller mypackage.mymodule:MyController"
         raise BundleError(
             f"no policy is shipped for '{robot.name}' and '{task.name}'. Give one with --policy, "
             f"train one with `fulmar train {robot.name} {task.name}`{otherwise}."

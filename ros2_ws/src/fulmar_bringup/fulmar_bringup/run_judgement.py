@@ -17,7 +17,7 @@ from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targe
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.schedule import LONGEST_AHEAD_NS, SLACK_NS
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks import Task, load_recorded_task
 from fulmar_core.trajectories import COLUMNS
 
 LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its stamp
@@ -105,7 +105,7 @@ def judge(record: RunRecord) -> Judgement | None:
     motion = record.motion
     if len(motion) < 2 or motion.stamp_s[-1] <= motion.stamp_s[0]:
         return None
-    task = load_task(_text(record, "task"))
+    task = load_recorded_task(_text(record, "task"), record.path)
     goals = _goals(record, task)
     robot = load_robot(_text(record, "robot"))
     time_s, samples = _even(motion)

@@ -23,8 +23,7 @@ from visualization_msgs.msg import MarkerArray
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.safety.estop import HOLDS, SILENT
-from fulmar_core.tasks import Task, sees_obstacles
-from fulmar_core.tasks.track_velocities import TrackVelocities
+from fulmar_core.tasks import Task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.late_subscribers import LateSubscribers
@@ -65,7 +64,7 @@ class Supervisor:
         LateSubscribers(node, self._goal, lambda: list(self._sent))
         self._obstacles = (
             node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
-            if sees_obstacles(task)
+            if task.sees_obstacles
             else None
         )
         node.create_subscription(
@@ -195,7 +194,7 @@ class Supervisor:
 
     def _timed(self, goal: Goal, time_ns: int) -> list[tuple[Goal, int]]:
         """Goals to publish, with their stamps [ns]."""
-        if not isinstance(self._task, TrackVelocities):
+        if self._task.step_s is None:
             return [(goal, time_ns)]
         step_ns = round(1e9 * self._task.step_s)
         return [(goal_at(tuple(target)), time_ns + i * step_ns) for i, target in enumerate(goal.targets)]

@@ -105,6 +105,7 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
         ConfigError: On the first wrong one.
     """
     the_robot, the_task = load_robot(robot), load_task(task)
+    the_task.check(the_robot)
     controller_entry(controller).check(the_robot, the_task)
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)

@@ -15,7 +15,7 @@ from fulmar_bringup.node_table import NodeSpec, list_nodes
 ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",
     "robot": "a file of configs/robots, without .yaml",
-    "task": "a file of configs/tasks, without .yaml",
+    "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
     "controller": "policy, or a classical controller such as lqr",
     "backend": "mujoco, mock or hardware",
     "hardware": "a file of configs/hardware, without .yaml, or a path to one",

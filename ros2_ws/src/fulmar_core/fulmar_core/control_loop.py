@@ -14,7 +14,7 @@ from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import COLUMNS, PlanarState, in_float64
 from fulmar_core.robot import Robot
 from fulmar_core.safety.command_gate import command_problem
-from fulmar_core.tasks import Task, fitted
+from fulmar_core.tasks import Task
 
 NEVER_NS = 1 << 62  # no pause is that long
 
@@ -60,7 +60,7 @@ class ControlLoop:
             applied: What the actuators of one robot did, as far as that is known; without it the loop takes commands
                 for what was applied.
         """
-        self.robot, self.task = robot, fitted(task, robot)
+        self.robot, self.task = robot, task.fitted(robot)
         self.observer = Observer(robot, self.task)
         self.dt = robot.timing.substeps(controller.control_hz) * robot.timing.physics_dt
         self._pause_ns, self._applied = pause_ns, applied
@@ -153,9 +153,7 @@ class ControlLoop:
         assert self.goal is not None, "a control step needs a goal"
         if self._began_ns is None:
             self._began_ns = stamp_ns
-            begun = getattr(self.task, "begun", None)
-            if begun is not None:
-                self.goal = begun(self.goal, state)
+            self.goal = self.task.begun(self.goal, state)
         else:
             time_s = np.asarray((stamp_ns - self._began_ns) / 1e9)
             self.goal = self.task.advance(self.goal, state, time_s)

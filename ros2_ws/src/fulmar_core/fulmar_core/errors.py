@@ -31,6 +31,10 @@ class BundleError(FulmarError):
     """A policy bundle is damaged, or does not fit the robot, the task or the rate."""
 
 
+class TaskError(ConfigError):
+    """A user's own task raised, or returned what no task returns."""
+
+
 class SafetyError(FulmarError):
     """A safety limit is set to something that would not protect."""
 

@@ -3,21 +3,9 @@
 from __future__ import annotations
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.push_block import PushBlock
-
-
-def distance_from_goal(task: Task, state: PlanarState, goal: Goal) -> Array | None:
-    """How far the robot is from the current target; None where goals are no places [m].
-
-    Where something else has to get there, as a block, that is not the task's error alone.
-    """
-    own = getattr(task, "distance_from_goal", None)
-    return task.errors(state, goal).position if own is None else own(state, goal)
 
 
 def check_starts(robot: Robot, task: Task, *, training: bool = False) -> None:

@@ -82,6 +82,16 @@ def goal_at(*targets: tuple[float, float, float], obstacles: np.ndarray | None =
     )
 
 
+def goals_at(targets: Array) -> Goal:
+    """A batch of goals with one target each.
+
+    Args:
+        targets: Poses or body velocities as of `Goal`, shape (n, 3).
+    """
+    zero = array_namespace(targets).zeros_like(targets[:, 0])
+    return Goal(targets[:, None, :], zero, no_obstacles(len(targets)), targets[:, :2] * 0.0)
+
+
 def stack_goals(goals: list[Goal]) -> Goal:
     """Join single goals into a batch along a new first axis."""
     return Goal(*(np.stack([getattr(g, name) for g in goals]) for name in Goal.__slots__))

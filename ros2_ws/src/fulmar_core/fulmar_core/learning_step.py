@@ -5,7 +5,6 @@ from __future__ import annotations
 from array_api_compat import device
 
 from fulmar_core.arrays import array_namespace, is_numpy, sum_of
-from fulmar_core.geofence import distance_from_goal
 from fulmar_core.goal import Goal
 from fulmar_core.observation import shares
 from fulmar_core.planar import PlanarState
@@ -45,12 +44,12 @@ def learning_step(
         time, because the robot left the geofence or touched something. Shapes (worlds,).
     """
     reward = task.reward(before, after, goal, ended) - _cost(robot, effort, previous, command)
-    penalty = getattr(task, "penalty", None)  # tasks where nothing is in the way have none
+    penalty = task.penalty(after, goal, robot)
     if penalty is not None:
-        reward = reward - penalty(after, goal, robot)
+        reward = reward - penalty
     xp = array_namespace(after.x)
     over = xp.zeros(after.x.shape, dtype=xp.bool, device=device(after.x))
-    away = distance_from_goal(task, after, ended)
+    away = task.distance_from_goal(after, ended)
     if away is not None:
         over = away > robot.limits.geofence
     touching = task.collides(after, goal, robot)

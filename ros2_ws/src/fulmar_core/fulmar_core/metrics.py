@@ -42,14 +42,14 @@ def successes(run: Trajectories, task: Task) -> np.ndarray:
         One truth value an episode, shape (episodes,).
     """
     clean = ~np.any(run.touching, axis=1)
-    if counts_targets(task):
-        return np.asarray(clean & (run.goals[:, -1] >= task.required))  # type: ignore[union-attr]
+    if task.required is not None:
+        return np.asarray(clean & (run.goals[:, -1] >= task.required))
     return np.asarray(clean & np.all(_inside(run, task)[:, -_window(run, task) :], axis=1))
 
 
 def counts_targets(task: Task) -> bool:
     """Whether a task is about how many targets one reaches."""
-    return getattr(task, "required", None) is not None
+    return task.required is not None
 
 
 def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:

@@ -9,13 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from fulmar_core.control_loop import ControlLoop
-from fulmar_core.geofence import distance_from_goal
 from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.planar import PlanarState
 from fulmar_core.schedule import Schedule
-from fulmar_core.tasks import sees_obstacles
-from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
-from fulmar_core.tasks.push_block import PushBlock
 
 GOALS_REMEMBERED = 200  # stamps of goals; publishers repeat at most the last 100
 BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
@@ -43,8 +39,8 @@ class Mission:
         # Velocities may come ahead of their time; a place counts from when it comes, whatever clock stamped it.
         timed = self._task.goal_topic == "goal_velocity"
         self._schedule: Schedule[Goal] | None = Schedule() if timed else None
-        self._obstacles: np.ndarray | None = None if sees_obstacles(self._task) else np.zeros((0, 3))
-        self._pushes = isinstance(self._task, PushBlock)
+        self._obstacles: np.ndarray | None = None if self._task.sees_obstacles else np.zeros((0, 3))
+        self._pushes = self._task.pushes is not None
         self._block: np.ndarray | None = None
         self._block_stamp_ns = 0
         self._given: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # since the last drop
@@ -144,7 +140,7 @@ class Mission:
         """
         if self._loop.goal is None:
             return math.inf
-        distance = distance_from_goal(self._task, state, self._loop.goal)
+        distance = self._task.distance_from_goal(state, self._loop.goal)
         return 0.0 if distance is None else float(distance[0])
 
     def _take(self, goal: Goal | None, *, anew: bool = True) -> None:
@@ -167,9 +163,7 @@ class Mission:
         if not self._pushes:
             block = goal.block if before is None else before.block[0]
         batched = stack_goals([replace(goal, done=np.asarray(done), obstacles=obstacles, block=block)])
-        if isinstance(self._task, GoToPositionWithObstacles):
-            batched = self._task.surveyed(batched, self._loop.robot)
-        self._loop.goal = batched
+        self._loop.goal = self._task.surveyed(batched, self._loop.robot)
 
 
 def _key(goal: Goal, stamp_ns: int) -> GoalKey:

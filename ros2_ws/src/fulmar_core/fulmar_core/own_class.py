@@ -20,10 +20,16 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.errors import ConfigError, FulmarError, did_you_mean, shortened
+from fulmar_core.yaml_text import YamlError, load
 
 SEPARATOR = ":"  # of module and class; no name of anything that Fulmar brings has one
 EXAMPLE = "mypackage.mymodule:MyClass"
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
+
+
+def is_own(name: str) -> bool:
+    """Whether the name of a controller or task is the dotted path of a class."""
+    return SEPARATOR in name
 
 
 def check_class_path(text: str) -> None:
@@ -95,6 +101,31 @@ def construct(cls: type[Any], call: str, what: str, *arguments: Any, **named: An
         raise ConfigError(
             f"{what} '{cls.__module__}:{cls.__name__}': {call} raised {one_line(error, cls.__module__)}."
         ) from error
+
+
+def settings_beside(cls: type[Any]) -> dict[str, Any]:
+    """Settings of a user's class: the mapping in the YAML file of the same name beside its module, or an empty one.
+
+    Raises:
+        ConfigError: The file is not valid YAML, or holds no mapping.
+    """
+    path = source_of(cls).with_suffix(".yaml")
+    if not path.exists():
+        return {}
+    try:
+        values = load(path.read_text(encoding="utf-8"))
+    except YamlError as error:
+        raise ConfigError(f"{path}:{error.line}: {error}.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}.") from error
+    if not isinstance(values, dict):
+        raise ConfigError(f"{path}: must hold a mapping, found {type(values).__name__}.")
+    return values
+
+
+def source_of(cls: type[Any]) -> Path:
+    """The file that a user's class is in."""
+    return Path(str(sys.modules[cls.__module__].__file__))
 
 
 def one_line(error: BaseException, module_name: str) -> str:

@@ -20,7 +20,7 @@ from fulmar_core.planar import PlanarState, planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.tasks import Task, fitted
+from fulmar_core.tasks import Task
 
 SIDE_BY_SIDE = 256  # simulators alive at once
 WORLDS = 2048  # of a batch at once: nearly as fast as more, and their record stays below some 200 MB
@@ -133,9 +133,7 @@ def roll_out_in_backends(
                 progress(done + steps)
 
             robot = backends[0].robot
-            drawn = draw_episodes(
-                robot, fitted(task, robot), scenario, seed=seed, numbers=np.asarray(numbers)
-            )
+            drawn = draw_episodes(robot, task.fitted(robot), scenario, seed=seed, numbers=np.asarray(numbers))
             samples = [
                 backend.reset(drawn[i], seed=seed, number=each)
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))

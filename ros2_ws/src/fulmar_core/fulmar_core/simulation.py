@@ -22,8 +22,7 @@ from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
-from fulmar_core.tasks import Task, fitted
-from fulmar_core.tasks.push_block import PushBlock
+from fulmar_core.tasks import Task
 from fulmar_core.upcoming import Beginning, UpcomingEpisodes
 
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
@@ -79,7 +78,7 @@ class BatchSimulation(Moves):
             device: Where its arrays live, for torch.
             dtype: Floating type; the library's float32 by default.
         """
-        self.robot, self.task, self.scenario, self.seed = robot, fitted(task, robot), scenario, seed
+        self.robot, self.task, self.scenario, self.seed = robot, task.fitted(robot), scenario, seed
         self.worlds, self.training = worlds, training
         self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
@@ -169,7 +168,7 @@ class BatchSimulation(Moves):
     @property
     def block(self) -> Array | None:
         """Where the things to push are, shape (worlds, 2); None where there are none [m]."""
-        return self.goal.block if isinstance(self.task, PushBlock) else None
+        return self.goal.block if self.task.pushes else None
 
     def step(self, command: Array) -> None:
         """Do one control step of a learner: limit and apply its command, and advance the goals by what is measured.
@@ -215,7 +214,7 @@ class BatchSimulation(Moves):
             off_centre=self._off_centre,
         )
         self._steps = self._steps + 1
-        if isinstance(self.task, PushBlock):
+        if self.task.pushes:
             self.goal, self.truth = self.task.pushed(self.goal, before, self.truth, self.robot)
         self._measure()
 

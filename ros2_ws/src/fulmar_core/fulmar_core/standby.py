@@ -12,7 +12,7 @@ from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
-from fulmar_core.errors import ConfigError
+from fulmar_core.errors import ConfigError, TaskError
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.own_class import SEPARATOR, one_line
 from fulmar_core.robot import Robot
@@ -49,6 +49,8 @@ def ready(controller: Controller, robot: Robot, task: Task, *, said: dict[str, A
         for number in range(WARM_UP):
             loop.step(episode.start, round(1e9 * number * loop.dt))
         controller.reset()
+    except TaskError:
+        raise
     except Exception as error:
         module = controller.name.partition(SEPARATOR)[0]
         raise ConfigError(f"controller '{controller.name}' raised {one_line(error, module)}.") from error

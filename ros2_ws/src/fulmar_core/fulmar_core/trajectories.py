@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.geofence import distance_from_goal
 from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.planar import PlanarState, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.push_block import PushBlock
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,7 @@ class TrajectoryLog:
 def _step_columns(robot: Robot, task: Task, state: PlanarState, goal: Goal) -> dict[str, np.ndarray]:
     errors, touching = task.errors(state, goal), task.collides(state, goal, robot)
     unasked, none = np.asarray(np.nan), np.asarray(False)
-    away = distance_from_goal(task, state, goal)
+    away = task.distance_from_goal(state, goal)
     far = none if away is None else np.asarray(away > robot.limits.geofence)
     return {
         "x": state.x,
@@ -135,7 +133,7 @@ class Judge:
 
     def __init__(self, task: Task, goal: Goal, control_dt: float) -> None:
         """Begin an episode, or a batch of them."""
-        self._task, self._dt, self._steps = getattr(task, "judged", task), control_dt, 0
+        self._task, self._dt, self._steps = task.judged, control_dt, 0
         self.goal = goal
 
     def see(self, truth: PlanarState, block: np.ndarray | None = None) -> Goal:
@@ -146,14 +144,9 @@ class Judge:
             block: Where the thing to push is by now, shape (..., 2), for tasks that have one [m].
         """
         self._steps += 1
-        if block is not None and isinstance(self._task, PushBlock):
+        if block is not None and self._task.pushes:
             self.goal = dataclasses.replace(self.goal, block=block)
-        counted = getattr(self._task, "counted", None)
-        if counted is not None:
-            self.goal = counted(self.goal, truth, self._task.tolerance.position)
-        else:
-            time_s = np.asarray(self._steps * self._dt)
-            self.goal = self._task.advance(self.goal, truth, time_s)
+        self.goal = self._task.counted(self.goal, truth, np.asarray(self._steps * self._dt))
         return self.goal
 
 

@@ -18,7 +18,7 @@ from visualization_msgs.msg import MarkerArray
 from fulmar_core.control_loop import Step
 from fulmar_core.controller_settings import POLICY, ControllerSettings
 from fulmar_core.controllers.controller import Controller, Inputs
-from fulmar_core.errors import FulmarError
+from fulmar_core.errors import FulmarError, TaskError
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
@@ -303,6 +303,9 @@ class ControllerNode(LifecycleNode):
             if inputs is not None:
                 step = self._act(guard, inputs)
                 command = step.command[0]
+        except TaskError as error:
+            self._give_up(str(error), stamp)
+            return
         except Exception as error:  # noqa: BLE001 - whatever a controller raises, the robot stops
             guard.loop.rest(stamp)
             self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)

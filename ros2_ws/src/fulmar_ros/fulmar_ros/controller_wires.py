@@ -17,8 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task, sees_obstacles
-from fulmar_core.tasks.push_block import PushBlock
+from fulmar_core.tasks import Task
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_HEALTH,
@@ -139,11 +138,11 @@ class ControllerWires:
         for goal in goal_wires(task.goal_topic):
             self._subscriptions += subscribe_operator(node, TYPES[goal.name], goal, on_goal)
         reliably = [ESTOP, ESTOP_RELEASED, SWAP, *goal_wires(task.goal_topic)]
-        if sees_obstacles(task):
+        if task.sees_obstacles:
             self._subscriptions += subscribe_operator(node, MarkerArray, OBSTACLES, on_obstacles)
             reliably.append(OBSTACLES)
         self.subscribed = {ODOMETRY: lockstep, **dict.fromkeys(reliably, True)}  # and whether reliably
-        if isinstance(task, PushBlock):
+        if task.pushes:
             self._subscriptions.append(
                 node.create_subscription(
                     PoseStamped, BLOCK.name, on_block, subscriber_qos(BLOCK, reliable=lockstep)

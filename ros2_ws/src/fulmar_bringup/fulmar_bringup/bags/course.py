@@ -26,7 +26,7 @@ from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
@@ -118,7 +118,8 @@ def course_of(
     """
     info = bag.info or {}
     the_robot = load_robot(_name(bag, "robot", robot))
-    the_task = load_task(_name(bag, "task", task))
+    the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None), bag.path)
+    the_task.check(the_robot)
     warnings: list[str] = list(bag.warnings)
     limits = limits_of(info)
     if limits["max_run_time_s"] and not begins_with_its_run(info):

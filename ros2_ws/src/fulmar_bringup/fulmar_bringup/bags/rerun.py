@@ -17,7 +17,7 @@ from fulmar_bringup.bags.told import ABSENT
 from fulmar_core.control_loop import unknown_inputs
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.controllers.law import Law
-from fulmar_core.errors import BagError, FulmarError, RunFailed
+from fulmar_core.errors import BagError, FulmarError, RunFailed, TaskError
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.observation import Observer
@@ -246,6 +246,8 @@ class _Rerun:
 
     def _give_up(self, step: int, error: Exception) -> str:
         """Let the fallback take over from a controller that raised, and say why the step has no answer."""
+        if isinstance(error, TaskError):
+            raise error
         name = self._guard.loop.controller.name
         reason = f"'{name}' raised {type(error).__name__} at step {step}: {error}"
         if not self._guard.fall_back(reason):

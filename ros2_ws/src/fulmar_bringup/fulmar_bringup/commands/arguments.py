@@ -12,8 +12,9 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.safety.area import check_area
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")]
-TaskArgument = Annotated[str, typer.Argument(metavar="TASK", help="A name from `fulmar list tasks`.")]
-TaskOption = Annotated[str, typer.Option("--task", metavar="T", help="A name from `fulmar list tasks`.")]
+TASK_HELP = "A name from `fulmar list tasks`, or your own class: mypackage.mymodule:MyTask."
+TaskArgument = Annotated[str, typer.Argument(metavar="TASK", help=TASK_HELP)]
+TaskOption = Annotated[str, typer.Option("--task", metavar="T", help=TASK_HELP)]
 ControllerOption = Annotated[
     str,
     typer.Option(

@@ -29,6 +29,10 @@ def export(
     out: Annotated[
         Path | None, typer.Option(metavar="PATH", help="Folder, or the .npz file; beside the bag by default.")
     ] = None,
+    task: Annotated[
+        str | None,
+        typer.Option(metavar="T", help="Task of the bags, for a dataset, where it is a class of your own."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
@@ -60,7 +64,7 @@ def export(
                 raise BagError(
                     f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
                 )
-        courses = [course_of(bag) for bag in opened]
+        courses = [course_of(bag, task=task) for bag in opened]
         titles = [course.task.title for course in courses]
         folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
         files, left_out = [folder], []

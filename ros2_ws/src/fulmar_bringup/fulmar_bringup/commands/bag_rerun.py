@@ -175,8 +175,8 @@ def _check_effect(source: str, through: str, *, foreign: bool, options: dict[str
 def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | None) -> tuple[str, str]:
     """Name of the controller and folder of its bundle, empty where it has none."""
     from fulmar_bringup.bags.course import policy_folder
+    from fulmar_core.own_class import is_own
     from policy_server.controllers import controller_entry
-    from policy_server.own_controller import is_own
     from policy_server.shipped import shipped_policy
 
     name = controller or ("policy" if policy else (bag.info or {}).get("controller"))

@@ -42,7 +42,10 @@ def report(
     from fulmar_bringup.bags.pictures import write_pictures
     from fulmar_bringup.report import write_report
     from fulmar_bringup.report.sources import default_report
+    from fulmar_core.tasks import load_task
 
+    if task is not None:
+        load_task(task)
     records = [read_any_run(bag, task=task, robot=robot) for bag in bags]
     for record in records:
         for warning in record.warnings:

@@ -35,8 +35,9 @@ def run(
         str | None,
         typer.Option(
             metavar="T",
-            help="A name from `fulmar list tasks`; by default what --goal asks for: go_to_position for x,y, "
-            "go_to_pose for x,y,deg and without a goal; with --goals, the one that takes them.",
+            help="A name from `fulmar list tasks`, or your own class: mypackage.mymodule:MyTask; by default what "
+            "--goal asks for: go_to_position for x,y, go_to_pose for x,y,deg and without a goal; with --goals, the one "
+            "that takes them.",
         ),
     ] = None,
     controller: ControllerOption = "policy",

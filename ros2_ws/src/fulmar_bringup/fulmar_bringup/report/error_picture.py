@@ -110,7 +110,7 @@ def counting(runs: Sequence[View]) -> bool:
 def _reached(axes: Axes, runs: Sequence[View]) -> None:
     for run, judgement in judged(runs):
         axes.step(judgement.time_s, judgement.run.goals[0], where="post", color=run.colour, label=run.label)
-        required = getattr(judgement.task, "required", None)
+        required = judgement.task.required
         if required is not None:
             _limit(axes, required, f"{required} make a success")
     quiet_grid(axes)

@@ -7,7 +7,6 @@ from typing import Any
 
 from fulmar_bringup.report.view import View
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.push_block import PushBlock
 
 Row = tuple[str, str, list[str]]  # what, an explanation, and the cell of each run
 
@@ -30,7 +29,7 @@ def verdict(run: View) -> tuple[str, str]:
             f"Of the goal file: {judgement.progress} in {judgement.duration_s:.0f} s; {end}.{way}{touched}"
         )
     if judgement.counts:
-        reached, required = run.summary["goals_reached"] or 0, getattr(judgement.task, "required", 0)
+        reached, required = run.summary["goals_reached"] or 0, judgement.task.required
         word = "Reached" if judgement.success else "Missed"
         return word, (
             f"The robot reached {reached:.0f} targets in {judgement.duration_s:.0f} s; "
@@ -67,7 +66,7 @@ def rule(runs: Sequence[View]) -> str:
             if run.judgement.counts:
                 return (
                     f"A target counts as reached within {100 * tolerance.position:g} cm{heading}, and a run that "
-                    f"reaches {getattr(task, 'required', 0)} of them as a success."
+                    f"reaches {task.required} of them as a success."
                 )
             if tolerance.velocity > 0.0:
                 return (
@@ -83,7 +82,7 @@ def rule(runs: Sequence[View]) -> str:
 
 def _what(task: Task) -> str:
     """What shall be at the goal."""
-    return "the block" if isinstance(task, PushBlock) else "the robot"
+    return "the block" if task.pushes else "the robot"
 
 
 def table(runs: Sequence[View]) -> list[Row]:

@@ -1,31 +1,35 @@
 """Tasks: what a robot shall reach, what its controller sees, how it is judged.
 
-The explicit table of tasks. A new task is one file here, one line below and one YAML.
+The explicit table of tasks. A new task is one file here, one line below and one YAML; a user's own is a class outside.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import cast
 
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
+from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_path
 from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import TASK
-from fulmar_core.robot import Robot
 from fulmar_core.tasks.go_through_poses import GoThroughPoses
 from fulmar_core.tasks.go_through_positions import GoThroughPositions
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
-from fulmar_core.tasks.passing import PassingTask
+from fulmar_core.tasks.own_task import load_own_task
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.tasks.race_gates import RaceGates
 from fulmar_core.tasks.race_waypoints import RaceWaypoints
 from fulmar_core.tasks.race_wayposes import RaceWayposes
+from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.track_velocities import TrackVelocities
 
-Task = (
+__all__ = ["ShippedTask", "Task", "load_recorded_task", "load_task"]
+
+ShippedTask = (  # what a file of `configs/tasks` can be
     GoToPose
     | GoToPosition
     | GoToPositionWithObstacles
@@ -37,35 +41,48 @@ Task = (
     | RaceGates
     | PushBlock
 )
+_asked_for: set[str] = set()  # dotted paths that this process was given, in the place of what a bag names
 
 
 def load_task(name: str) -> Task:
-    """Read `configs/tasks/<name>.yaml`.
+    """Load a task by its name.
 
     Args:
-        name: A name that `fulmar list tasks` shows.
+        name: A name that `fulmar list tasks` shows, of `configs/tasks/<name>.yaml`, or the dotted path of a user's
+            own class, `mypackage.mymodule:MyTask`.
 
     Returns:
         The task.
 
     Raises:
-        ConfigError: Unknown name, or a mistake in the file.
+        ConfigError: Unknown name, a mistake in the file, or a class as of `load_own_task`.
     """
+    if is_own(name):
+        task = load_own_task(name)
+        _asked_for.add(name)
+        return task
     path = config_path("tasks", name)
-    task = cast(Task, load_config(Task, path))  # type: ignore[arg-type]
-    if task.name != name:
+    shipped = cast(ShippedTask, load_config(ShippedTask, path))  # type: ignore[arg-type]
+    if shipped.name != name:
         raise ConfigError(
-            f"{path}: 'name' is '{task.name}', the file's own name is '{name}'. Make them equal."
+            f"{path}: 'name' is '{shipped.name}', the file's own name is '{name}'. Make them equal."
         )
-    check_plausible(task, TASK, path)
-    return task
+    check_plausible(shipped, TASK, path)
+    return shipped
 
 
-def fitted(task: Task, robot: Robot) -> Task:
-    """A task as a robot does it: how near it has to come depends on how well it knows its place."""
-    return task.fitted(robot) if isinstance(task, PassingTask) else task
+def load_recorded_task(name: str, bag: Path) -> Task:
+    """Load the task that a bag names, without importing a class that nothing but the bag names.
 
+    Args:
+        name: As of `load_task`.
+        bag: The bag, for messages.
 
-def sees_obstacles(task: Task) -> bool:
-    """Whether a controller of this task must be told what stands about."""
-    return isinstance(task, GoToPositionWithObstacles)
+    Raises:
+        ConfigError: As of `load_task`; or a class that this process has not loaded by `load_task` before.
+    """
+    if is_own(name) and name not in _asked_for:  # a bag from elsewhere must not have its code run
+        raise ConfigError(
+            f"{bag}: the task is '{name}', a class that only this bag names. To use it: --task {name}."
+        )
+    return load_task(name)

@@ -8,10 +8,11 @@ from typing import ClassVar, Literal
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.goal import Goal, goals_at
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import (
     FINE_TERMS,
     HEADING_TERMS,
@@ -48,7 +49,7 @@ class PoseReward:
 
 
 @dataclass(frozen=True)
-class GoToPose:
+class GoToPose(Task):
     """Go to a pose in the plane; the goal arrives on `goal_pose`."""
 
     kind: Literal["go_to_pose"]
@@ -81,13 +82,12 @@ class GoToPose:
         return (*POSITION_TERMS, *HEADING_TERMS, *MOTION_TERMS, *FINE_TERMS, *heading, *speed, *turning)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
-        """Draw starts and goals; see `TaskProtocol.draw`."""
+        """Draw starts and goals; see `Task.draw`."""
         start, target = self.start.draw(draws, training=training)
-        zero = array_namespace(target).zeros_like(start.x)
-        return start, Goal(target[:, None, :], zero, no_obstacles(draws.worlds), target[:, :2] * 0.0)
+        return start, goals_at(target)
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
-        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        """What every controller of this task sees; see `Task.observe`."""
         target = goal.current
         x, y = goal_terms(state, target)
         fine = fine_terms(x, y, saturation=self.fine_distance)
@@ -102,12 +102,8 @@ class GoToPose:
             terms += (clip(motion[2] / self.fine_yaw_rate, -1.0, 1.0),)
         return terms
 
-    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
-        """The goal stays."""
-        return goal
-
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step; see `TaskProtocol.reward`."""
+        """Reward of one control step; see `Task.reward`."""
         old, new = self.errors(before, goal), self.errors(after, goal)
         xp = array_namespace(after.x)
         w = self.reward_weights
@@ -131,7 +127,3 @@ class GoToPose:
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
         """Distance from the goal, and heading error."""
         return pose_errors(state, goal.current, heading=True)
-
-    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
-        """Nothing stands about."""
-        return None

@@ -7,10 +7,11 @@ from typing import ClassVar, Literal
 
 from fulmar_core.arrays import array_namespace
 from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.goal import Goal, goals_at
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import (
     FINE_TERMS,
     MOTION_TERMS,
@@ -48,7 +49,7 @@ class PositionReward:
 
 
 @dataclass(frozen=True)
-class GoToPosition:
+class GoToPosition(Task):
     """Go to a position in the plane; the goal arrives on `goal_point`."""
 
     kind: Literal["go_to_position"]
@@ -64,29 +65,20 @@ class GoToPosition:
     observation_names: ClassVar[tuple[str, ...]] = (*POSITION_TERMS, *MOTION_TERMS, *FINE_TERMS)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
-        """Draw starts and goals; see `TaskProtocol.draw`."""
+        """Draw starts and goals; see `Task.draw`."""
         start, target = self.start.draw(draws, training=training)
-        zero = array_namespace(target).zeros_like(start.x)
-        return start, Goal(target[:, None, :], zero, no_obstacles(draws.worlds), target[:, :2] * 0.0)
+        return start, goals_at(target)
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
-        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        """What every controller of this task sees; see `Task.observe`."""
         x, y = goal_terms(state, goal.current)
         return (x, y, *motion_terms(state), *fine_terms(x, y, saturation=self.fine_distance))
 
-    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
-        """The goal stays."""
-        return goal
-
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step; see `TaskProtocol.reward`."""
+        """Reward of one control step; see `Task.reward`."""
         old, new = self.errors(before, goal).position, self.errors(after, goal).position
         return self.reward_weights.of(old, new, after)
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
         """Distance from the goal."""
         return pose_errors(state, goal.current, heading=False)
-
-    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
-        """Nothing stands about."""
-        return None

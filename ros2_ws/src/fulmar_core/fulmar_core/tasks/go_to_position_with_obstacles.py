@@ -14,6 +14,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.go_to_position import GoToPosition, PositionReward
 from fulmar_core.tasks.obstacles import TOUCH, Obstacles, clearance
+from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import (
     MOTION_TERMS,
     Errors,
@@ -30,7 +31,7 @@ FINE_WAY_TERMS = ("fine_way_x_in_body", "fine_way_y_in_body", "way_length")
 
 
 @dataclass(frozen=True)
-class GoToPositionWithObstacles:
+class GoToPositionWithObstacles(Task):
     """Go to a position around discs; the goal arrives on `goal_point`, the discs on `obstacles`."""
 
     kind: Literal["go_to_position_with_obstacles"]
@@ -46,6 +47,7 @@ class GoToPositionWithObstacles:
     nearness_cost: float  # times exp(-clearance / 0.15 m): learned before the first touch
 
     goal_topic: ClassVar[str] = "goal_point"
+    sees_obstacles: ClassVar[bool] = True
 
     @functools.cached_property
     def observation_names(self) -> tuple[str, ...]:
@@ -60,7 +62,7 @@ class GoToPositionWithObstacles:
         )  # fmt: skip
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
-        """Draw starts, goals and obstacles; see `TaskProtocol.draw`."""
+        """Draw starts, goals and obstacles; see `Task.draw`."""
         start, goal = self._plain.draw(draws, robot, training=training)
         discs = self.obstacles.draw(draws, robot, start, goal.current)
         return start, self.surveyed(Goal(goal.targets, goal.done, discs, goal.block), robot)
@@ -71,7 +73,7 @@ class GoToPositionWithObstacles:
         return Goal(goal.targets, goal.done, discs, goal.block)
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
-        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        """What every controller of this task sees; see `Task.observe`."""
         x, y = self.way_in_body(state, goal)
         fine = fine_terms(x, y, saturation=self.fine_distance)
         return (x, y, *motion_terms(state), *fine, *self.obstacles.observe(state, goal.obstacles))
@@ -81,12 +83,8 @@ class GoToPositionWithObstacles:
         x, y, length = _way(state, goal)
         return to_body(state.yaw, length * x, length * y)
 
-    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
-        """The goal stays."""
-        return goal
-
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step; see `TaskProtocol.reward`."""
+        """Reward of one control step; see `Task.reward`."""
         return self.reward_weights.of(_way(before, goal)[2], _way(after, goal)[2], after)
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
@@ -98,7 +96,7 @@ class GoToPositionWithObstacles:
         return clearance(state, goal.obstacles, robot) < TOUCH
 
     def penalty(self, state: PlanarState, goal: Goal, robot: Robot) -> Array:
-        """What being near an obstacle costs a learner; see `TaskProtocol.penalty`."""
+        """What being near an obstacle costs a learner; see `Task.penalty`."""
         gap = clearance(state, goal.obstacles, robot)
         xp = array_namespace(gap)
         touching = xp.astype(gap < TOUCH, gap.dtype)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from abc import abstractmethod
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -15,6 +15,7 @@ from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.planar import PlanarState, at_rest, wrapped
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import (
     MOTION_TERMS,
     Errors,
@@ -64,7 +65,7 @@ class WaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PassingTask(ABC):
+class PassingTask(Task):
     """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
 
     name: str
@@ -76,7 +77,7 @@ class PassingTask(ABC):
     )
     reach: float  # within which a controller takes a target for reached; `fitted` may widen it [m]
     tolerance: Tolerance  # within which a judge does
-    required: int  # targets that make an episode a success
+    required: int = field()  # targets that make an episode a success; a file has to say it
     reward_weights: WaypointReward
 
     goal_topic: ClassVar[str] = "goal_path"
@@ -121,7 +122,7 @@ class PassingTask(ABC):
         return at_rest(x, y, yaw), Goal(targets, np.zeros(n), no_obstacles(n), np.zeros((n, 2)))
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
-        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        """What every controller of this task sees; see `Task.observe`."""
         terms: tuple[Array, ...] = motion_terms(state)
         for further in range(self.seen):
             target = goal.ahead(further)
@@ -134,9 +135,9 @@ class PassingTask(ABC):
         """A target that is passed is done."""
         return self._after(goal, state, self.reached(goal, state, self.reach))
 
-    def counted(self, goal: Goal, state: PlanarState, radius: float) -> Goal:
-        """The goal with one more target done where the current one counts within a radius [m], as judges have it."""
-        return self._after(goal, state, self.reached(goal, state, radius, strict=False))
+    def counted(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The goal with one more target done where the current one is within the tolerance; see `Task.counted`."""
+        return self._after(goal, state, self.reached(goal, state, self.tolerance.position, strict=False))
 
     def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
         """Whether the current target is passed.
@@ -157,7 +158,7 @@ class PassingTask(ABC):
         return Goal(goal.targets, done, goal.obstacles, goal.block)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step; see `TaskProtocol.reward`."""
+        """Reward of one control step; see `Task.reward`."""
         old, new = self.errors(before, goal).position, self.errors(after, goal).position
         return self.reward_weights.of(
             old - new, newly_done(goal, ended), bearing_of(after, goal.current), after
@@ -166,10 +167,6 @@ class PassingTask(ABC):
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
         """Distance from the current target, and heading error where that counts."""
         return pose_errors(state, goal.current, heading=self.heads)
-
-    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
-        """Nothing stands about."""
-        return None
 
 
 def newly_done(goal: Goal, ended: Goal) -> Array:

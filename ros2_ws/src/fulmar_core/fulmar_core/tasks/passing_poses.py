@@ -48,7 +48,7 @@ class PosePassingTask(PassingTask):
         return (errors.position < radius) & (array_namespace(state.x).abs(errors.heading) < limit)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step; see `TaskProtocol.reward`."""
+        """Reward of one control step; see `Task.reward`."""
         xp = array_namespace(after.x)
         w, old, new = self.reward_weights, self.errors(before, goal), self.errors(after, goal)
         reached = newly_done(goal, ended)

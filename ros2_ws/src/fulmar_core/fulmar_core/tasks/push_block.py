@@ -17,6 +17,7 @@ from fulmar_core.planar import PlanarState, at_rest, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.passing import toward
+from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
 
 Range = tuple[float, float]
@@ -39,7 +40,7 @@ class PushReward:
 
 
 @dataclass(frozen=True)
-class PushBlock:
+class PushBlock(Task):
     """Push a block to a place; that arrives on `goal_point`, where the block is on `block/pose`."""
 
     kind: Literal["push_block"]
@@ -78,8 +79,13 @@ class PushBlock:
                     f"distances must be [low, high] with 0 <= low <= high, found [{low}, {high}]."
                 )
 
+    @property
+    def pushes(self) -> Block:
+        """The block."""
+        return self.block
+
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
-        """Draw where robot and block start, and where the block belongs; see `TaskProtocol.draw`."""
+        """Draw where robot and block start, and where the block belongs; see `Task.draw`."""
         half, n = 0.5 * self.goal_area, draws.worlds
         place = np.asarray(draws.uniform(-half, half, 2))
         angles = np.asarray(draws.uniform(-math.pi, math.pi, 3))
@@ -97,7 +103,7 @@ class PushBlock:
         return start, Goal(targets, np.zeros(n), no_obstacles(n), block)
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
-        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        """What every controller of this task sees; see `Task.observe`."""
         block_x, block_y, block_distance = toward(state, goal.block)
         place_x, place_y, _ = toward(state, goal.current)
         dx, dy, distance = self._way(goal)
@@ -117,19 +123,15 @@ class PushBlock:
             block_x * fine_y - block_y * fine_x,
         )
 
-    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
-        """The goal stays; the block is moved by what `pushed` says, or by the world."""
-        return goal
-
     def pushed(
         self, goal: Goal, before: PlanarState, after: PlanarState, robot: Robot
     ) -> tuple[Goal, PlanarState]:
-        """Where the block is after a step, and what pushing left of the robot's speed; see `TaskProtocol`."""
+        """Where the block is after a step, and what pushing left of the robot's speed; see `Task`."""
         x, y, slowed = push(before, after, goal.block[..., 0], goal.block[..., 1], self.block, robot)
         return replace(goal, block=array_namespace(x).stack((x, y), axis=-1)), slowed
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step: how the robot moved, and how the block did; see `TaskProtocol.reward`."""
+        """Reward of one control step: how the robot moved, and how the block did; see `Task.reward`."""
         xp = array_namespace(after.x)
         w = self.reward_weights
         far, was_behind = self._stance(before, goal)
@@ -155,10 +157,6 @@ class PushBlock:
         xp, target = array_namespace(state.x), goal.current
         robot = xp.hypot(target[..., 0] - state.x, target[..., 1] - state.y)
         return xp.maximum(robot, self._way(goal)[2])
-
-    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
-        """Touching the block is the task."""
-        return None
 
     def _way(self, goal: Goal) -> tuple[Array, Array, Array]:
         """From the block to its place in the world, and how far that is [m]."""

@@ -58,7 +58,7 @@ class RaceGates(PassingTask):
         return start, self.begun(goal, start)
 
     def begun(self, goal: Goal, state: PlanarState) -> Goal:
-        """The goal with the place from which the next step leads; see `TaskProtocol`."""
+        """The goal with the place from which the next step leads; see `Task`."""
         return replace(goal, block=array_namespace(state.x).stack((state.x, state.y), axis=-1))
 
     def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
@@ -69,7 +69,7 @@ class RaceGates(PassingTask):
         return self.begun(super()._after(goal, state, reached), state)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step; see `TaskProtocol.reward`."""
+        """Reward of one control step; see `Task.reward`."""
         xp = array_namespace(after.x)
         gate = goal.current
         forward = newly_done(goal, ended)

@@ -2,49 +2,94 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Self
 
 from fulmar_core.counter_rng import Draws
+from fulmar_core.dynamics.pushing import Block
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.terms import Errors, Tolerance
+from fulmar_core.tasks.terms import Errors, Tolerance, pose_errors
 
 
-class TaskProtocol(Protocol):
-    """Frozen, free of side effects; every array has the leading shape of the state it goes with.
+class Task(ABC):
+    """Observation, reward, errors and tolerance of one task; free of side effects.
 
-    Some tasks have more, which whoever runs them asks for by name:
+    Every array has the leading shape of the state that it goes with.
 
-    - `required: int`: targets that make an episode a success, where not a closing window but their number counts.
-    - `counted(goal, state, radius) -> Goal`: as `advance`, for judges: a target counts within a radius of theirs [m].
-    - `begun(goal, state) -> Goal`: a goal that was told, for a robot that is somewhere, before its first step.
-    - `distance_from_goal(state, goal) -> Array`: what the geofence limits, where that is not the position's error [m].
-    - `penalty(state, goal, robot) -> Array`: what a state costs a learner beside the reward.
-    - `pushed(goal, before, after, robot) -> (Goal, PlanarState)`: where the block is after a step in the core's batch,
-      and the robot once the block has held it up; simulators with contacts move the block themselves.
+    Attributes:
+        kind: Which class of task this is.
+        name: As `load_task` takes it.
+        title: The task in a few words.
+        episode_s: Length of an episode [s].
+        tolerance: What counts as success.
+        required: Targets that make an episode a success; None where a closing window does.
     """
 
+    kind: str
     name: str
     title: str
-    episode_s: float  # length of an episode [s]
+    episode_s: float
     tolerance: Tolerance
-    goal_topic: str
-    observation_names: tuple[str, ...]
+    required: int | None = None
 
+    # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
+    if TYPE_CHECKING:
+
+        @property
+        def goal_topic(self) -> str:
+            """One of `fulmar_core.topics.GOAL_WIRES`."""
+
+        @property
+        def observation_names(self) -> tuple[str, ...]:
+            """Of the terms of `observe`, in their order."""
+
+    @property
+    def sees_obstacles(self) -> bool:
+        """Whether a controller needs the obstacles."""
+        return False
+
+    @property
+    def pushes(self) -> Block | None:
+        """The block that has to get to the goal; None where the robot itself has to."""
+        return None
+
+    @property
+    def step_s(self) -> float | None:
+        """Time from one target to the next, where each is published at its time; None: all at once [s]."""
+        return None
+
+    @property
+    def judged(self) -> Task:
+        """The task with the errors that evaluations use."""
+        return self
+
+    def check(self, robot: Robot) -> None:  # noqa: B027 - shipped tasks are checked by their tests
+        """Refuse a task that does not work with a robot, before anything moves.
+
+        Raises:
+            TaskError: A member of a user's own task raises, or returns what no task returns.
+        """
+
+    def fitted(self, robot: Robot) -> Self:
+        """The task for a robot: how near it has to come may depend on how well it knows its place."""
+        return self
+
+    def surveyed(self, goal: Goal, robot: Robot) -> Goal:
+        """A batch of goals, as NumPy, with what the task computes once of the obstacles."""
+        return goal
+
+    @abstractmethod
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw starts and goals, as NumPy float64, leading shape (worlds,)."""
-        ...
 
+    @abstractmethod
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """Terms in the order of `observation_names`, each of shape (...,)."""
-        ...
 
-    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
-        """The goal after a measurement: targets may be done, or their time may be over."""
-        ...
-
+    @abstractmethod
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step, shape (...,); actuators cost extra.
 
@@ -54,12 +99,45 @@ class TaskProtocol(Protocol):
             goal: That it began with.
             ended: The goal after it: targets may be done, things may have moved.
         """
-        ...
 
+    @abstractmethod
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
         """How far a state is from the current target."""
-        ...
+
+    def begun(self, goal: Goal, state: PlanarState) -> Goal:
+        """A goal that was received, for a robot that is somewhere, before its first step."""
+        return goal
+
+    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """The goal after a measurement: targets may be done, or their time may be over. By default it stays."""
+        return goal
+
+    def counted(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+        """As `advance`, for evaluations: a target counts within the tolerance."""
+        return self.advance(goal, state, time_s)
+
+    def pushed(
+        self, goal: Goal, before: PlanarState, after: PlanarState, robot: Robot
+    ) -> tuple[Goal, PlanarState]:
+        """Where the block is after a step in the core's batch, and the robot once the block has held it up.
+
+        Simulators with contacts move the block themselves.
+        """
+        return goal, after
 
     def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
         """Whether a state touches something it must not, shape (...,); None where nothing stands about."""
-        ...
+        return None
+
+    def penalty(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+        """What a state costs a learner beside the reward, shape (...,); None: nothing."""
+        return None
+
+    def distance_from_goal(self, state: PlanarState, goal: Goal) -> Array | None:
+        """What the geofence limits, shape (...,) [m]: by default the way to the current target.
+
+        None where targets are no places.
+        """
+        if self.goal_topic == "goal_velocity":
+            return None
+        return pose_errors(state, goal.current, heading=False).position

@@ -12,6 +12,7 @@ from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
 
 ERROR_TERMS = ("velocity_error_x_in_body", "velocity_error_y_in_body", "yaw_rate_error")
@@ -32,7 +33,7 @@ class VelocityReward:
 
 
 @dataclass(frozen=True)
-class TrackVelocities:
+class TrackVelocities(Task):
     """Track a velocity in the body's frame; the target arrives on `goal_velocity`.
 
     Targets are drawn from what the robot can do: up to its speeds, and no faster a turn than its sideways acceleration
@@ -90,7 +91,7 @@ class TrackVelocities:
         return xp.reshape(turned, (targets.shape[0], -1, 3))
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
-        """What every controller of this task sees; see `TaskProtocol.observe`."""
+        """What every controller of this task sees; see `Task.observe`."""
         xp = array_namespace(state.x)
         u, v, r = motion_terms(state)
         target = goal.current
@@ -110,7 +111,7 @@ class TrackVelocities:
         return Goal(goal.targets, xp.zeros_like(goal.done) + done, goal.obstacles, goal.block)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
-        """Reward of one control step; see `TaskProtocol.reward`."""
+        """Reward of one control step; see `Task.reward`."""
         xp = array_namespace(after.x)
         w = self.reward_weights
         errors = self.errors(after, goal)
@@ -131,7 +132,3 @@ class TrackVelocities:
         target = goal.current
         eu, ev = target[..., 0] - u, target[..., 1] - v
         return Errors(velocity=xp.sqrt(eu * eu + ev * ev), yaw_rate=target[..., 2] - r)
-
-    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
-        """Nothing stands about."""
-        return None

@@ -1,0 +1,248 @@
+"""A task of the user's own: loaded by its dotted path, tried before anything moves, and every mistake is one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fulmar_core.control_loop import ControlLoop
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episodes
+from fulmar_core.errors import BundleError, ConfigError, TaskError
+from fulmar_core.learning_step import observed_step
+from fulmar_core.robot import load_robot
+from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.standby import ready
+from fulmar_core.tasks import load_recorded_task, load_task
+from tests.own_files import own_folder
+
+ROBOT = load_robot("turtlebot2")
+NOMINAL = load_scenario("nominal")
+HEAD = """
+import numpy as np
+from dataclasses import replace
+from fulmar_core.goal import Goal, goals_at
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.terms import Errors, Start, Tolerance, pose_errors
+"""
+MEMBERS = """
+    goal_topic, episode_s, tolerance = "goal_point", 4.0, Tolerance(position=0.1, hold_s=1.0)
+    observation_names = ("distance", "east")
+    def draw(self, draws, robot, *, training):
+        state, places = Start((1.0, 2.0), (0.0, 2.0), 1.0).draw(draws, training=training)
+        return state, goals_at(places)
+    def observe(self, state, goal):
+        return pose_errors(state, goal.current, heading=False).position, goal.current[..., 0] - state.x
+    def errors(self, state, goal): return pose_errors(state, goal.current, heading=False)
+    def reward(self, before, after, goal, ended): return -self.errors(after, goal).position
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """Writes a class with the members of a task and some more, and gives its name."""
+    with own_folder(tmp_path, monkeypatch):
+
+        def write(more: str = "", *, base: str = "(Task)", members: str = MEMBERS) -> str:
+            module = f"own_{len(list(tmp_path.glob('*.py')))}"
+            (tmp_path / f"{module}.py").write_text(f"{HEAD}class Mine{base}:\n{members}\n{more}\n")
+            return f"{module}:Mine"
+
+        yield write
+
+
+def complaint(name: str) -> str:
+    """What is said of a task that is loaded and tried."""
+    with pytest.raises(ConfigError) as caught:
+        load_task(name).check(ROBOT)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(f"task '{name}': ")
+    return message.removeprefix(f"task '{name}': ")
+
+
+class Still:
+    """Stands where it is."""
+
+    name, control_hz, estimator = "still", 10.0, None
+
+    def reset(self):
+        pass
+
+    def act(self, inputs):
+        return np.zeros_like(inputs.previous)
+
+    def metadata(self):
+        return {}
+
+
+@pytest.mark.parametrize("base", ["(Task)", ""])
+def test_a_class_with_the_needed_members_is_a_task_whether_or_not_it_inherits(own, base):
+    task = load_task(own(base=base))
+    task.check(ROBOT)
+    assert (task.name, task.kind, task.title) == ("own_0:Mine", "own_0:Mine", "Mine")
+    assert (task.required, task.sees_obstacles, task.pushes) == (None, False, None)
+    run = roll_out_in_batch(Still(), ROBOT, task, NOMINAL, episodes=3, seed=1)
+    start = draw_episodes(ROBOT, task, NOMINAL, seed=1, numbers=np.arange(3))
+    away = np.hypot(start.start.x - start.goal.current[:, 0], start.start.y - start.goal.current[:, 1])
+    np.testing.assert_allclose(run.position_error[:, -1], away, atol=1e-3)
+
+
+def test_settings_come_from_the_yaml_beside_the_module_where_the_class_takes_them(own, tmp_path):
+    name = own("    def __init__(self, settings): self.radius = settings.get('radius', 1.0)")
+    assert load_task(name).own.radius == 1.0
+    (tmp_path / "own_0.yaml").write_text("radius: 2.5\n")
+    assert load_task(name).own.radius == 2.5
+    (tmp_path / "own_0.yaml").write_text("- 1\n")
+    with pytest.raises(ConfigError, match=r"own_0\.yaml: must hold a mapping, found list\."):
+        load_task(name)
+
+
+def test_learners_get_its_reward_in_single_precision(own):
+    simulation = BatchSimulation(ROBOT, load_task(own()), NOMINAL, worlds=4, seed=1, training=True)
+    before = simulation.truth, simulation.goal
+    reward, over, seen = observed_step(simulation, np.zeros((4, 2)), effort=0.0)
+    away = np.hypot(before[1].current[:, 0] - before[0].x, before[1].current[:, 1] - before[0].y)
+    np.testing.assert_allclose(reward, -away, atol=1e-3)
+    assert (reward.dtype, seen.dtype, over.any()) == (np.float32, np.float32, False)
+
+
+def test_targets_that_it_counts_make_an_episode_a_success(own):
+    name = own(
+        "    required = 3\n"
+        "    def advance(self, goal, state, time_s): return replace(goal, done=goal.done + 1.0)\n"
+    )
+    run = roll_out_in_batch(Still(), ROBOT, load_task(name), NOMINAL, episodes=2, seed=1)
+    assert (run.goals[:, -1] == 40.0).all()
+
+
+@pytest.mark.parametrize("missing", ["draw", "observe", "reward", "errors"])
+def test_a_missing_method_is_named(own, missing):
+    lines = [line for line in MEMBERS.splitlines() if f"def {missing}" not in line]
+    if missing in ("draw", "observe"):  # whose bodies stand in lines of their own
+        lines = MEMBERS.replace(f"def {missing}", f"def not_{missing}").splitlines()
+    message = complaint(own(members="\n".join(lines)))
+    assert f"class 'Mine' lacks {missing}." in message
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("    tolerance = None", "lacks tolerance. A task needs: episode_s, tolerance, goal_topic, "),
+        ("    tolerance = 0.1", "tolerance = 0.1 must be a fulmar_core.tasks.terms.Tolerance."),
+        ("    episode_s = -1", "episode_s = -1 must be a number of seconds, greater than 0."),
+        ("    goal_topic = 'goal_poin'", "'goal_poin' must be a topic of goals. Did you mean 'goal_point'?"),
+        ("    observation_names = ('a', 'a')", "('a', 'a') must be a tuple of names, none of them twice."),
+        ("    required = 'all'", "required = 'all' must be None or a number from 1 on."),
+        ("    step_s = 1.0", "has 'step_s', which only shipped tasks can have. Leave it out."),
+        ("    def __init__(self): 1 / 0", "Mine() raised ZeroDivisionError: division by zero (own_0.py:19)."),
+    ],
+)
+def test_a_member_that_cannot_be_is_refused(own, tmp_path, more, says):
+    assert says in complaint(own(more)).replace(f"{tmp_path}/", "")
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("observe(self, state, goal): return (state.x,)", "observe returned 1 terms, observation_names has 2."),
+        ("observe(self, state, goal): return state.x", "observe returned a ndarray, it must be a tuple of terms."),
+        (
+            "observe(self, state, goal): return state.x, np.zeros(5)",
+            "observe returned 'east' of shape (5,), it must be numbers of shape (3,).",
+        ),
+        (
+            "observe(self, state, goal): return state.x, 'far'",
+            "observe returned 'east' of a str, it must be numbers of shape (3,).",
+        ),
+        ("observe(self, state, goal): return state.x, state.x + np.nan", "observe returned 'east' that is not finite."),
+        (
+            "observe(self, state, goal): raise KeyError('far')",
+            "observe raised KeyError: 'far' (own_0.py:19).",
+        ),
+        ("errors(self, state, goal): return state.x", "errors returned a ndarray, it must be a fulmar_core"),
+        ("errors(self, state, goal): return Errors()", "errors returned no position, which the tolerance or"),
+        (
+            "errors(self, state, goal): return Errors(state.x, velocity=state.x)",
+            "errors returned no yaw_rate, which the tolerance or the other velocity needs.",
+        ),
+        ("reward(self, *given): return np.inf", "reward returned the reward that is not finite."),
+        ("draw(self, draws, robot, training): return 1", "draw returned a int, it must be a PlanarState and a Goal."),
+        (
+            "draw(self, *a, **k): return (lambda s, g: (s[0], g))(*Start((1, 2), (1, 2), 1).draw(*a[:1], **k))",
+            "draw returned a tuple, it must be a PlanarState and a Goal.",
+        ),
+        ("advance(self, goal, state, time_s): pass", "advance returned a NoneType, it must be a Goal."),
+        (
+            "advance(self, goal, state, time_s): return replace(goal, done=np.zeros(7))",
+            "advance returned a Goal with done of shape (7,), it must be (3).",
+        ),
+        ("counted(self, goal, *more): return replace(goal, done=goal.done + np.nan)", "Goal with done that are not"),
+        ("begun(self, goal, state): return None", "begun returned a NoneType, it must be a Goal."),
+        ("collides(self, state, goal, robot): return np.zeros(2)", "collides returned the result of shape (2,)"),
+        ("penalty(self, state, goal, robot): 1 / 0", "penalty raised ZeroDivisionError: division by zero (own_0"),
+        ("distance_from_goal(self, state, goal): return 'far'", "distance_from_goal returned the result of a str"),
+    ],
+)  # fmt: skip
+def test_a_member_that_answers_nonsense_is_refused_before_anything_moves(own, tmp_path, more, says):
+    assert says in complaint(own(f"    def {more}")).replace(f"{tmp_path}/", "")
+
+
+def test_what_works_for_many_robots_and_not_for_one_is_refused(own):
+    """A re-run of a bag asks for one state without a batch axis."""
+    message = complaint(
+        own("    def reward(self, before, after, goal, ended): return after.x[:, None][:, 0]")
+    )
+    assert message.startswith("reward raised IndexError: ")
+
+
+def test_a_mistake_on_the_way_is_the_task_s_not_the_controller_s(own):
+    name = own(
+        "    def observe(self, state, goal): return goal.targets[..., 0, 0], 1.0 / (state.x - state.x[0] + 1)"
+    )
+    task = load_task(name)
+    loop = ControlLoop(ROBOT, task, Still())
+    episode = draw_episodes(ROBOT, task, NOMINAL, seed=0, numbers=np.zeros(1, dtype=int))
+    loop.begin(episode.goal)
+    loop.step(episode.start, 0)
+    task.own.observe = lambda *_: 1 / 0
+    with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
+        loop.step(episode.start, 100_000_000)
+    with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
+        ready(Still(), ROBOT, task)
+
+
+def test_a_class_that_only_a_bag_names_is_never_imported(own, tmp_path):
+    own(members="    open('run', 'w')\n" + MEMBERS)
+    (tmp_path / "own_0.py").rename(tmp_path / "own_of_a_bag.py")
+    name, bag = "own_of_a_bag:Mine", Path("bags/from_elsewhere")
+    with pytest.raises(ConfigError) as caught:
+        load_recorded_task(name, bag)
+    assert str(caught.value) == (
+        f"{bag}: the task is '{name}', a class that only this bag names. To use it: --task {name}."
+    )
+    assert not (tmp_path / "run").exists()
+    load_task(name)  # a user asked for it
+    assert load_recorded_task(name, bag).name == name
+
+
+def test_no_law_no_excitation_and_no_shipped_bundle_knows_it(own):
+    from fulmar_bringup.planning import checked_policy
+    from policy_server.controllers import controller_entry
+    from policy_server.shipped import shipped_policy
+
+    task = load_task(own())
+    with pytest.raises(
+        BundleError, match="or use a controller of your own: --controller mypackage"
+    ) as caught:
+        checked_policy(None, ROBOT, task, 10.0)
+    assert "train one with `fulmar train turtlebot2 own_0:Mine`" in str(caught.value)
+    with pytest.raises(BundleError, match="was trained for task 'go_to_position', not 'own_0:Mine'"):
+        checked_policy(shipped_policy("turtlebot2", "go_to_position"), ROBOT, task, 10.0)
+    with pytest.raises(ConfigError, match=r"no classical law does 'own_0:Mine' on 'turtlebot2'"):
+        controller_entry("classical").check(ROBOT, task)
+    with pytest.raises(ConfigError, match=r"'own_0:Mine' has none"):
+        controller_entry("excite").check(ROBOT, task)

@@ -1,0 +1,92 @@
+"""A task of the user's own, from a folder outside the checkout: in runs, evaluations, re-runs and reports."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from fulmar_bringup.bag_reader import read_run
+from fulmar_bringup.cli import app
+from fulmar_core.errors import ConfigError
+from tests.conftest import RosDomain
+from tests.own_files import own_folder
+from tests.ros.cli import fulmar, json_of
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "own-task.md"
+TASK, CONTROLLER = ("--task", "my_task:Circle"), ("--controller", "my_orbit:Orbit")
+LATE = """
+from my_task import Circle
+class Observes(Circle):
+    def observe(self, state, goal):
+        assert not (state.x.shape == (1,) and state.speed[0] > 0.25), "too fast"
+        return super().observe(state, goal)
+class Measures(Circle):
+    def distance_from_goal(self, state, goal):
+        return state.x / (0.0 if state.x.shape == (1,) and state.speed[0] > 0.25 else 1.0)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The files of the page, in the current folder."""
+    task, controller = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "my_task.py").write_text(task)
+    (tmp_path / "my_orbit.py").write_text(controller)
+    with own_folder(tmp_path, monkeypatch):
+        yield tmp_path
+
+
+def test_the_task_of_the_page_is_done_in_run_evaluation_and_rerun(
+    ros_domain: RosDomain, folder: Path
+) -> None:
+    def ask(*words: str) -> str:
+        done = CliRunner().invoke(app, words, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        return done.stdout
+
+    run = ("--goal", "1,0.5", "--lockstep", "--duration", "15", "--record", "bag", "--json")
+    done = fulmar("run", "turtlebot2", *TASK, *CONTROLLER, *run, env=ros_domain.env, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found = json_of(done.stdout)
+    assert (found["task"], found["success"]) == ("my_task:Circle", True)
+    for command in (("bag", "rerun", "bag", *CONTROLLER), ("report", "bag")):
+        with pytest.raises(
+            ConfigError, match="the task is 'my_task:Circle', a class that only this bag names"
+        ):
+            ask(*command)
+    assert "my_task" not in sys.modules
+    found = json_of(ask("bag", "rerun", "bag", *TASK, *CONTROLLER, "--from", "odometry", "--json"))
+    assert (found["task"], found["same"]) == ("my_task:Circle", True)
+    evaluated = ask(
+        "evaluate", "turtlebot2", TASK[1], *CONTROLLER, "--through", "mujoco", "--episodes", "4", "--json"
+    )
+    found = json_of(evaluated)
+    assert (found["task"], found["success_rate"]) == ("my_task:Circle", 1.0)
+    ask("report", "bag", *TASK)
+    assert "Reached" in (folder / "bag" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("late:Observes", "task 'late:Observes': observe raised AssertionError: too fast"),
+        ("late:Measures", "task 'late:Measures': distance_from_goal returned the result that is not finite."),
+    ],
+)
+def test_a_task_that_fails_on_the_way_ends_its_run_with_one_line_and_a_robot_that_stands(
+    name: str, words: str, ros_domain: RosDomain, folder: Path
+) -> None:
+    (folder / "late.py").write_text(LATE)
+    run = ("run", "turtlebot2", "--task", name, *CONTROLLER, "--lockstep", "--duration", "8", "--json")
+    done = fulmar(*run, "--record", "bag", env=ros_domain.env, cwd=folder)
+    assert done.returncode == 1, done.stderr
+    assert words in json_of(done.stdout)["failure"]
+    assert "Traceback" not in done.stderr
+    commanded = read_run(folder / "bag").commanded.effort
+    assert commanded.any()
+    assert not commanded[-1].any()
