@@ -16,7 +16,6 @@ from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
 from fulmar_ros.provenance import fulmar_version, git_revision
 from policy_server.controllers import controller_entry
-from policy_server.own_controller import is_own
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:
@@ -77,10 +76,11 @@ def effective_system(plan: RunPlan) -> System:
 
 def _of_controller(plan: RunPlan) -> dict[str, Path | dict[str, Any]]:
     """The passport of a policy, which has the hash of its weights; the gains of a law."""
-    if plan.controller == "excite" or is_own(plan.controller):
-        return {}
-    if not controller_entry(plan.controller).runs_bundle:
+    entry = controller_entry(plan.controller)
+    if entry.is_law:
         robot, law = load_robot(plan.robot), plan.controller
         return {"controller.yaml": gains_path(robot, law) or asdict(gains_of(robot, law))}
+    if not entry.runs_bundle:
+        return {}
     folder = Path(plan.policy) if plan.policy else shipped_policy(plan.robot, plan.task)
     return {"passport.json": folder / PASSPORT} if folder else {}

@@ -1,0 +1,79 @@
+"""Readiness of an external controller: a publisher is matched on the topic that its commands come in on."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from fulmar_bringup.console import console
+from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.supervisor import Supervisor
+from fulmar_core.errors import RunFailed
+from fulmar_core.robot import load_robot
+from fulmar_core.topics import Wire, command_wire
+from fulmar_core.wire_check import Offer, wire_problems
+from hardware_drivers.adapter_node import heard_class
+from hardware_drivers.settings import load_hardware
+
+TIMEOUT_S = 20.0
+
+
+@dataclass(frozen=True)
+class CommandInput:
+    """Where the commands of an external controller come in."""
+
+    topic: str  # full name
+    wire: Wire  # what it carries
+    reliable: bool  # whether its subscriber asks for reliable delivery
+
+
+def command_input(plan: RunPlan) -> CommandInput:
+    """The command topic of a plan's robot, or the topic that its adapter takes."""
+    wire, reliable = command_wire(load_robot(plan.robot)), plan.lockstep
+    topic = dict(plan.remappings).get(wire.name, wire.name)
+    if plan.adapter:
+        driver = load_hardware(plan.adapter).driver
+        kind = heard_class(driver)
+        wire = replace(wire, type=f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}")
+        topic, reliable = plan.adapter_topic or driver.topic, False
+    return CommandInput(topic if topic.startswith("/") else f"/{plan.robot}/{topic}", wire, reliable)
+
+
+def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
+    """Wait until a node publishes the commands that a plan waits for.
+
+    Args:
+        plan: What runs.
+        overseer: Sees who publishes.
+        alive: Called while waiting; raises to give up.
+
+    Raises:
+        RunFailed: No publisher fits within the time for it; with those that do not, and why.
+    """
+    entry, began_s = command_input(plan), time.monotonic()
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+
+    def problems(offers: list[Offer]) -> list[str]:
+        return wire_problems(entry.wire, entry.topic, offers, reliable=entry.reliable)
+
+    def matched() -> bool:
+        return any(not problems([offer]) for offer in overseer.offers(entry.topic))
+
+    def waiting() -> None:
+        alive()
+        if time.monotonic() - began_s > TIMEOUT_S:
+            unfit = "".join(f" {problem}." for problem in problems(overseer.offers(entry.topic)))
+            raise RunFailed(
+                f"no publisher on {entry.topic} within {TIMEOUT_S:g} s.{unfit} Start your controller, in ROS domain "
+                f"{domain}; it publishes {entry.wire.type}."
+            )
+
+    if not matched():
+        console.print(
+            f"waiting for your controller: a publisher of {entry.wire.type} on {entry.topic}, in ROS domain {domain}",
+            markup=False,
+            soft_wrap=True,
+        )
+        overseer.wait_until(matched, waiting)
