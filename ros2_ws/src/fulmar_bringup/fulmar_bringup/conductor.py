@@ -18,7 +18,7 @@ from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.emulation import emulation_of
-from fulmar_bringup.external_ready import command_input, wait_for_publisher
+from fulmar_bringup.external_ready import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.goal_plan import is_endless, shown_path
 from fulmar_bringup.node_table import (
     NodeSpec,
@@ -183,8 +183,9 @@ def _listeners(plan: RunPlan) -> int:
         return 1  # the recorder
     if plan.guards.estimator:
         return 2  # of the poses: estimator, recorder
-    # Recorder, goals, and our own controller: where another one measures, only its owner knows.
-    return 1 + bool(plan.goals) + (not controller_entry(plan.controller).is_external)
+    # An external controller answers odometry in lock step; by the clock, only its owner knows where it measures.
+    answers = plan.lockstep or not controller_entry(plan.controller).is_external
+    return 1 + answers + bool(plan.goals)  # recorder, controller, goals
 
 
 def _with_ends(failure: str, ends: list[Ended]) -> str:
@@ -213,6 +214,8 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
         elif not external:
             overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
+        if external:
+            wait_for_reader(plan, overseer, lambda: raise_if_ended(group))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved, end_on_estop=request.end_on_estop)
     except RunFailed as error:

@@ -12,7 +12,7 @@ from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.supervisor import Supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot
-from fulmar_core.topics import Wire, command_wire
+from fulmar_core.topics import ODOMETRY, Wire, command_wire
 from fulmar_core.wire_check import Offer, wire_problems
 from hardware_drivers.adapter_node import heard_class
 from hardware_drivers.settings import load_hardware
@@ -77,3 +77,30 @@ def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], 
             soft_wrap=True,
         )
         overseer.wait_until(matched, waiting)
+
+
+def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
+    """Wait until a plant in lock step, which has been started, no longer waits for subscribers.
+
+    Args:
+        plan: What runs.
+        overseer: Receives what the plant reports.
+        alive: Called while waiting; raises to give up.
+
+    Raises:
+        RunFailed: Too few nodes subscribe its odometry within the time for it.
+    """
+    if not plan.lockstep:
+        return
+    began_s = time.monotonic()
+
+    def waiting() -> None:
+        alive()
+        if time.monotonic() - began_s > TIMEOUT_S:
+            topic = dict(plan.remappings).get(ODOMETRY.name, ODOMETRY.name)
+            raise RunFailed(
+                f"the plant did not begin within {TIMEOUT_S:g} s ({overseer.plant.message}). In lock step your "
+                f"controller subscribes {topic} of '{plan.robot}' and answers each message by its stamp."
+            )
+
+    overseer.wait_until(lambda: overseer.plant.values.get("mode") not in ("inactive", "waiting"), waiting)
