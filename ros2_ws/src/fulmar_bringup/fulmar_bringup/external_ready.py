@@ -103,4 +103,6 @@ def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], Non
                 f"controller subscribes {topic} of '{plan.robot}' and answers each message by its stamp."
             )
 
-    overseer.wait_until(lambda: overseer.plant.values.get("mode") not in ("inactive", "waiting"), waiting)
+    overseer.wait_until(
+        lambda: overseer.plant.values.get("mode", "inactive") not in ("inactive", "waiting"), waiting
+    )
