@@ -13,13 +13,18 @@ import pytest
 from fulmar_bringup import external_ready
 from fulmar_bringup.bag_origin import attachments
 from fulmar_bringup.bag_reader import read_run
+from fulmar_bringup.bags.contents import open_bag
+from fulmar_bringup.bags.course import course_of
 from fulmar_bringup.commands.run import verdict
-from fulmar_bringup.external_ready import command_input, wait_for_publisher
+from fulmar_bringup.external_ready import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.node_table import RunPlan, list_nodes
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.run_summary import summarise
+from fulmar_bringup.supervisor import Report
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_core.wire_check import Offer
+from tests.fulmar_bringup.command_line import complaint
+from tests.fulmar_bringup.synthetic_run import Plan, write_run
 
 PLAN = RunPlan("turtlebot2", "go_to_position", "external", "mujoco", 10.0)
 OWN = {"robot": "turtlebot2", "task": "go_to_position", "controller": "external"}
@@ -151,17 +156,77 @@ def test_without_a_fitting_publisher_a_run_fails_with_one_line(offer, lockstep, 
     assert "Start your controller, in ROS domain 7" in text
 
 
-def test_commands_that_answer_no_stamp_count_and_have_no_latency(reached):
-    """As an external controller sends them that stamps none, or by a clock of its own."""
-    record = read_run(reached)
-    commanded = replace(record.commanded, stamp_s=np.zeros(len(record.commanded)))
-    record = replace(record, commanded=commanded, health=(), controller={})
-    assert summarise(record)["steps"] == 0
-    summary = summarise(replace(record, info=record.info | {"controller": "external"}))
-    assert summary["steps"] == 201
-    assert summary["latency_ms"]["p50"] is None
-    assert summary["success"] is True
+@pytest.mark.parametrize(("mode", "message"), [("inactive", ""), ("waiting", "waiting: 1 of 2 listen")])
+def test_a_plant_in_lock_step_that_nothing_answers_fails_its_run_in_one_line(mode, message, monkeypatch):
+    times = iter(range(1000))
+    monkeypatch.setattr(external_ready, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
+    overseer = Overseer([STAMPED])
+    overseer.plant = Report("ok", message, {"mode": mode})
+    wait_for_reader(PLAN, overseer, lambda: None)  # by the clock the plant waits for nothing
+    lockstep = replace(PLAN, lockstep=True)
+    with pytest.raises(RunFailed) as caught:
+        wait_for_reader(lockstep, overseer, lambda: None)
+    assert (
+        f"the plant did not begin within 20 s ({message}). In lock step your controller subscribes odom"
+        in str(caught.value)
+    )
+    overseer.plant = Report("ok", "running", {"mode": "running"})
+    wait_for_reader(lockstep, overseer, lambda: None)
+
+
+@pytest.fixture(scope="module")
+def external(tmp_path_factory) -> Path:
+    """A run whose controller reports nothing and stamps no command, otherwise as `reached`."""
+    return write_run(
+        tmp_path_factory.mktemp("runs") / "external", Plan(controller="external", duration_s=16.0)
+    )
+
+
+def test_commands_without_a_stamp_count_and_have_no_latency(external):
+    summary = summarise(read_run(external))
+    assert (summary["steps"], summary["success"], summary["watchdog_trips"]) == (81, True, 0)
     assert summary["control_rate_hz"] == pytest.approx(5.0, rel=0.01)
-    assert (summary["watchdog_trips"], summary["overruns"]) == (None, None)
-    assert "  201 commands\n" in verdict(summary)
+    for figure in ("latency_ms", "inference_ms", "period_error_ms"):
+        assert summary[figure] == {"p50": None, "p99": None, "max": None}
+    assert "  81 commands; 2 overruns, 0 watchdog trips\n" in verdict(summary)
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+
+
+def test_what_is_unknown_of_a_run_is_not_printed(external):
+    summary = summarise(replace(read_run(external), health=()))
+    assert (summary["watchdog_trips"], summary["overruns"]) == (None, None)
+    assert "  81 commands\n" in verdict(summary)
+
+
+def test_the_bag_of_an_external_controller_is_described_compared_and_reported(external, reached, fulmar):
+    code, out, _ = fulmar("bag", "info", external)
+    assert code == 0
+    assert "controller: external" in out
+    code, out, _ = fulmar("bag", "diff", external, reached, "--topic", "actuators/command", "--json")
+    assert (code, json.loads(out)["topics"][0]["counts"]) == (1, [81, 201])
+    code, _, _ = fulmar("report", external)
+    assert code == 0
+    assert (external / "report.html").is_file()
+
+
+def test_a_rerun_refuses_an_external_controller_and_compares_another(external, reached, fulmar):
+    for words in ((), ("--controller", "external")):
+        line = complaint(fulmar("bag", "rerun", external, *words))
+        assert "an external controller drove" in line
+        assert "--controller classical --from odometry" in line
+    course = course_of(open_bag(external))
+    stamped = course_of(open_bag(reached))
+    np.testing.assert_array_equal(course.stamp_ns, stamped.stamp_ns[: len(course)])
+    np.testing.assert_array_equal(course.commands, stamped.commands[: len(course)])
+    code, out, _ = fulmar(
+        "bag", "rerun", external, "--controller", "classical", "--from", "odometry", "--json"
+    )
+    compared = json.loads(out)
+    assert (compared["steps"], compared["asked"], compared["compared"]) == (81, 81, True)
+    assert code == 1  # other weights, so other commands
+
+
+@pytest.mark.parametrize("through", ["batch", "mujoco", "ros"])
+def test_an_evaluation_refuses_an_external_controller(through, fulmar):
+    words = ("turtlebot2", "go_to_position", "--controller", "external", "--through", through)
+    assert "a node of your own, which no evaluation can begin anew" in complaint(fulmar("evaluate", *words))
