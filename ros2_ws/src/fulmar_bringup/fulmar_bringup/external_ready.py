@@ -15,7 +15,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY, Wire, command_wire
 from fulmar_core.wire_check import Offer, wire_problems
 from hardware_drivers.adapter_node import heard_class
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
 
 TIMEOUT_S = 20.0
 
@@ -35,6 +35,7 @@ def command_input(plan: RunPlan) -> CommandInput:
     topic = dict(plan.remappings).get(wire.name, wire.name)
     if plan.adapter:
         driver = load_hardware(plan.adapter).driver
+        assert isinstance(driver, TOPIC_DRIVERS)  # as `adapter_path` has checked
         kind = heard_class(driver)
         wire = replace(wire, type=f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}")
         topic, reliable = plan.adapter_topic or driver.topic, False
