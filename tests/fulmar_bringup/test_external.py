@@ -23,6 +23,7 @@ from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import Report
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_core.wire_check import Offer
+from fulmar_ros.recorder_health import COMMANDERS
 from tests.fulmar_bringup.command_line import complaint
 from tests.fulmar_bringup.synthetic_run import Plan, write_run
 
@@ -93,12 +94,11 @@ def test_a_run_refuses_options_of_the_controller_node(choice, words, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "topic", "kind", "reliable"),
     [
-        ({}, "/turtlebot2/cmd_vel", "geometry_msgs/msg/TwistStamped", False),
-        ({"lockstep": True}, "/turtlebot2/cmd_vel", "geometry_msgs/msg/TwistStamped", True),
-        ({"remappings": (("cmd_vel", "/raw"),)}, "/raw", "geometry_msgs/msg/TwistStamped", False),
+        ({}, "/turtlebot2/cmd_vel", "geometry_msgs/msg/TwistStamped", True),
+        ({"remappings": (("cmd_vel", "/raw"),)}, "/raw", "geometry_msgs/msg/TwistStamped", True),
         ({"adapter": KOBUKI}, "/commands/velocity", "geometry_msgs/msg/Twist", False),
         ({"adapter": KOBUKI, "adapter_topic": "raw"}, "/turtlebot2/raw", "geometry_msgs/msg/Twist", False),
-        ({"robot": "kingfisher"}, "/kingfisher/actuators/command", "sensor_msgs/msg/JointState", False),
+        ({"robot": "kingfisher"}, "/kingfisher/actuators/command", "sensor_msgs/msg/JointState", True),
         ({"robot": "kingfisher", "adapter": "kingfisher_action"}, "/action", "std_msgs/msg/Float32MultiArray", False),
     ],
 )  # fmt: skip
@@ -110,8 +110,9 @@ def test_commands_are_waited_for_where_the_plant_or_its_adapter_takes_them(chang
 class Overseer:
     """Shows the publishers of a topic, one look after another; the last stay."""
 
-    def __init__(self, *looks: list[Offer]) -> None:
+    def __init__(self, *looks: list[Offer], recorded: str = "1") -> None:
         self._looks = list(looks)
+        self.recorder = Report(values={COMMANDERS: recorded})
 
     def offers(self, topic: str) -> list[Offer]:
         assert topic == "/turtlebot2/cmd_vel"
@@ -122,12 +123,11 @@ class Overseer:
             alive()
 
 
-def wait(monkeypatch, *looks: list[Offer], lockstep: bool = False) -> None:
+def wait(monkeypatch, *looks: list[Offer], recorded: str = "1") -> None:
     times = iter(range(1000))
     monkeypatch.setattr(external_ready, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
     monkeypatch.setenv("ROS_DOMAIN_ID", "7")
-    plan = replace(PLAN, lockstep=lockstep)
-    wait_for_publisher(plan, Overseer(*looks), lambda: None)
+    wait_for_publisher(PLAN, Overseer(*looks, recorded=recorded), lambda: None)
 
 
 def test_a_run_is_ready_once_a_fitting_publisher_is_there(monkeypatch, capsys):
@@ -141,16 +141,17 @@ def test_a_run_is_ready_once_a_fitting_publisher_is_there(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    ("offer", "lockstep", "why"),
+    ("offer", "recorded", "why"),
     [
-        (None, False, ""),
-        (replace(STAMPED, type="geometry_msgs/msg/Twist"), False, " /steer publishes geometry_msgs/msg/Twist"),
-        (replace(STAMPED, reliable=False), True, " /steer publishes best effort"),
+        (None, "0", ""),
+        (STAMPED, "0", ""),
+        (replace(STAMPED, type="geometry_msgs/msg/Twist"), "1", " /steer publishes geometry_msgs/msg/Twist"),
+        (replace(STAMPED, reliable=False), "1", " /steer publishes best effort"),
     ],
 )  # fmt: skip
-def test_without_a_fitting_publisher_a_run_fails_with_one_line(offer, lockstep, why, monkeypatch):
+def test_without_a_fitting_publisher_a_run_fails_with_one_line(offer, recorded, why, monkeypatch):
     with pytest.raises(RunFailed) as caught:
-        wait(monkeypatch, [offer] if offer else [], lockstep=lockstep)
+        wait(monkeypatch, [offer] if offer else [], recorded=recorded)
     text = str(caught.value)
     assert text.startswith(f"no publisher on /turtlebot2/cmd_vel within 20 s.{why}")
     assert "Start your controller, in ROS domain 7" in text

@@ -1,4 +1,4 @@
-"""Readiness of an external controller: a publisher is matched on the topic that its commands come in on."""
+"""Readiness of an external controller: its publisher of commands is matched."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY, Wire, command_wire
 from fulmar_core.wire_check import Offer, wire_problems
+from fulmar_ros.recorder_health import COMMANDERS
 from hardware_drivers.adapter_node import heard_class
 from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
 
@@ -31,7 +32,7 @@ class CommandInput:
 
 def command_input(plan: RunPlan) -> CommandInput:
     """The command topic of a plan's robot, or the topic that its adapter takes."""
-    wire, reliable = command_wire(load_robot(plan.robot)), plan.lockstep
+    wire, reliable = command_wire(load_robot(plan.robot)), True  # the recorder asks for it
     topic = dict(plan.remappings).get(wire.name, wire.name)
     if plan.adapter:
         driver = load_hardware(plan.adapter).driver
@@ -59,8 +60,12 @@ def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], 
     def problems(offers: list[Offer]) -> list[str]:
         return wire_problems(entry.wire, entry.topic, offers, reliable=entry.reliable)
 
-    def matched() -> bool:
+    def fits() -> bool:
         return any(not problems([offer]) for offer in overseer.offers(entry.topic))
+
+    def ready() -> bool:
+        """Commands that came before the recorder is matched would be missing in the bag."""
+        return fits() and int(overseer.recorder.values.get(COMMANDERS, 0)) > 0
 
     def waiting() -> None:
         alive()
@@ -71,13 +76,13 @@ def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], 
                 f"{domain}; it publishes {entry.wire.type}."
             )
 
-    if not matched():
+    if not fits():
         console.print(
             f"waiting for your controller: a publisher of {entry.wire.type} on {entry.topic}, in ROS domain {domain}",
             markup=False,
             soft_wrap=True,
         )
-        overseer.wait_until(matched, waiting)
+    overseer.wait_until(ready, waiting)
 
 
 def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:

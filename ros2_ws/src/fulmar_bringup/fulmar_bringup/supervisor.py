@@ -59,7 +59,7 @@ class Supervisor:
         """Listen to plant and controller."""
         self._node, self._robot, self._task = node, robot, task
         self._made_s = time.monotonic()
-        self.plant, self.controller = Report(), Report()
+        self.plant, self.controller, self.recorder = Report(), Report(), Report()
         self._changed = threading.Condition()
         self._error: Exception | None = None
         wire = GOAL_WIRES[task.goal_topic]
@@ -100,9 +100,8 @@ class Supervisor:
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            part = {f"{self._robot}: plant": self.plant, f"{self._robot}: controller": self.controller}.get(
-                status.name
-            )
+            parts = {"plant": self.plant, "controller": self.controller, "recorder": self.recorder}
+            part = parts.get(status.name.removeprefix(f"{self._robot}: "))
             if part is None:
                 continue
             with self._changed:
