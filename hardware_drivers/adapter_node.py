@@ -32,6 +32,16 @@ from hardware_drivers.valve_message import from_message
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches whatever they offer
 PLANT = "plant"  # name of driver nodes
 NO_STAMP = 0  # they answer no observation of ours
+TopicDriver = ValveTopic | VelocityTopic | ThrustTopic
+
+
+def heard_class(driver: TopicDriver) -> type:
+    """Class of the messages that an adapter takes for a driver."""
+    if isinstance(driver, ValveTopic):
+        return VALVE_MESSAGES[driver.message]
+    if isinstance(driver, ThrustTopic):
+        return Float32MultiArray
+    return TwistStamped if driver.stamped else Twist
 
 
 @dataclass(frozen=True)
@@ -77,17 +87,17 @@ class AdapterNode(Node):
         self._bearing: bool | None = None
         self._enable = self.create_client(SetBool, SERVICE) if self._order else None
         self._request_exit = request_exit
-        heard, self._take = self._ear(driver)
-        self._heard = self.create_subscription(heard, settings.topic or driver.topic, self._hear, NEWEST)
+        self._take = self._taker(driver)
+        self._heard = self.create_subscription(
+            heard_class(driver), settings.topic or driver.topic, self._hear, NEWEST
+        )
 
-    def _ear(self, driver: ValveTopic | VelocityTopic | ThrustTopic) -> tuple[type, Callable[[Any], None]]:
+    def _taker(self, driver: TopicDriver) -> Callable[[Any], None]:
         if isinstance(driver, ValveTopic):
-            return VALVE_MESSAGES[driver.message], self._valves
+            return self._valves
         if isinstance(driver, ThrustTopic):
-            return Float32MultiArray, lambda message: self._pass_on(np.array(message.data, dtype=float))
-        if driver.stamped:
-            return TwistStamped, lambda message: self._velocity(message.twist)
-        return Twist, self._velocity
+            return lambda message: self._pass_on(np.array(message.data, dtype=float))
+        return (lambda message: self._velocity(message.twist)) if driver.stamped else self._velocity
 
     def _hear(self, message: Any) -> None:
         if self._comes_from_our_plant():

@@ -21,6 +21,8 @@ from fulmar_core.tasks import Task
 from policy_server.own_controller import MEMBERS, OwnController
 from policy_server.shipped import shipped_policy
 
+EXTERNAL = "external"  # any node that publishes the robot's commands
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -42,6 +44,7 @@ class ControllerEntry:
     strives: bool = True  # whether it means to meet the goal
     runs_bundle: bool = False  # whether a learned policy drives
     is_law: bool = False  # whether it has gains, and may take over from a policy that is refused
+    is_external: bool = False  # whether it is a node of the user's own, which Fulmar neither loads nor starts
 
 
 def _load_policy(robot: Robot, task: Task, choice: Choice) -> Controller:
@@ -57,7 +60,7 @@ def _load_policy(robot: Robot, task: Task, choice: Choice) -> Controller:
 
 
 def _any_pair(robot: Robot, task: Task) -> None:
-    """A bundle says itself what it was made for."""
+    """Accept any pair: a bundle names its own, and what an external node is for its owner knows."""
 
 
 def _load_law(law: str | None, robot: Robot, task: Task, choice: Choice) -> Controller:
@@ -84,6 +87,13 @@ def _check_excite(robot: Robot, task: Task) -> None:
         )
 
 
+def _load_external(robot: Robot, task: Task, choice: Choice) -> Controller:
+    raise ConfigError(
+        f"controller '{EXTERNAL}' is a node of your own, which is not loaded here: it goes with `fulmar run`, systems "
+        "and launch files. Give another controller, or a class: docs/own-controller.md."
+    )
+
+
 def _load_own(name: str, robot: Robot, task: Task, choice: Choice) -> Controller:
     return OwnController(name, robot, task, choice.control_hz)
 
@@ -102,6 +112,9 @@ CONTROLLERS = {
     "lqr_drift": _law("the published LQR of DRIFT, to compare with", "lqr_drift"),
     "classical": _law(f"the law of the robot's family: {_LAWS}", None),
     "excite": ControllerEntry(Excite.title, _load_excite, _check_excite, strives=False),
+    EXTERNAL: ControllerEntry(
+        "any node that publishes commands, started by you", _load_external, _any_pair, is_external=True
+    ),
 }
 FALLBACKS = tuple(name for name, entry in CONTROLLERS.items() if entry.is_law)
 

@@ -23,12 +23,14 @@ from fulmar_core.tasks import Task, load_task
 from fulmar_core.topics import VELOCITY_COMMAND, WIRES, command_wire
 from fulmar_ros.bag_types import type_store
 from fulmar_ros.bag_writer import BagWriter
+from policy_server.controllers import EXTERNAL
 
 ROBOT = "floating_platform"
 EPOCH_NS = 1_700_000_000_000_000_000
 NS = 1_000_000_000
 TICK_S = 0.02
 WATCHDOG_S = 0.4
+UNSTAMPED_S = -1.0  # a time whose stamp is 0
 LATENCY_NS = 1_500_000
 
 
@@ -54,7 +56,7 @@ class Plan:
     """What kind of run to write."""
 
     robot: str = ROBOT
-    controller: str = "lqr"
+    controller: str = "lqr"  # external: a node that reports nothing and stamps no command
     task: str = "go_to_pose"
     seed: int = 3
     duration_s: float = 40.0
@@ -85,7 +87,9 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
     bag = _Messages(folder, plan, robot)
     bag.goal(task.goal_topic, simulation.goal[0], EPOCH_NS)
     bag.obstacles(simulation.goal[0].obstacles)
-    bag.text("controller/metadata", json.dumps(controller.metadata()))
+    external = plan.controller == EXTERNAL
+    if not external:
+        bag.text("controller/metadata", json.dumps(controller.metadata()))
     jitter = np.random.default_rng([plan.seed, len(plan.controller)])
     substeps = round(1.0 / (plan.control_hz * TICK_S))
     safe, loop = robot.actuators.safe_command, ControlLoop(robot, task, controller)
@@ -108,13 +112,14 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
             command = loop.step(simulation.measured, round(time_s * NS)).command[0]
             heard_s, steps = time_s, steps + 1
             late_ns = LATENCY_NS + int(jitter.gamma(2.0, 300_000))
-            bag.command(command, time_s, now_ns + late_ns)
+            bag.command(command, UNSTAMPED_S if external else time_s, now_ns + late_ns)
         was_closed, closed = closed, time_s - heard_s > WATCHDOG_S
         trips += closed and not was_closed
         applied = safe if closed else command
         bag.joints("actuators/state", applied, time_s, now_ns + 4_000_000)
         if tick % 25 == 0:
-            bag.health("controller/status", "controller", _controller_values(steps), now_ns)
+            if not external:
+                bag.health("controller/status", "controller", _controller_values(steps), now_ns)
             bag.health("/diagnostics", "plant", _plant_values(tick, trips), now_ns)
         simulation.step(applied[None, :])
     bag.writer.close()

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from fulmar_bringup.system import System
 from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_of, gains_path
-from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import load_robot
@@ -87,10 +86,11 @@ def _of_task(name: str) -> dict[str, Path]:
 
 def _of_controller(plan: RunPlan) -> dict[str, Path | dict[str, Any]]:
     """The passport of a policy, which has the hash of its weights; the gains of a law."""
-    if plan.controller == "excite" or is_own(plan.controller):
-        return {}
-    if not controller_entry(plan.controller).runs_bundle:
+    entry = controller_entry(plan.controller)
+    if entry.is_law:
         robot, law = load_robot(plan.robot), plan.controller
         return {"controller.yaml": gains_path(robot, law) or asdict(gains_of(robot, law))}
+    if not entry.runs_bundle:
+        return {}
     folder = Path(plan.policy) if plan.policy else shipped_policy(plan.robot, plan.task)
     return {"passport.json": folder / PASSPORT} if folder else {}

@@ -18,11 +18,12 @@ from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.emulation import emulation_of
+from fulmar_bringup.external_ready import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.goal_plan import is_endless, shown_path
 from fulmar_bringup.node_table import (
     NodeSpec,
     RunPlan,
-    controller_spec,
+    commander_specs,
     emulator_spec,
     guard_specs,
     plant_spec,
@@ -46,6 +47,7 @@ from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from hardware_drivers.presence import check_presence
 from hardware_drivers.settings import load_hardware
+from policy_server.controllers import controller_entry
 
 # A ring that no fault has written tells nothing of the goal.
 _UNJUDGED: dict[str, Any] = {"success": None, "bag": None, "failure": None}
@@ -95,6 +97,13 @@ def conduct(request: RunRequest) -> RunOutcome:
     except FulmarError as error:
         failure, summary = failure or str(error), summarise(_nothing_recorded(request))
         summary["bag"] = str(request.record) if request.record.exists() else None
+    if (
+        not failure
+        and not ring
+        and not summary["steps"]
+        and controller_entry(request.plan.controller).is_external
+    ):
+        failure = f"no command came on {command_input(request.plan).topic}: your controller published none"
     if not failure and not ring and plant_steps > summary["steps"]:
         failure = f"the bag lacks {plant_steps - summary['steps']} of {plant_steps} commands"
     return RunOutcome({**summary, "failure": failure or None}, failure)
@@ -148,7 +157,7 @@ def _specs(request: RunRequest, plan: RunPlan, folders: contextlib.ExitStack) ->
         port = emulation.port
     specs.append(plant_spec(plan, subscribers=_listeners(plan), port=port))
     specs += guard_specs(plan)
-    specs.append(controller_spec(plan, subscribers=2))  # plant and recorder
+    specs += commander_specs(plan, subscribers=2)  # plant and recorder
     return [*specs, run_goals_spec(plan)] if plan.goals else specs
 
 
@@ -174,7 +183,9 @@ def _listeners(plan: RunPlan) -> int:
         return 1  # the recorder
     if plan.guards.estimator:
         return 2  # of the poses: estimator, recorder
-    return 3 if plan.goals else 2  # controller, recorder, goals
+    # An external controller answers odometry in lock step; by the clock, only its owner knows where it measures.
+    answers = plan.lockstep or not controller_entry(plan.controller).is_external
+    return 1 + answers + bool(plan.goals)  # recorder, controller, goals
 
 
 def _with_ends(failure: str, ends: list[Ended]) -> str:
@@ -188,16 +199,23 @@ def _with_ends(failure: str, ends: list[Ended]) -> str:
 
 def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
     """Start the run and wait for its end; returns why it failed, or an empty text."""
-    starting = while_starting(group, overseer)
+    external = controller_entry(plan.controller).is_external
     try:
-        if plan.goals:
-            overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
-        else:
-            now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
+        if external:
+            wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))
+        starting = while_starting(group, overseer)
+        now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
+        if not plan.goals and external:
+            overseer.publish_goal(request.mission, time_ns=now_ns, alive=starting)
+        elif not plan.goals:
             overseer.give_goal(
                 request.mission, time_ns=now_ns, alive=starting, listeners=CONTROLLER_AND_RECORDER
             )
+        elif not external:
+            overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
         overseer.start_plant(starting, lambda: group.last_words("plant"))
+        if external:
+            wait_for_reader(plan, overseer, lambda: raise_if_ended(group))
         with time_bar("running", plan.duration_s) as moved:
             _wait_for_end(plan, overseer, group, moved, end_on_estop=request.end_on_estop)
     except RunFailed as error:

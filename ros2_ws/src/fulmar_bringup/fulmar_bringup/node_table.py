@@ -10,6 +10,7 @@ from pathlib import Path
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.emulation import Emulation
+from fulmar_bringup.external import adapter_path, check_external
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
 from fulmar_bringup.system import (
     NONE,
@@ -74,6 +75,10 @@ class RunPlan:
     controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
     mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
     remappings: tuple[tuple[str, str], ...] = ()  # topics and their other names, for every node
+    adapter: str = (
+        ""  # hardware file of an adapter, whose commands an external controller speaks; empty: none
+    )
+    adapter_topic: str = ""  # topic that it takes them from; empty: the file's
 
 
 def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
@@ -124,6 +129,34 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         network=plan.controller_network,
         remappings=dict(plan.remappings),
     )
+
+
+def adapter_spec(plan: RunPlan) -> NodeSpec:
+    """The node that passes the commands of another stack on to the plant."""
+    parameters: dict[str, Parameter] = {"hardware": plan.adapter}
+    if plan.adapter_topic:
+        parameters["topic"] = plan.adapter_topic
+    return NodeSpec(
+        "adapter",
+        "hardware_drivers",
+        "adapter_node",
+        "hardware_drivers.adapter_node",
+        f"/{plan.robot}",
+        parameters,
+        remappings=dict(plan.remappings),
+    )
+
+
+def commander_specs(plan: RunPlan, *, subscribers: int = 0) -> tuple[NodeSpec, ...]:
+    """The node that commands the plant; none where an external controller does so without an adapter.
+
+    Args:
+        plan: What to run.
+        subscribers: As of `controller_spec`.
+    """
+    if not controller_entry(plan.controller).is_external:
+        return (controller_spec(plan, subscribers=subscribers),)
+    return (adapter_spec(plan),) if plan.adapter else ()
 
 
 def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSpec:
@@ -311,6 +344,8 @@ def list_nodes(
     policy: str | None = None,
     goals: str | None = None,
     hardware: str | None = None,
+    adapter: str | None = None,
+    topic: str | None = None,
 ) -> tuple[NodeSpec, ...]:
     """Nodes of a system, each of its choices replaced by what is given.
 
@@ -323,9 +358,12 @@ def list_nodes(
         policy: Folder of a bundle; the shipped one by default.
         goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it somebody else gives goals.
         hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
+        adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
+        topic: Topic that the adapter takes them from; the file's by default.
 
     Returns:
-        Recorder, plant, controller and, with `goals`, the node that tells them.
+        Recorder, plant, controller and, with `goals`, the node that tells them. The row of an external controller is
+        not there, or is that of its adapter.
 
     Raises:
         ConfigError: Unknown name, or a mistake in a file.
@@ -344,10 +382,12 @@ def list_nodes(
             base.guards if base.backend == "hardware" else default_guards(plan.controller, "hardware", path)
         )
         plan = replace(plan, hardware=path, guards=guards)
+    check_external(plan.controller, plan.guards, adapter=adapter, topic=topic, lockstep=False)
+    plan = replace(plan, adapter=adapter_path(plan.robot, adapter), adapter_topic=topic or "")
     recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan))
-    nodes = recorder, plant_spec(plan), *guard_specs(plan)
+    nodes = recorder, plant_spec(plan), *guard_specs(plan), *commander_specs(plan)
     if not goals:
-        return *nodes, controller_spec(plan)
+        return nodes
     checked_goals(goals, load_robot(plan.robot), load_task(plan.task))
     plan = replace(plan, goals=str(goal_path(goals)))
-    return *nodes, controller_spec(plan), run_goals_spec(plan)
+    return *nodes, run_goals_spec(plan)

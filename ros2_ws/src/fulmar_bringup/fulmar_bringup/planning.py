@@ -13,6 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from fulmar_bringup.emulation import check_emulated
+from fulmar_bringup.external import adapter_path, check_external
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.remapping import read_remappings
@@ -88,6 +89,8 @@ def plan_run(
     controller_network: str = "",
     mocap_hz: float = 0.0,
     remap: Sequence[str] = (),
+    adapter: str | None = None,
+    topic: str | None = None,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -118,6 +121,8 @@ def plan_run(
         controller_network: Network namespace that the controller runs in; ours by default.
         mocap_hz: Rate of a simulated motion capture beside the odometry; 0: none [Hz].
         remap: Topics under other names, each `FROM:=TO`.
+        adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
+        topic: Topic that the adapter takes them from; the file's by default.
 
     Returns:
         The request.
@@ -137,6 +142,8 @@ def plan_run(
     watched = _checked_guards(
         default_guards(controller, backend, hardware), guards, the_robot, the_task, lockstep=lockstep
     )
+    check_external(controller, watched, adapter=adapter, topic=topic, lockstep=lockstep)
+    _check_ours(controller, copies=copies, network=controller_network)
     policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=watched.fallback)
     if policy is not None and watched.trusted_keys is not None:
         _check_signed(policy, Path(watched.trusted_keys), fallback=watched.fallback)
@@ -185,6 +192,8 @@ def plan_run(
         controller_network=controller_network,
         mocap_hz=_checked_mocap(mocap_hz, hardware, emulate=emulate, lockstep=lockstep),
         remappings=tuple(read_remappings(remap).items()),
+        adapter=adapter_path(robot, adapter),
+        adapter_topic=topic or "",
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
@@ -210,6 +219,19 @@ def _checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: b
         check_emulated(driver)
     check_own_driver(driver)
     return path
+
+
+def _check_ours(controller: str, *, copies: int, network: str) -> None:
+    """Refuse options of the controller node where an external controller runs.
+
+    Raises:
+        ConfigError: On the first one.
+    """
+    for option, given in (("--copies", copies > 1), ("--controller-in", bool(network))):
+        if given and controller_entry(controller).is_external:
+            raise ConfigError(
+                f"{option} is for a controller that Fulmar starts; '{controller}' is yours. Leave it out."
+            )
 
 
 def check_arming(hardware: str, *, arm: bool) -> None:

@@ -12,6 +12,7 @@ from fulmar_bringup.run_judgement import Judgement, judge
 from fulmar_bringup.run_record import HealthSample, RunRecord
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
+from policy_server.controllers import EXTERNAL
 
 ASKED = ("robot", "task", "controller", "backend", "seed")
 PERCENTILES = ("p50", "p99", "max")
@@ -44,7 +45,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
     wall_hz = _number(controller, "control_rate_hz") or _wall_rate_hz(record)
     return {
         **{key: record.info.get(key) for key in ASKED},
-        "steps": len(latencies_ms(record)),
+        "steps": len(latencies_ms(record)) or _unanswering(record),
         "duration_s": judgement.duration_s if judgement else 0.0,
         "success": judgement is not None and judgement.success,
         **{name: judgement.figure(name) if judgement else None for name in FIGURES},
@@ -113,6 +114,12 @@ def percentiles(values: np.ndarray) -> Spread:
     return {"p50": float(p50), "p99": float(p99), "max": float(values.max())}
 
 
+def _unanswering(record: RunRecord) -> int:
+    """Commands of an external controller that stamps none of them as the odometry that it answers."""
+    external = record.info.get("controller") == EXTERNAL
+    return len(record.commanded) if external and not len(latencies_ms(record)) else 0
+
+
 def _use(judgement: Judgement | None) -> float | None:
     """Mean share of actuators in use."""
     if judgement is None or np.isnan(judgement.run.shares).any():
@@ -129,9 +136,11 @@ def _own_rate_hz(record: RunRecord, wall_hz: float | None) -> float | None:
 
 
 def _wall_rate_hz(record: RunRecord) -> float | None:
-    """Answers a second of wall-clock time, from when the first of each was recorded."""
+    """Answers a second of wall-clock time, from when the first of each was recorded; of none, commands."""
     stamps, first = np.unique(record.commanded.stamp_s, return_index=True)
     times = np.unique(record.commanded.log_s[first[np.isin(stamps, record.odom.stamp_s)]])
+    if _unanswering(record):
+        times = np.unique(record.commanded.log_s)
     return float((len(times) - 1) / (times[-1] - times[0])) if len(times) > 1 else None
 
 

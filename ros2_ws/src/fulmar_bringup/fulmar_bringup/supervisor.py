@@ -25,6 +25,7 @@ from fulmar_core.goal import Goal, goal_at
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.tasks import Task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
+from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.late_subscribers import LateSubscribers
 from fulmar_ros.living_plant import refuse_living_plant, sees_living_plant
@@ -32,9 +33,11 @@ from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.operator_subscription import SUBSCRIPTIONS
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
+from fulmar_ros.wire_watch import offers_of
 
 START_TIMEOUT_S = 30.0
 TELL_AGAIN_S = 0.5  # after an e-stop was silent, before the goal is told once more
+SUBSCRIBES_S = 1.0  # for an external controller that publishes already to subscribe its goal
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
 
 
@@ -55,7 +58,7 @@ class Supervisor:
         """Listen to plant and controller."""
         self._node, self._robot, self._task = node, robot, task
         self._made_s = time.monotonic()
-        self.plant, self.controller = Report(), Report()
+        self.plant, self.controller, self.recorder = Report(), Report(), Report()
         self._changed = threading.Condition()
         self._error: Exception | None = None
         wire = GOAL_WIRES[task.goal_topic]
@@ -67,6 +70,9 @@ class Supervisor:
             if task.sees_obstacles
             else None
         )
+        self._sent_obstacles: list[MarkerArray] = []
+        if self._obstacles is not None:
+            LateSubscribers(node, self._obstacles, lambda: list(self._sent_obstacles))
         node.create_subscription(
             DiagnosticArray,
             DIAGNOSTICS.name,
@@ -93,9 +99,8 @@ class Supervisor:
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            part = {f"{self._robot}: plant": self.plant, f"{self._robot}: controller": self.controller}.get(
-                status.name
-            )
+            parts = {"plant": self.plant, "controller": self.controller, "recorder": self.recorder}
+            part = parts.get(status.name.removeprefix(f"{self._robot}: "))
             if part is None:
                 continue
             with self._changed:
@@ -189,8 +194,39 @@ class Supervisor:
         """The obstacles alone, if the task has any; arguments as of `give_goal`."""
         if self._obstacles is None:
             return
-        self._obstacles.publish(obstacles_message(goal.obstacles, time_ns))
+        self._publish_obstacles(goal, time_ns)
         self.wait_until(lambda: self.controller.values.get("obstacles_stamp_ns") == str(time_ns), alive)
+
+    def _publish_obstacles(self, goal: Goal, time_ns: int) -> None:
+        if self._obstacles is not None:
+            self._sent_obstacles = [obstacles_message(goal.obstacles, time_ns)]
+            self._obstacles.publish(self._sent_obstacles[0])
+
+    def publish_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
+        """Publish a goal, with the obstacles if the task has any, to a controller that reports nothing.
+
+        The recorder has found this operator by then. A controller that subscribes later receives both all the same.
+
+        Args:
+            goal: The goal, without a batch axis.
+            time_ns: As of `give_goal`.
+            alive: Called while waiting; raises to give up.
+        """
+        self.wait_until(lambda: self._goal.get_subscription_count() >= SUBSCRIPTIONS, alive)
+        until_s = time.monotonic() + SUBSCRIBES_S  # one that takes its goal from elsewhere never subscribes
+        self.wait_until(
+            lambda: self._goal.get_subscription_count() > SUBSCRIPTIONS or time.monotonic() > until_s, alive
+        )
+        self._publish_obstacles(goal, time_ns)
+        self._sent = [
+            goal_message(part, self._task.goal_topic, stamp) for part, stamp in self._timed(goal, time_ns)
+        ]
+        for message in self._sent:
+            self._goal.publish(message)
+
+    def offers(self, topic: str) -> list[Offer]:
+        """Publishers of a topic, by its full name, as the graph shows them now."""
+        return offers_of(self._node, topic)
 
     def _timed(self, goal: Goal, time_ns: int) -> list[tuple[Goal, int]]:
         """Goals to publish, with their stamps [ns]."""

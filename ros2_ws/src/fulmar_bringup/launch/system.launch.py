@@ -16,10 +16,12 @@ ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",
     "robot": "a file of configs/robots, without .yaml",
     "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
-    "controller": "policy, or a classical controller such as lqr",
+    "controller": "policy, a classical controller such as lqr, a class of your own (mymodule:MyController), or external",
     "backend": "mujoco, mock or hardware",
     "hardware": "a file of configs/hardware, without .yaml, or a path to one",
     "policy": "folder of a policy bundle",
+    "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
+    "topic": "topic that the adapter takes, in the place of the file's",
     "goals": "a file of configs/goals, without .yaml, that a node of its own tells",
 }
 

@@ -88,6 +88,7 @@ class LockstepLoop:
         stamp = self._clock.now_ns
         began = time.monotonic()
         grounded = self._tell_bearing()
+        before = self._wires.answered_ns
         self._wires.publish_sample(sample, stamp)
         with self._wires.lock:
             while not self._wires.wait_for_answer(stamp, RESEND_S):
@@ -95,10 +96,9 @@ class LockstepLoop:
                 if stop.is_set():
                     return None
                 if waited > self._answer_timeout_s:
-                    refused = f" {self._guard.last_rejection}." if self._guard.last_rejection else ""
                     raise LockstepError(
                         f"no command answers the odom of t = {stamp / 1e9:.2f} s for {waited:.1f} s "
-                        f"(limit {self._answer_timeout_s:g} s): the controller is silent.{refused} Look at its output."
+                        f"(limit {self._answer_timeout_s:g} s): {self._why_unanswered(before)} Look at its output."
                     )
                 # The first messages can get lost while endpoints still find each other.
                 self._wires.publish_sample(sample, stamp, resend=True)
@@ -108,6 +108,14 @@ class LockstepLoop:
             command = self._backend.robot.actuators.safe_command  # what the backend does with any other
         self._wires.publish_applied(command, stamp)
         return command
+
+    def _why_unanswered(self, before_ns: int | None) -> str:
+        """What came in the place of an answer, if anything; with the stamp that was answered before."""
+        answered_ns = self._wires.answered_ns
+        if answered_ns is not None and answered_ns != before_ns:
+            return f"the last command is stamped t = {answered_ns / 1e9:.2f} s. A command answers an odom by its stamp."
+        refused = f" {self._guard.last_rejection}." if self._guard.last_rejection else ""
+        return f"the controller is silent.{refused}"
 
     def _tell_bearing(self) -> bool:
         """Publish a change of the air bearing before the state that it is true of; returns whether it is off."""

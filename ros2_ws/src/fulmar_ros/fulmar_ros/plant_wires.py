@@ -94,7 +94,7 @@ class PlantWires:
         self._sent = SentStates(guard.watchdog.timeout_ns)
         # Who knows where the robot is from elsewhere answers stamps of another clock.
         self._knows_ages = simulated or odometry
-        self._answered: int | None = None
+        self.answered_ns: int | None = None  # stamp of the newest command that was taken
         self._clock_ns = 0
         self._captured_ns = 0
         self._qos = qos = partial(publisher_qos, lockstep=lockstep)
@@ -228,7 +228,7 @@ class PlantWires:
 
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""
-        return self.lock.wait_for(lambda: self._answered == time_ns, timeout_s)
+        return self.lock.wait_for(lambda: self.answered_ns == time_ns, timeout_s)
 
     def _on_command(self, message: JointState) -> None:
         self._take(message.name, message.effort, stamp_ns(message.header.stamp))
@@ -285,5 +285,5 @@ class PlantWires:
                 self.latency_ms.add(latency_ns / 1e6)
                 self.answers += 1
             if taken:
-                self._answered = stamp
+                self.answered_ns = stamp
             self.lock.notify_all()

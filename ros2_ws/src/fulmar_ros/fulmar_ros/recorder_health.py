@@ -16,6 +16,7 @@ from fulmar_ros.health import Health
 from fulmar_ros.qos import publisher_qos
 
 PERIOD_S = 1.0
+COMMANDERS = "command_publishers"  # key of the publishers of commands that the recorder is matched with
 LITTLE_ROOM = 200_000_000  # bytes free on the disk; below, it is told before it is full
 
 
@@ -23,7 +24,13 @@ class RecorderHealth:
     """Publishes the account of a recording."""
 
     def __init__(
-        self, node: Node, robot: str, directory: Path, account: Callable[[], Account], mode: Callable[[], str]
+        self,
+        node: Node,
+        robot: str,
+        directory: Path,
+        account: Callable[[], Account],
+        mode: Callable[[], str],
+        commanders: Callable[[], int],
     ) -> None:
         """Begin to publish.
 
@@ -33,7 +40,9 @@ class RecorderHealth:
             directory: The bag; its disk is watched.
             account: Asked once a second.
             mode: What the recorder is doing, in a word or two.
+            commanders: Publishers of commands whose messages reach the recorder.
         """
+        self._commanders = commanders
         self._account, self._mode, self._directory = account, mode, directory
         publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._health = Health(f"{robot}: {RECORDER}", [publisher])
@@ -45,6 +54,7 @@ class RecorderHealth:
         level, message = verdict(account, free)
         values = {
             "mode": self._mode(),
+            COMMANDERS: str(self._commanders()),
             "received": str(account.received),
             "recorded": str(account.recorded),
             "dropped": str(sum(account.dropped.values())),

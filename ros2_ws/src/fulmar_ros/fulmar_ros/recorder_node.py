@@ -11,10 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
 from fulmar_core.errors import BagError
 from fulmar_core.exit_codes import DONE, FAILED
-from fulmar_core.topics import WIRES, Wire
+from fulmar_core.topics import COMMAND, VELOCITY_COMMAND, WIRES, Wire
 from fulmar_ros.bag_ring import BagRing
 from fulmar_ros.bag_thread import BagThread
 from fulmar_ros.bag_writer import BagWriter, check_free
@@ -57,14 +58,21 @@ class RecorderNode(Node):
         self._thread = BagThread(self._ring or self._open_bag(), on_error=self.get_logger().error)
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
+        commands: list[Subscription] = []
         for wire, topic in self._topics.items():
             if wire.source == "operator" and wire.delivery == "latched":
                 subscribe_operator(self, classes[wire], wire, self._keep(topic), depth=EVERYTHING, raw=True)
                 continue
             qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
-            self.create_subscription(classes[wire], wire.name, self._keep(topic), qos, raw=True)
+            made = self.create_subscription(classes[wire], wire.name, self._keep(topic), qos, raw=True)
+            commands += [made] if wire in (COMMAND, VELOCITY_COMMAND) else []
         self._health = RecorderHealth(
-            self, self._robot, self._directory, self._thread.account, lambda: self._mode
+            self,
+            self._robot,
+            self._directory,
+            self._thread.account,
+            lambda: self._mode,
+            lambda: sum(each.get_publisher_count() for each in commands),
         )
         told = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
         sys.stdout.write(f"{told} {self._directory}\n")

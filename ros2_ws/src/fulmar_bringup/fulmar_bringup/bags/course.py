@@ -147,7 +147,10 @@ def course_of(
     if observations.left_out:
         warnings.append(f"{observations.left_out} messages of {OBSERVATION.name} cannot be read.")
     seen = _odometry_of(bag, odometry, needed=not len(observations))
-    steps = _steps(observations, commands)
+    # Who stamps commands by another clock, or not at all, answers by the time of recording.
+    unmatched = bool(len(commands)) and not np.isin(commands.stamp_ns, seen.stamp_ns).any()
+    by_time = unmatched and bool(len(seen)) and not len(observations)
+    steps = [] if by_time else _steps(observations, commands)
     if not steps:
         seen = _timed(seen, warnings)
         steps = _even_steps(seen, settings.control_rate(the_robot))
@@ -159,7 +162,9 @@ def course_of(
     answers = np.array([index for _, _, _, index in steps])
     plain = plain_commands(bag) if wire is VELOCITY_COMMAND and not len(commands) else None
     if plain is not None:
-        commands, answers = plain, answers_within(log_ns, plain.log_ns)
+        commands = plain
+    if plain is not None or by_time:
+        answers = answers_within(log_ns, commands.log_ns)
     return Course(
         robot=the_robot,
         task=the_task,

@@ -20,7 +20,8 @@ ControllerOption = Annotated[
     typer.Option(
         "--controller",
         metavar="C",
-        help="policy, a classical controller such as lqr, or your own class: mypackage.mymodule:MyController.",
+        help="policy, a classical controller such as lqr, or your own class: mypackage.mymodule:MyController. "
+        "With `fulmar run` also external: a node that you start.",
     ),
 ]
 PolicyOption = Annotated[

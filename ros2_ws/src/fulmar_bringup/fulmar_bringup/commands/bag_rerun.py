@@ -186,6 +186,11 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
         raise ConfigError(
             f"{bag.path}: '{name}' drove, a class that only this bag names. To run it: --controller {name}."
         )
+    if controller_entry(name).is_external:
+        raise ConfigError(
+            f"{bag.path}: an external controller drove, which is no part of Fulmar and cannot be run again here. "
+            "To compare another one: --controller classical --from odometry."
+        )
     if not controller_entry(name).runs_bundle:
         if policy is not None:
             raise ConfigError(

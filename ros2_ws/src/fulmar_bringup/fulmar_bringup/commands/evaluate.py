@@ -112,11 +112,17 @@ def evaluate(
     from fulmar_core.robot import load_robot
     from fulmar_core.rollout import WORLDS
     from fulmar_core.tasks import load_task
+    from policy_server.controllers import controller_entry
 
     if through not in WAYS:
         raise UnknownNameError("way", through, WAYS)
     use_calibration(calibration, robot)
     check_names(robot, task, controller, "mujoco")
+    if controller_entry(controller).is_external:
+        raise ConfigError(
+            f"controller '{controller}' is a node of your own, which no evaluation can begin anew for each episode. "
+            "Use `fulmar run`, or make it a class: docs/own-controller.md."
+        )
     the_robot, the_task = load_robot(robot), load_task(task)
     check_delays(the_robot, load_scenario(scenario))  # so that mistakes are told before anything is started
     hz = checked_rate(the_robot, control_hz or the_robot.timing.control_hz)

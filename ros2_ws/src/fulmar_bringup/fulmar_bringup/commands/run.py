@@ -173,6 +173,18 @@ def run(
             "the bag keeps the usual one. Give it once for each topic.",
         ),
     ] = None,
+    adapter: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="With --controller external: take commands as the driver of this hardware file sends them, and pass "
+            "them on to the plant. A name from configs/hardware, or a .yaml file.",
+        ),
+    ] = None,
+    topic: Annotated[
+        str | None,
+        typer.Option(metavar="T", help="Topic that --adapter takes; the file's by default."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
@@ -194,6 +206,8 @@ def run(
     fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
 
     fulmar run floating_platform --controller lqr --duration 3600 --recording ring
+
+    fulmar run turtlebot2 --task go_to_position --controller external
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
@@ -243,6 +257,8 @@ def run(
         controller_network=controller_network,
         mocap_hz=mocap_hz,
         remap=remap or (),
+        adapter=adapter,
+        topic=topic,
     )
     plan = request.plan
     for note in {gains_note(robot, name): None for name in (controller, plan.guards.fallback)}:
@@ -319,11 +335,12 @@ def verdict(summary: dict[str, Any]) -> str:
     told += ["touched an obstacle"] if summary["collided"] else []
     length = f"; length of the run {summary['duration_s']:.0f} s"
     lines = [f"{summary['controller']}: {', '.join([reached, *told])}{length}"]
-    if latency["p50"] is not None:
-        lines.append(
-            f"  {summary['steps']} commands, latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms; "
-            f"{summary['overruns']} overruns, {summary['watchdog_trips']} watchdog trips"
-        )
+    if summary["steps"]:
+        answers = latency["p50"] is not None
+        spread = f", latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms" if answers else ""
+        counts = [(summary[key], key) for key in ("overruns", "watchdog_trips")]
+        known = ", ".join(f"{count} {key.replace('_', ' ')}" for count, key in counts if count is not None)
+        lines.append(f"  {summary['steps']} commands{spread}" + (f"; {known}" if known else ""))
     lines += [f"  warning: {warning}" for warning in summary["warnings"]]
     if summary["believed_dead"]:
         lines.append(f"  believed dead: {', '.join(summary['believed_dead'])}")

@@ -20,6 +20,7 @@ SPOKEN = {
     "policy": "policy",
     "classical": "classical law",
     "excite": "excitation",
+    "external": "external controller",
 }
 
 

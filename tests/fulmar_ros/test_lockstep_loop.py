@@ -1,0 +1,47 @@
+"""Lock step without an answer: the error says what came in its place."""
+
+from __future__ import annotations
+
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from fulmar_core.errors import LockstepError
+from fulmar_core.robot import load_robot
+from fulmar_ros.lockstep_loop import LockstepLoop
+from fulmar_ros.simulated_time import SimulatedTime
+
+ROBOT = load_robot("turtlebot2")
+
+
+class Wires:
+    """A plant's wires on which commands come with one stamp, or none come."""
+
+    def __init__(self, stamp_ns: int | None) -> None:
+        self.lock, self.answered_ns, self._stamp_ns = threading.Condition(), None, stamp_ns
+
+    def publish_sample(self, sample: object, time_ns: int, *, resend: bool = False) -> None:
+        self.answered_ns = self._stamp_ns
+
+    def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
+        return self.answered_ns == time_ns
+
+
+@pytest.mark.parametrize(
+    ("stamp_ns", "words"),
+    [
+        (None, "the controller is silent. Look at its output."),
+        (0, "the last command is stamped t = 0.00 s. A command answers an odom by its stamp. Look"),
+        (7_000_000_000, "the last command is stamped t = 7.00 s."),
+    ],
+)
+def test_commands_that_answer_another_stamp_are_named(stamp_ns: int | None, words: str) -> None:
+    backend = SimpleNamespace(robot=ROBOT)
+    guard = SimpleNamespace(last_rejection="")
+    loop = LockstepLoop(
+        backend, Wires(stamp_ns), guard, SimulatedTime(), control_hz=10.0, answer_timeout_s=0.0
+    )
+    with pytest.raises(LockstepError) as caught:
+        loop.run(None, 1, threading.Event())
+    assert words in str(caught.value)
