@@ -16,7 +16,7 @@ ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",
     "robot": "a file of configs/robots, without .yaml",
     "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
-    "controller": "policy, a classical controller such as lqr, a class of your own (mymodule:MyController), or external",
+    "controller": "policy, a classical one such as lqr, mymodule:MyController, or external: a node of yours",
     "backend": "mujoco, mock or hardware",
     "hardware": "a file of configs/hardware, without .yaml, or a path to one",
     "policy": "folder of a policy bundle",
