@@ -13,7 +13,9 @@ from types import ModuleType
 
 import pytest
 
-ARGUMENTS = {"system", "robot", "task", "controller", "backend", "hardware", "policy", "goals"}
+ARGUMENTS = {
+    "system", "robot", "task", "controller", "backend", "hardware", "policy", "goals", "adapter", "topic",
+}  # fmt: skip
 
 
 class Built:
