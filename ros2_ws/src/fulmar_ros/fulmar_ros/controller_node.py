@@ -264,17 +264,17 @@ class ControllerNode(LifecycleNode):
         self._take_odometry(measurement, again=again)
 
     def _take_odometry(self, measurement: Measurement, *, again: bool) -> None:
-        if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
+        lockstep, awaited, guard = self.settings.lockstep, self.settings.wait_for_subscribers, self._guarded
+        if lockstep and awaited and self.wires.subscribers() < awaited:
             return  # the plant asks again
-        if self.settings.lockstep and self._lacks_something_of(measurement.stamp_ns, again=again):
+        if lockstep and self._lacks_something_of(measurement.stamp_ns, again=again):
             self._late = measurement
             return
-        loop = self._guarded.loop
-        if self.settings.lockstep and measurement.stamp_ns == loop.answered_ns:
-            self.wires.publish_command(loop.previous[0], loop.answered_ns)  # the answer got lost
+        if lockstep and measurement.stamp_ns == guard.loop.answered_ns:
+            self.wires.publish_command(guard.loop.previous[0], measurement.stamp_ns)  # the answer got lost
             return
-        usable = self._guarded.take(measurement, time.monotonic_ns())
-        if self.settings.lockstep:
+        usable = guard.take(measurement, time.monotonic_ns())
+        if lockstep:
             self._control(measurement)
             return
         if usable:
@@ -286,7 +286,7 @@ class ControllerNode(LifecycleNode):
         guard, answered_ns = self._guarded, self._guarded.loop.answered_ns
         if guard.mission.lacks_something_of(stamp) or not guard.bearing_known:
             return True
-        if again or self.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
+        if again or guard.loop.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
             return False
         return self._applied.newest_ns < answered_ns and self.wires.state_published()
 

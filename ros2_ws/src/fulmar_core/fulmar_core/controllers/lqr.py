@@ -184,7 +184,7 @@ class Lqr(Law):
         if self.frame.tracks:
             return np.asarray(np.stack(now.motion, axis=-1) - inputs.goal.current)
         to_goal = np.stack(self._aim(inputs, now), axis=-1)
-        distance = np.linalg.norm(to_goal, axis=-1, keepdims=True)
+        distance = np.sqrt((to_goal * to_goal).sum(axis=-1, keepdims=True))
         limit = self._weights.position_error_limit * self.share_of_speed
         if self._weights.braking:
             brake = self.reach.along(-to_goal / np.maximum(distance, 1e-9), now.push[..., :2])[..., None]
