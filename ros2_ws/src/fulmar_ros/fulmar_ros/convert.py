@@ -58,7 +58,7 @@ class OdometryWriter:
             self._message.twist.covariance = _diagonal((speed, speed, 0.0, 0.0, 0.0, turn))
         pose, twist = marks(7), marks(6, after=7)
         self._fill(pose, twist)
-        self.image = WireImage(self._message, pose, twist)
+        self.image = WireImage(self._message, pose, twist, texts=(frame, child_frame))
 
     def raw(self, state: RigidBodyState, time_ns: int) -> bytes:
         """The message of `write` as bytes."""
@@ -154,7 +154,8 @@ class VectorWriter:
         values = marks(len(names))
         self._message = JointState(name=list(names), **{field: values})
         self._field = field
-        self.image = WireImage(self._message, values)
+        counts = 1 + ("position", "velocity", "effort").index(field)
+        self.image = WireImage(self._message, values, texts=("", *names), counts=counts)
 
     def raw(self, values: np.ndarray, time_ns: int) -> bytes:
         """The message of `write` as bytes; one value for each name."""
@@ -180,7 +181,7 @@ class TwistWriter:
         self._message.header.frame_id = "base_link"
         v, w = self._message.twist.linear, self._message.twist.angular
         v.x, v.y, v.z, w.x, w.y, w.z = numbers = marks(6)
-        self.image = WireImage(self._message, numbers)
+        self.image = WireImage(self._message, numbers, texts=("base_link",))
         v.x = v.y = v.z = w.x = w.y = w.z = 0.0
 
     def raw(self, values: np.ndarray, time_ns: int) -> bytes:
