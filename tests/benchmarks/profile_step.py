@@ -23,7 +23,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 WARM_UP_STEPS = 300  # not counted: discovery, first calls, caches
-GIVE_UP_S = 120.0
+BLOCK_STEPS = (
+    25  # timed together; of all blocks the median counts, so that one in which a pair was held does not
+)
+TURN_S = 0.5
 CONTROLLERS = ("lqr", "policy")
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -71,16 +74,21 @@ class Profiler:
 
 
 class Stopwatch:
-    """Notes when each command was published."""
+    """Notes how long each block of steps takes."""
 
     def __init__(self) -> None:
-        self.times_s: list[float] = []
+        self.blocks_s: list[float] = []
+        self._steps, self._began_s = 0, time.perf_counter()
 
     def begin(self) -> None:
         pass
 
     def end(self) -> None:
-        self.times_s.append(time.perf_counter())
+        self._steps += 1
+        if self._steps % BLOCK_STEPS == 0:
+            now_s = time.perf_counter()
+            self.blocks_s.append(now_s - self._began_s)
+            self._began_s = now_s
 
 
 def serve(arguments: argparse.Namespace) -> None:
@@ -114,7 +122,7 @@ def serve(arguments: argparse.Namespace) -> None:
         nonlocal given
         if not given:
             given = True
-            node._on_goal(goal_message(goal_at((2.0, 1.0, 0.5), (-1.0, 2.0, 2.0)), topic, 1))
+            node._on_goal(goal_message(goal_at((2.0, 1.0, 0.5)), topic, 1))
         if steps >= WARM_UP_STEPS:
             watch.begin()
         on_odometry(node, message)
@@ -123,6 +131,8 @@ def serve(arguments: argparse.Namespace) -> None:
         nonlocal steps
         publish_command(wires, *command)
         steps += 1
+        if steps == WARM_UP_STEPS:
+            say("warm")
         if steps > WARM_UP_STEPS:
             watch.end()
         if steps == WARM_UP_STEPS + arguments.steps:
@@ -144,7 +154,7 @@ def say(line: str) -> None:
 
 def _figures(watch: Profiler | Stopwatch) -> dict[str, object]:
     if isinstance(watch, Stopwatch):
-        return {"steps_per_s": (len(watch.times_s) - 1) / (watch.times_s[-1] - watch.times_s[0])}
+        return {"steps_per_s": BLOCK_STEPS / statistics.median(watch.blocks_s)}
     return {"answer": _median(watch.answers), "cycle": _median(watch.cycles)}
 
 
@@ -153,50 +163,112 @@ def _median(steps: list[Calls]) -> dict[str, object]:
     return sorted(steps, key=lambda step: step.count)[len(steps) // 2].figures()
 
 
-def measured(root: Path, controller: str, mode: str, steps: int, arguments: argparse.Namespace) -> dict:
-    """Run one pair of a checkout, and return its figures."""
-    python = root / ".venv" / "bin" / "python"
-    chosen = ["--serve", "--controller", controller, "--mode", mode, "--steps", str(steps)]
-    chosen += ["--robot", arguments.robot, "--task", arguments.task, "--backend", arguments.backend]
-    command = [python, __file__, *chosen]
-    pair = subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True, start_new_session=True)
+class Pair:
+    """A plant and a controller of one checkout, in processes and a ROS domain of their own."""
+
+    def __init__(
+        self, root: Path, controller: str, mode: str, domain: int, arguments: argparse.Namespace
+    ) -> None:
+        steps = arguments.steps if mode == "profile" else arguments.rate_steps
+        command = [
+            root / ".venv" / "bin" / "python",
+            __file__,
+            "--serve",
+            "--mode",
+            mode,
+            "--steps",
+            str(steps),
+        ]
+        command += ["--controller", controller, "--robot", arguments.robot, "--task", arguments.task]
+        own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        self.root = root
+        self._process = subprocess.Popen(
+            [*command, "--backend", arguments.backend],
+            cwd=root,
+            env={**os.environ, **own},
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self._line()  # warm
+
+    @property
+    def over(self) -> bool:
+        """Whether the controller made all its steps."""
+        return self._process.poll() is not None
+
+    def send(self, number: int) -> None:
+        """Send a signal to plant and controller."""
+        os.killpg(self._process.pid, number)
+
+    def figures(self) -> dict:
+        """What the pair measured, once it is over."""
+        return json.loads(self._line())
+
+    def end(self) -> None:
+        """Leave no process behind."""
+        self.send(signal.SIGKILL)
+        self._process.wait()
+
+    def _line(self) -> str:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            self.end()
+            sys.exit(f"{self.root}: the controller ended before its steps were made; its output is above.")
+        return line
+
+
+def profiled(root: Path, controller: str, domain: int, arguments: argparse.Namespace) -> dict:
+    """Files and calls of a step."""
+    pair = Pair(root, controller, "profile", domain, arguments)
     try:
-        said = pair.communicate(timeout=GIVE_UP_S)[0]
+        return pair.figures()
     finally:
-        os.killpg(pair.pid, signal.SIGKILL)  # the plant too
-    if not said:
-        sys.exit(f"{root}: the pair with '{controller}' did not make {steps} steps; its output is above.")
-    return json.loads(said.splitlines()[-1])
+        pair.end()
+
+
+def timed(
+    roots: list[Path], controller: str, domains: list[int], arguments: argparse.Namespace
+) -> list[float]:
+    """Steps a second of every checkout's pair, all alive at once but running in turns of a moment."""
+    pairs: list[Pair] = []
+    try:
+        for root, domain in zip(roots, domains, strict=True):
+            pairs.append(Pair(root, controller, "rate", domain, arguments))
+            pairs[-1].send(signal.SIGSTOP)
+        while not all(pair.over for pair in pairs):
+            for pair in pairs:
+                if not pair.over:
+                    pair.send(signal.SIGCONT)
+                    time.sleep(TURN_S)
+                    pair.send(signal.SIGSTOP)
+        return [pair.figures()["steps_per_s"] for pair in pairs]
+    finally:
+        for pair in pairs:
+            pair.end()
 
 
 def compare(arguments: argparse.Namespace) -> None:
-    """Profile every checkout, measure their rates in turns, and print a table."""
+    """Profile every checkout, measure their rates in turns, and print both."""
     from fulmar_bringup.domains import reserved_domains
 
     roots = [ROOT, *([Path(arguments.against).resolve()] if arguments.against else [])]
-    with reserved_domains(1) as (domain,):
-        os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    with reserved_domains(len(roots)) as domains:
         for controller in CONTROLLERS:
             for root in roots:
-                found = measured(root, controller, "profile", arguments.steps, arguments)
+                found = profiled(root, controller, domains[0], arguments)
                 for part, figures in found.items():
                     say(
                         f"{controller} {part}: {figures['files']} files, {figures['calls']} calls  {root.name}"
                     )
                     if arguments.names:
                         say("   " + "\n   ".join(figures["names"]))
-            rates: dict[Path, list[float]] = {root: [] for root in roots}
-            for _ in range(arguments.repeats):
-                for root in roots:
-                    rates[root].append(
-                        measured(root, controller, "rate", arguments.rate_steps, arguments)["steps_per_s"]
-                    )
-            for root, found in rates.items():
-                every = ", ".join(f"{rate:.0f}" for rate in found)
-                say(f"{controller} lock step: {statistics.median(found):.0f} steps/s ({every})  {root.name}")
+            rates = timed(roots, controller, list(domains), arguments)
+            for root, rate in zip(roots, rates, strict=True):
+                say(f"{controller} lock step: {rate:.0f} steps/s  {root.name}")
             if len(roots) == 2:
-                ours, theirs = (statistics.median(rates[root]) for root in roots)
-                say(f"{controller} lock step: {ours / theirs:.2f} times {roots[1].name}")
+                say(f"{controller} lock step: {rates[0] / rates[1]:.2f} times {roots[1].name}")
 
 
 def main() -> None:
@@ -210,8 +282,7 @@ def main() -> None:
         "--backend", default="mujoco", help="of the plant: mujoco, or mock for no physics at all"
     )
     parser.add_argument("--steps", type=int, default=300, help="profiled steps")
-    parser.add_argument("--rate-steps", type=int, default=3000, help="timed steps of a pair")
-    parser.add_argument("--repeats", type=int, default=3, help="timed pairs of each checkout")
+    parser.add_argument("--rate-steps", type=int, default=6000, help="timed steps of each pair")
     parser.add_argument("--names", action="store_true", help="list the files")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--controller", help=argparse.SUPPRESS)

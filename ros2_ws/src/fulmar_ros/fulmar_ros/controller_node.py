@@ -79,7 +79,8 @@ class ControllerNode(LifecycleNode):
             propose=lambda candidate: self._guarded.succession.propose(candidate),
             warn=self.get_logger().warning,
         )
-        self._read_odometry, self._read_applied = OdometryReader(), VectorReader(self.robot.actuators.names)
+        self._names = self.robot.actuators.names
+        self._read_odometry, self._read_applied = OdometryReader(), VectorReader(self._names)
         self._late: Measurement | None = (
             None  # waits in lock step for the block or the goal of the same stamp
         )
@@ -238,7 +239,7 @@ class ControllerNode(LifecycleNode):
 
     def _on_applied(self, data: bytes) -> None:
         applied = self._read_applied.read(data)
-        names = self.robot.actuators.names
+        names = self._names
         if applied is not None and tuple(applied.names) == names and len(applied.values) == len(names):
             self._applied.add(applied.stamp_ns, np.array(applied.values))
         self._go_on()
