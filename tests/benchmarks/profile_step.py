@@ -190,7 +190,10 @@ class Pair:
             text=True,
             start_new_session=True,
         )
-        self._line()  # warm
+
+    def wait_until_warm(self) -> None:
+        """Wait for the steps that are not counted."""
+        self._line()
 
     @property
     def over(self) -> bool:
@@ -223,6 +226,7 @@ def profiled(root: Path, controller: str, domain: int, arguments: argparse.Names
     """Files and calls of a step."""
     pair = Pair(root, controller, "profile", domain, arguments)
     try:
+        pair.wait_until_warm()
         return pair.figures()
     finally:
         pair.end()
@@ -236,7 +240,10 @@ def timed(
     try:
         for root, domain in zip(roots, domains, strict=True):
             pairs.append(Pair(root, controller, "rate", domain, arguments))
-            pairs[-1].send(signal.SIGSTOP)
+        for pair in pairs:
+            pair.wait_until_warm()
+        for pair in pairs:
+            pair.send(signal.SIGSTOP)
         while not all(pair.over for pair in pairs):
             for pair in pairs:
                 if not pair.over:
