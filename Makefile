@@ -125,6 +125,10 @@ test: dev ## Run the tests, but for those that take more than ten seconds
 test-all: dev ## Run every test
 	@$(call run_tests,)
 
+.PHONY: profile-step
+profile-step: dev ## Profile a step of the live controller and its lock step (AGAINST=DIR: beside another checkout)
+	@$(BIN)/python tests/benchmarks/profile_step.py $(if $(AGAINST),--against $(AGAINST))
+
 .PHONY: check
 check: dev ## Check format, lint, types, import contracts and spelling
 	$(BIN)/ruff format --check .

@@ -15,6 +15,7 @@ TARGETS = {
     "dev",
     "demo",
     "train-demo",
+    "profile-step",
     "test",
     "test-all",
     "check",

@@ -5,16 +5,19 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+import signal
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 import rclpy
-from geometry_msgs.msg import PointStamped, TwistStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 
 from fulmar_core.errors import ConfigError
+from fulmar_core.goal_files import single_goal
 from fulmar_core.topics import GOAL_WIRES
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.goal_node import GoalNode
@@ -23,7 +26,7 @@ from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, start_fulmar
-from tests.ros.neighbour import NAMESPACE, Neighbour, Stream, until
+from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, until
 
 pytestmark = pytest.mark.real_time
 
@@ -87,6 +90,20 @@ def goal_node(tmp_path, text: str, **parameters: object) -> Iterator[tuple[GoalN
         arguments += ["-p", f"{name}:={value}"]
     codes: list[int] = []
     node = GoalNode(codes.append, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        yield node, codes
+        node.stop()
+
+
+@contextlib.contextmanager
+def single_goal_node(*place: float, **parameters: object) -> Iterator[tuple[GoalNode, list[int]]]:
+    """A goal node for one place, as the command line gives it."""
+    space = f"/{parameters.get('robot', ROBOT)}"
+    arguments = ["--ros-args", "-r", f"__ns:={space}"]
+    for name, value in parameters.items():
+        arguments += ["-p", f"{name}:={value}"]
+    codes: list[int] = []
+    node = GoalNode(codes.append, goals=single_goal(place), cli_args=arguments)
     with spinning(node, lambda error: pytest.fail(repr(error))):
         yield node, codes
         node.stop()
@@ -248,6 +265,43 @@ def test_goals_for_a_robot_that_is_not_up_end_with_one_line(tmp_path, ros_domain
     assert "nothing comes on /floating_platform/odom (after 5 s)" in line
     assert "--wait" in line
     assert "WARN" not in done.stderr
+
+
+def test_a_pose_on_the_command_line_becomes_the_goal_of_a_running_controller(
+    tmp_path, neighbour: Neighbour, stream: Stream, controller: Any, ros_domain: RosDomain
+) -> None:
+    """And of whoever subscribes as a node does by default, with a stamp."""
+    got: list[PoseStamped] = []
+    neighbour.node.create_subscription(PoseStamped, "goal_pose", got.append, 10)
+    words = ("goals", "--robot", "floating_platform", "--pose", "3,1,90")
+    command = start_fulmar(*words, env=ros_domain.env, cwd=tmp_path)
+    try:
+        until(lambda: bool(np.allclose(controller.guard.loop.goal.current, [3.0, 1.0, math.pi / 2])), 20.0)
+        until(
+            lambda: any(stamp_ns(message.header.stamp) and message.pose.position.y == 1.0 for message in got)
+        )
+        command.send_signal(signal.SIGINT)
+        _, said = command.communicate(timeout=20.0)
+    finally:
+        if command.poll() is None:
+            command.kill()
+    assert command.returncode == 0, said
+    (line,) = [line for line in said.splitlines() if "published" in line]
+    assert "pose x = 3 m, y = 1 m, heading = 90 deg on /floating_platform/goal_pose" in line
+
+
+@pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)
+@pytest.mark.parametrize("topic", ["goal_velocity", "goal_path"])
+def test_a_pose_for_a_controller_that_takes_other_goals_ends_with_one_line(
+    topic: str, neighbour: Neighbour, capfd
+) -> None:
+    listener = neighbour.node.create_subscription(TYPES[topic], topic, lambda _message: None, 10)
+    arguments = {"robot": "turtlebot2", "give_up_s": 0.5, **PATIENT}
+    with single_goal_node(1.0, 2.0, 90.0, **arguments) as (_, codes), streaming(neighbour):
+        until(lambda: codes == [1])
+    neighbour.node.destroy_subscription(listener)
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if "ERROR" in line]
+    assert "no controller subscribes" in line and f"the one that runs takes {topic}" in line
 
 
 @pytest.mark.slow

@@ -119,6 +119,19 @@ class FollowedPath:
 GoalFile = Positions | Poses | Velocities | FollowedPath
 
 
+def single_goal(place: tuple[float, ...]) -> Positions | Poses:
+    """One place as a goal file would hold it.
+
+    Args:
+        place: x [m], y [m] and, for a pose, heading [deg].
+    """
+    x, y, *heading = place
+    if not heading:
+        return Positions("positions", f"position x = {x:g} m, y = {y:g} m", ((x, y),))
+    title = f"pose x = {x:g} m, y = {y:g} m, heading = {heading[0]:g} deg"
+    return Poses("poses", title, ((x, y, heading[0]),))
+
+
 def load_goals(name: str) -> GoalFile:
     """Read `configs/goals/<name>.yaml`, or a file anywhere.
 

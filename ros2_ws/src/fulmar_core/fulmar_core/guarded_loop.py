@@ -14,7 +14,7 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.goal import Goal
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.mission import Mission
-from fulmar_core.planar import planar_of
+from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
 from fulmar_core.safety.area import outside
@@ -92,6 +92,7 @@ class GuardedLoop:
         )
         self.mission = Mission(self.loop, streamed=settings.goals_streamed)
         self.newest: Measurement | None = None
+        self._newest_state: PlanarState  # of `newest`, shapes (1,)
         self.acted = 0
         self.refusal = Refusal()
         self._settings, self._estop = settings, estop
@@ -190,6 +191,7 @@ class GuardedLoop:
                 self._change(input_problem=problem)
                 return False
             self.newest, self._newest_epoch = measurement, self._gate.epoch
+            self._newest_state = planar_of(measurement.state)[None]
             self.mission.turn_to(measurement.stamp_ns)
             self._follow_mission(
                 last_input_ns=now_ns, input_problem="", outside=self._flags.outside or self._outside()
@@ -257,7 +259,8 @@ class GuardedLoop:
             self.loop.reset()
 
     def _inputs(self, measurement: Measurement) -> Inputs:
-        return self.loop.inputs(planar_of(measurement.state)[None], measurement.stamp_ns)
+        state = self._newest_state if measurement is self.newest else planar_of(measurement.state)[None]
+        return self.loop.inputs(state, measurement.stamp_ns)
 
     def _follow_succession(self, before: Standby) -> bool:
         changed = self.succession.current is not before
@@ -281,7 +284,7 @@ class GuardedLoop:
         """Let the flags say what the mission lacks, and how far its goal is away."""
         distance = float("inf")
         if self.newest is not None:
-            distance = self.mission.distance(planar_of(self.newest.state)[None])
+            distance = self.mission.distance(self._newest_state)
         lacking = self.mission.lacking
         self._change(has_goal=not lacking, lacking=lacking, goal_distance=distance, **changes)
 
@@ -293,4 +296,5 @@ class GuardedLoop:
         return outside(x, y, self._settings.area)
 
     def _change(self, **changes: object) -> None:
-        self._flags = replace(self._flags, **changes)  # type: ignore[arg-type]
+        for name, value in changes.items():
+            setattr(self._flags, name, value)

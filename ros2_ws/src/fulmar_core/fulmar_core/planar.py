@@ -6,6 +6,8 @@ One array for each quantity, so that thousands of worlds lie side by side in mem
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import partial
+from operator import attrgetter, itemgetter
 from typing import Any
 
 import numpy as np
@@ -28,7 +30,7 @@ class PlanarState:
 
     def __getitem__(self, index: Any) -> PlanarState:
         """Pick worlds out of a batch."""
-        return PlanarState(*(getattr(self, name)[index] for name in COLUMNS))
+        return PlanarState(*map(itemgetter(index), _columns(self)))
 
     def write(self, index: Any, other: PlanarState) -> None:
         """Overwrite some worlds of a batch in place, as a reset does."""
@@ -47,6 +49,8 @@ class PlanarState:
 
 
 COLUMNS = tuple(f.name for f in fields(PlanarState))
+_columns = attrgetter(*COLUMNS)
+_float64 = partial(np.asarray, dtype=float)
 
 
 def to_body(yaw: Array, x: Array, y: Array) -> tuple[Array, Array]:
@@ -70,7 +74,7 @@ def at_rest(x: Array, y: Array, yaw: Array) -> PlanarState:
 
 def in_float64(state: PlanarState) -> PlanarState:
     """The same state as NumPy arrays of float64."""
-    return PlanarState(*(np.asarray(getattr(state, name), dtype=float) for name in COLUMNS))
+    return PlanarState(*map(_float64, _columns(state)))
 
 
 def planar_of(state: RigidBodyState) -> PlanarState:

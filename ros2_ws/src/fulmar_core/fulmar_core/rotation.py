@@ -85,7 +85,7 @@ def yaw_of(quat_xyzw: Array) -> Array:
         Yaw, shape (...,) [rad], in (-pi, pi].
     """
     xp = array_namespace(quat_xyzw)
-    x, y, z, w = (quat_xyzw[..., i] for i in range(4))
+    x, y, z, w = quat_xyzw[..., 0], quat_xyzw[..., 1], quat_xyzw[..., 2], quat_xyzw[..., 3]
     return xp.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 

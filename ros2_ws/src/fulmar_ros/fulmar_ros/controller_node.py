@@ -9,9 +9,7 @@ from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
@@ -30,15 +28,17 @@ from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
+from fulmar_core.topics import ODOMETRY
 from fulmar_ros.control_beat import ControlBeat
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.message_reader import block_of, goal_of, measurement_of, obstacles_of, stamp_ns
+from fulmar_ros.message_reader import block_of, goal_of, obstacles_of, stamp_ns
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
+from fulmar_ros.wire_readers import OdometryReader, VectorReader
 from fulmar_ros.wire_watch import WireWatch
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -79,7 +79,11 @@ class ControllerNode(LifecycleNode):
             propose=lambda candidate: self._guarded.succession.propose(candidate),
             warn=self.get_logger().warning,
         )
-        self._late: Odometry | None = None  # waits in lock step for the block or the goal of the same stamp
+        self._names = self.robot.actuators.names
+        self._read_odometry, self._read_applied = OdometryReader(), VectorReader(self._names)
+        self._late: Measurement | None = (
+            None  # waits in lock step for the block or the goal of the same stamp
+        )
         self._pause_ns = self.settings.pause_ns(self.robot)
         self._applied = AppliedHistory(self.settings.hold_ns(self.robot))
         self._belief_reader = BeliefReader(self.robot) if can_be_watched(self.robot) else None
@@ -233,9 +237,11 @@ class ControllerNode(LifecycleNode):
         self._guarded.take_block(place, stamp_ns(message.header.stamp))
         self._go_on()
 
-    def _on_applied(self, message: JointState) -> None:
-        if tuple(message.name) == self.robot.actuators.names and len(message.effort) == len(message.name):
-            self._applied.add(stamp_ns(message.header.stamp), np.array(message.effort))
+    def _on_applied(self, data: bytes) -> None:
+        applied = self._read_applied.read(data)
+        names = self._names
+        if applied is not None and tuple(applied.names) == names and len(applied.values) == len(names):
+            self._applied.add(applied.stamp_ns, np.array(applied.values))
         self._go_on()
 
     def _on_bearing(self, message: Bool) -> None:
@@ -249,24 +255,27 @@ class ControllerNode(LifecycleNode):
         if late is not None:
             self._take_odometry(late, again=False)
 
-    def _on_odometry(self, message: Odometry) -> None:
+    def _on_odometry(self, data: bytes) -> None:
+        measurement = self._read_odometry.read(data)
+        if measurement is None:
+            self.get_logger().warning(f"a message on {ODOMETRY.name} is damaged: {len(data)} bytes, left out")
+            return
         # A plant in lock step asks again: what has not come by then got lost.
-        again = self._late is not None and self._late.header.stamp == message.header.stamp
-        self._take_odometry(message, again=again)
+        again = self._late is not None and self._late.stamp_ns == measurement.stamp_ns
+        self._take_odometry(measurement, again=again)
 
-    def _take_odometry(self, message: Odometry, *, again: bool) -> None:
-        if self.settings.lockstep and self.wires.subscribers() < self.settings.wait_for_subscribers:
+    def _take_odometry(self, measurement: Measurement, *, again: bool) -> None:
+        lockstep, awaited, guard = self.settings.lockstep, self.settings.wait_for_subscribers, self._guarded
+        if lockstep and awaited and self.wires.subscribers() < awaited:
             return  # the plant asks again
-        measurement = measurement_of(message)
-        if self.settings.lockstep and self._lacks_something_of(measurement.stamp_ns, again=again):
-            self._late = message
+        if lockstep and self._lacks_something_of(measurement.stamp_ns, again=again):
+            self._late = measurement
             return
-        loop = self._guarded.loop
-        if self.settings.lockstep and measurement.stamp_ns == loop.answered_ns:
-            self.wires.publish_command(loop.previous[0], loop.answered_ns)  # the answer got lost
+        if lockstep and measurement.stamp_ns == guard.loop.answered_ns:
+            self.wires.publish_command(guard.loop.previous[0], measurement.stamp_ns)  # the answer got lost
             return
-        usable = self._guarded.take(measurement, time.monotonic_ns())
-        if self.settings.lockstep:
+        usable = guard.take(measurement, time.monotonic_ns())
+        if lockstep:
             self._control(measurement)
             return
         if usable:
@@ -278,7 +287,7 @@ class ControllerNode(LifecycleNode):
         guard, answered_ns = self._guarded, self._guarded.loop.answered_ns
         if guard.mission.lacks_something_of(stamp) or not guard.bearing_known:
             return True
-        if again or self.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
+        if again or guard.loop.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
             return False
         return self._applied.newest_ns < answered_ns and self.wires.state_published()
 

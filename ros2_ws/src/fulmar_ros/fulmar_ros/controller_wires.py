@@ -58,14 +58,14 @@ class ControllerWires:
         task: Task,
         observation_names: tuple[str, ...],
         *,
-        on_odometry: Callable[[Odometry], None],
+        on_odometry: Callable[[bytes], None],
         on_goal: Callable[[GoalMessage], None],
         on_obstacles: Callable[[MarkerArray], None],
         on_block: Callable[[PoseStamped], None],
         on_estop: Callable[[Bool], None],
         on_estop_released: Callable[[String], None],
         on_swap: Callable[[String], None],
-        on_applied: Callable[[JointState], None],
+        on_applied: Callable[[bytes], None],
         on_bearing: Callable[[Bool], None] | None,
         lockstep: bool,
     ) -> None:
@@ -76,14 +76,14 @@ class ControllerWires:
             robot: The robot.
             task: Says on which topic goals come.
             observation_names: Of the terms that the controller observes.
-            on_odometry: Told every odometry message.
+            on_odometry: Receives every odometry message, serialised.
             on_goal: Told every goal.
             on_obstacles: Told all obstacles whenever they change.
             on_block: Told where the block is.
             on_estop: Told whether the e-stop is pressed.
             on_estop_released: Called after each reset of the e-stop.
             on_swap: Told which policy shall go on.
-            on_applied: Receives what the actuators do, of robots whose actuators can be watched.
+            on_applied: Receives what the actuators do, serialised, of robots whose actuators can be watched.
             on_bearing: Receives whether the air bearing is on; None where there is none.
             lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag
                 behind.
@@ -113,7 +113,7 @@ class ControllerWires:
         ]
         self._publishers = (*self._streams, self._metadata, status, diagnostics)
         self._write_command = self._command_writer()
-        self._newest: TwistStamped | JointState | None = None
+        self._newest: bytes | None = None
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_health = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(observation_names, "position")
@@ -127,10 +127,10 @@ class ControllerWires:
         if can_be_watched(robot):
             applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
             self._subscriptions.append(
-                node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied)
+                node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)
             )
         self._subscriptions += [
-            node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos),
+            node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True),
             *subscribe_operator(node, Bool, ESTOP, on_estop),
             node.create_subscription(String, ESTOP_RELEASED.name, on_estop_released, released),
             node.create_subscription(String, SWAP.name, on_swap, subscriber_qos(SWAP, reliable=True)),
@@ -162,7 +162,7 @@ class ControllerWires:
 
     def publish_command(self, command: np.ndarray, stamp: int) -> None:
         """Publish a command that answers the observation of this stamp [ns]."""
-        self._newest = self._write_command.write(command, stamp)
+        self._newest = self._write_command.raw(command, stamp)
         self._publish(self._command, self._newest)
 
     def repeat_command(self) -> None:
@@ -176,7 +176,7 @@ class ControllerWires:
 
     def publish_safe(self, stamp: int) -> None:
         """Publish the safe command; with a message of its own, so that any thread may."""
-        self._publish(self._command, self._command_writer().write(self._actuators.safe_command, stamp))
+        self._publish(self._command, self._command_writer().raw(self._actuators.safe_command, stamp))
 
     def destroy(self, node: LifecycleNode) -> None:
         """Give every endpoint back."""
@@ -192,9 +192,9 @@ class ControllerWires:
     def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
         """Publish the very vectors behind a command, where somebody listens."""
         if self._observation.get_subscription_count():
-            self._publish(self._observation, self._write_observation.write(observation, stamp))
+            self._publish(self._observation, self._write_observation.raw(observation, stamp))
         if self._action.get_subscription_count():
-            self._publish(self._action, self._write_action.write(action, stamp))
+            self._publish(self._action, self._write_action.raw(action, stamp))
 
     @property
     def health_wanted(self) -> bool:
@@ -204,7 +204,7 @@ class ControllerWires:
     def publish_actuators_health(self, effectiveness: np.ndarray, stamp: int) -> None:
         """Publish what is believed of each actuator; only where that is wanted."""
         assert self._health is not None
-        self._publish(self._health, self._write_health.write(effectiveness, stamp))
+        self._publish(self._health, self._write_health.raw(effectiveness, stamp))
 
     def publish_metadata(self, text: str) -> None:
         """Say who controls: a JSON object."""

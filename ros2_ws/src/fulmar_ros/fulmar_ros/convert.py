@@ -1,7 +1,7 @@
 """From the core's types to ROS messages; `message_reader` goes the other way.
 
 Messages are filled in place by writers that keep one message each: building an Odometry anew costs more than
-everything else a control step does.
+everything else a control step does. What a control step publishes is written as bytes, see `wire_image`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.message_reader import NS, turned
+from fulmar_ros.wire_image import LATEST_NS, WireImage, marks
 
-LATEST_NS = 2**31 * NS  # seconds of a message have 32 bits
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
 
 
@@ -32,7 +32,11 @@ def stamp_of(time_ns: int) -> Time:
 
 
 class OdometryWriter:
-    """States as `odom` → `base_link` odometry."""
+    """States as `odom` → `base_link` odometry.
+
+    Attributes:
+        image: Layout of its messages in bytes.
+    """
 
     def __init__(
         self, spec: OdometrySpec | None, *, frame: str = "odom", child_frame: str = "base_link"
@@ -52,6 +56,13 @@ class OdometryWriter:
             self._message.pose.covariance = _diagonal((place, place, 0.0, 0.0, 0.0, heading))
             speed, turn = spec.velocity.std, spec.yaw_rate.std
             self._message.twist.covariance = _diagonal((speed, speed, 0.0, 0.0, 0.0, turn))
+        pose, twist = marks(7), marks(6, after=7)
+        self._fill(pose, twist)
+        self.image = WireImage(self._message, pose, twist, texts=(frame, child_frame))
+
+    def raw(self, state: RigidBodyState, time_ns: int) -> bytes:
+        """The message of `write` as bytes."""
+        return self.image.write(time_ns, *_pose_and_twist(state))
 
     def write(self, state: RigidBodyState, time_ns: int) -> Odometry:
         """Fill the message; it is overwritten by the next call.
@@ -60,17 +71,23 @@ class OdometryWriter:
             state: Without a batch axis.
             time_ns: Time of measurement [ns].
         """
-        message = self._message
-        message.header.stamp = stamp_of(time_ns)
-        pose, twist = message.pose.pose, message.twist.twist
-        pose.position.x, pose.position.y, pose.position.z = state.position_in_world.tolist()
-        q = pose.orientation
-        x, y, z, w = state.quat_xyzw.tolist()
-        q.x, q.y, q.z, q.w = x, y, z, w
-        velocity = turned((x, y, z, -w), state.velocity_in_world.tolist())
-        twist.linear.x, twist.linear.y, twist.linear.z = velocity
-        twist.angular.x, twist.angular.y, twist.angular.z = state.angular_velocity_in_body.tolist()
-        return message
+        self._message.header.stamp = stamp_of(time_ns)
+        self._fill(*_pose_and_twist(state))
+        return self._message
+
+    def _fill(self, pose: Sequence[float], twist: Sequence[float]) -> None:
+        position, q = self._message.pose.pose.position, self._message.pose.pose.orientation
+        position.x, position.y, position.z, q.x, q.y, q.z, q.w = pose
+        v, w = self._message.twist.twist.linear, self._message.twist.twist.angular
+        v.x, v.y, v.z, w.x, w.y, w.z = twist
+
+
+def _pose_and_twist(state: RigidBodyState) -> tuple[Sequence[float], Sequence[float]]:
+    """Place and quaternion in the world, velocity and turn rate in the body."""
+    x, y, z, w = state.quat_xyzw.tolist()
+    velocity = turned((x, y, z, -w), state.velocity_in_world.tolist())
+    pose = (*state.position_in_world.tolist(), x, y, z, w)
+    return pose, (*velocity, *state.angular_velocity_in_body.tolist())
 
 
 class PoseWriter:
@@ -121,7 +138,11 @@ class ImuWriter:
 
 
 class VectorWriter:
-    """Named vectors as JointState: commands and states in `effort`, observations in `position`."""
+    """Named vectors as JointState: commands and states in `effort`, observations in `position`.
+
+    Attributes:
+        image: Layout of its messages in bytes.
+    """
 
     def __init__(self, names: Sequence[str], field: str = "effort") -> None:
         """Fill in the names.
@@ -130,8 +151,15 @@ class VectorWriter:
             names: Of the entries, in order.
             field: Which array of the message carries the values.
         """
-        self._message = JointState(name=list(names))
+        values = marks(len(names))
+        self._message = JointState(name=list(names), **{field: values})
         self._field = field
+        counts = 1 + ("position", "velocity", "effort").index(field)
+        self.image = WireImage(self._message, values, texts=("", *names), counts=counts)
+
+    def raw(self, values: np.ndarray, time_ns: int) -> bytes:
+        """The message of `write` as bytes; one value for each name."""
+        return self.image.write(time_ns, np.asarray(values, dtype=float).tolist())
 
     def write(self, values: np.ndarray, time_ns: int) -> JointState:
         """Fill the message; it is overwritten by the next call."""
@@ -141,12 +169,25 @@ class VectorWriter:
 
 
 class TwistWriter:
-    """Speed and turn rate as TwistStamped."""
+    """Speed and turn rate as TwistStamped.
+
+    Attributes:
+        image: Layout of its messages in bytes.
+    """
 
     def __init__(self) -> None:
         """Fill in what never changes."""
         self._message = TwistStamped()
         self._message.header.frame_id = "base_link"
+        v, w = self._message.twist.linear, self._message.twist.angular
+        v.x, v.y, v.z, w.x, w.y, w.z = numbers = marks(6)
+        self.image = WireImage(self._message, numbers, texts=("base_link",))
+        v.x = v.y = v.z = w.x = w.y = w.z = 0.0
+
+    def raw(self, values: np.ndarray, time_ns: int) -> bytes:
+        """The message of `write` as bytes."""
+        speed, turn_rate = (float(v) for v in values)
+        return self.image.write(time_ns, (speed, 0.0, 0.0, 0.0, 0.0, turn_rate))
 
     def write(self, values: np.ndarray, time_ns: int) -> TwistStamped:
         """Fill the message with (speed [m/s], turn rate [rad/s]); it is overwritten by the next call."""

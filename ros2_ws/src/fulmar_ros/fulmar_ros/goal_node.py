@@ -17,7 +17,7 @@ from rclpy.node import Node
 
 from fulmar_core.exit_codes import DONE, FAILED
 from fulmar_core.goal import Goal
-from fulmar_core.goal_files import load_goals
+from fulmar_core.goal_files import GoalFile, load_goals
 from fulmar_core.goal_sequence import STANDSTILL, goal_sequence
 from fulmar_core.paths import config_names
 from fulmar_core.planar import planar_of
@@ -66,11 +66,18 @@ class GoalSettings:
 class GoalNode(Node):
     """Publishes a goal when it differs from the last one, in the time of the odometry that it answers."""
 
-    def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
+    def __init__(
+        self,
+        request_exit: RequestExit,
+        *,
+        goals: GoalFile | None = None,
+        cli_args: list[str] | None = None,
+    ) -> None:
         """Read the parameters and the goals, and wait for odometry.
 
         Args:
             request_exit: Ends the process, once everything is done.
+            goals: One goal instead of the file that the parameter `goals` names; the node logs that it published it.
             cli_args: ROS arguments of this node alone, where it shares a process.
 
         Raises:
@@ -79,7 +86,9 @@ class GoalNode(Node):
         super().__init__("goals", cli_args=cli_args)
         self._settings = read_parameters(self, GoalSettings)
         robot = load_robot(self._settings.robot)
-        goals = load_goals(self._settings.goals)
+        self._single = goals is not None
+        goals = goals or load_goals(self._settings.goals)
+        self._title = goals.title
         self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
         self._request_exit = request_exit
         self._gate = InputGate(robot.limits, frozen_after=0)  # whether a sensor is stuck, controllers judge
@@ -106,7 +115,8 @@ class GoalNode(Node):
             Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
         )
         self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.get_logger().info(f"{goals.title}: goals for {robot.name} on {self._publisher.topic_name}")
+        if not self._single:
+            self.get_logger().info(f"{goals.title}: goals for {robot.name} on {self._publisher.topic_name}")
 
     def _on_odometry(self, message: Odometry) -> None:
         measurement = measurement_of(message)
@@ -152,6 +162,8 @@ class GoalNode(Node):
     def _tell(self, goal: Goal, stamp_ns: int) -> None:
         self._message = goal_message(goal, self._sequence.topic, stamp_ns)
         self._publisher.publish(self._message)
+        if self._single and self._told is None:
+            self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
         self._told, self._told_at_ns = goal, self._time_ns
 
     def _tell_progress(self) -> None:
@@ -228,11 +240,16 @@ class GoalNode(Node):
     def _without_subscriber(self) -> str:
         """Which topic has no subscriber, and which tasks have one; empty where there is one."""
         topic = self._publisher.topic_name
-        listeners = {info.node_name for info in self.get_subscriptions_info_by_topic(topic)} - {"recorder"}
-        if listeners:
+        if self._subscribed(topic):
             return ""
         tasks = [name for name in config_names("tasks") if _topic_of(name) == self._sequence.topic]
-        return f"no controller subscribes {topic}; one does with one of the tasks {', '.join(tasks)}"
+        taken = [name for name in GOAL_WIRES if self._subscribed(self.resolve_topic_name(name))]
+        instead = f"; the one that runs takes {' and '.join(taken)}" if taken else ""
+        return f"no controller subscribes {topic}; one does with one of the tasks {', '.join(tasks)}{instead}"
+
+    def _subscribed(self, topic: str) -> bool:
+        """Whether a node other than a recorder subscribes a topic."""
+        return any(info.node_name != "recorder" for info in self.get_subscriptions_info_by_topic(topic))
 
     def stop(self) -> None:
         """Last words: a robot that was told a velocity is told to stand still."""

@@ -41,13 +41,13 @@ from fulmar_core.topics import (
 from fulmar_ros.command_writers import writers_of
 from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
 from fulmar_ros.deadline import Spread
-from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.paced_capture import MakeCapture
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.sent_states import SentStates
 from fulmar_ros.simulated_time import SimulatedTime
+from fulmar_ros.wire_readers import TwistReader, VectorReader
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
@@ -111,17 +111,17 @@ class PlantWires:
         self._write_truth = OdometryWriter(None, frame="map")
         self._write_imu = ImuWriter(robot)
         self._write_state = VectorWriter(robot.actuators.names)
-        self._names = robot.actuators.names
         self._node = node
         self._block: Publisher | None = None
         wire = command_wire(robot)
         # By the clock the newest command counts. A reliable reader would hold it back while one that a network lost is
         # asked for again, which takes seconds.
         commands = subscriber_qos(wire, reliable=lockstep)
-        self._commands = (
-            node.create_subscription(TwistStamped, wire.name, self._on_velocity, commands)
-            if wire is VELOCITY_COMMAND
-            else node.create_subscription(JointState, wire.name, self._on_command, commands)
+        names = robot.actuators.names
+        by_velocity = wire is VELOCITY_COMMAND
+        self._reader = TwistReader(names) if by_velocity else VectorReader(names)
+        self._commands = node.create_subscription(
+            TwistStamped if by_velocity else JointState, wire.name, self._on_command, commands, raw=True
         )
         released = subscriber_qos(ESTOP_RELEASED, reliable=True)
         self._operator = [
@@ -174,7 +174,7 @@ class PlantWires:
         if sample.block is not None:
             self._publish_block(sample.block, time_ns)
         if self._odometry is not None and sample.odometry is not None:
-            self._publish(self._odometry, self._write_odometry.write(sample.odometry, time_ns))
+            self._publish(self._odometry, self._write_odometry.raw(sample.odometry, time_ns))
         if resend:
             return
         if sample.imu is not None and self._imu.get_subscription_count():
@@ -205,12 +205,12 @@ class PlantWires:
     def publish_truth(self, sample: Sample, time_ns: int) -> None:
         """Publish where the robot really is, if the backend knows and somebody listens."""
         if self._truth is not None and sample.truth is not None and self._truth.get_subscription_count():
-            self._publish(self._truth, self._write_truth.write(sample.truth, time_ns))
+            self._publish(self._truth, self._write_truth.raw(sample.truth, time_ns))
 
     def publish_applied(self, command: np.ndarray, time_ns: int) -> None:
         """Publish what the actuators are doing from this time on, if somebody listens."""
         if self._state.get_subscription_count():
-            self._publish(self._state, self._write_state.write(command, time_ns))
+            self._publish(self._state, self._write_state.raw(command, time_ns))
 
     def end_capture(self) -> None:
         """Publish no pose any more before the next measurement."""
@@ -230,12 +230,10 @@ class PlantWires:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""
         return self.lock.wait_for(lambda: self.answered_ns == time_ns, timeout_s)
 
-    def _on_command(self, message: JointState) -> None:
-        self._take(message.name, message.effort, stamp_ns(message.header.stamp))
-
-    def _on_velocity(self, message: TwistStamped) -> None:
-        values = (message.twist.linear.x, message.twist.angular.z)
-        self._take(self._names, values, stamp_ns(message.header.stamp))
+    def _on_command(self, data: bytes) -> None:
+        command = self._reader.read(data)
+        if command is not None:  # what is damaged feeds no watchdog
+            self._take(command.names, command.values, command.stamp_ns)
 
     def _on_estop(self, message: Bool) -> None:
         with self.lock:

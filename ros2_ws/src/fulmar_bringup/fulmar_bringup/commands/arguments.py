@@ -76,8 +76,12 @@ def read_area(text: str | None) -> Area | None:
     return x_min, x_max, y_min, y_max
 
 
-def read_goal(text: str | None) -> tuple[float, ...] | None:
-    """Read `x,y` or `x,y,deg` of --goal: x [m], y [m] and, for a pose, heading [deg].
+def read_goal(text: str | None, option: str = "--goal") -> tuple[float, ...] | None:
+    """Read `x,y` or `x,y,deg`: x [m], y [m] and, for a pose, heading [deg].
+
+    Args:
+        text: What was written, or None.
+        option: Name of the option, for messages.
 
     Raises:
         ConfigError: If it is not two or three finite numbers.
@@ -90,8 +94,8 @@ def read_goal(text: str | None) -> tuple[float, ...] | None:
         values = ()
     if len(values) not in (2, 3) or not all(math.isfinite(value) for value in values):
         raise ConfigError(
-            f"--goal = '{text}' must be two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
-            "Example: --goal 1,-0.5 or --goal 1,-0.5,90"
+            f"{option} = '{text}' must be two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
+            f"Example: {option} 1,-0.5 or {option} 1,-0.5,90"
         )
     return values
 

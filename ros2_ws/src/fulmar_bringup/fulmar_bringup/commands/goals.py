@@ -1,4 +1,4 @@
-"""`fulmar goals`: tell a running robot, from a file, where to go or how to move."""
+"""`fulmar goals`: send a running robot goals, from a file or one from the command line."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from fulmar_bringup.commands.arguments import read_goal
 from fulmar_bringup.commands.list import list_names
 from fulmar_core.errors import ConfigError
 
@@ -23,6 +24,14 @@ def goals(
     robot: Annotated[
         str | None, typer.Option(metavar="R", help="Who is to do it: a name from `fulmar list robots`.")
     ] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            "--pose",
+            metavar="X,Y,DEG",
+            help="One goal instead of a file: x [m], y [m], heading [deg]; or x,y for a position.",
+        ),
+    ] = None,
     as_path: Annotated[
         bool,
         typer.Option(
@@ -39,8 +48,9 @@ def goals(
 ) -> None:
     """Tell a running robot its goals, one after the other, until they are done or Ctrl-C.
 
-    Positions, poses, velocities by the clock, or a path to follow: a file in configs/goals says which. The robot must
-    be up, with a controller whose task takes such goals; velocities end in standstill.
+    Positions, poses, velocities by the clock, or a path to follow: a file in configs/goals says which; or one pose or
+    position from the command line. The robot must be up, with a controller whose task takes such goals; velocities end
+    in standstill.
 
     Try, in one terminal:
 
@@ -50,28 +60,38 @@ def goals(
 
     fulmar goals lab_circle --robot floating_platform
 
+    or, where the robot's task is go_to_pose:
+
+    fulmar goals --robot floating_platform --pose 1,-0.5,90
+
     Exit code: 0 done, or stopped by Ctrl-C, 1 there is no robot or no controller that takes such goals.
     """
-    if name is None:
+    if name is None and pose is None:
         list_names("goals")
         return
+    if name is not None and pose is not None:
+        raise ConfigError(f"'{name}' and --pose are two goals: give one of them.")
+    place = read_goal(pose, "--pose")
     if robot is None:
-        raise ConfigError(f"whose goals? Example: fulmar goals {name} --robot floating_platform")
+        example = name if place is None else f"--pose {pose}"
+        raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
     from fulmar_bringup.goal_plan import check_pace
     from fulmar_bringup.node_table import goals_spec
     from fulmar_bringup.processes import command_line
-    from fulmar_core.goal_files import load_goals
+    from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
 
-    file, the_robot = load_goals(name), load_robot(robot)
+    the_robot = load_robot(robot)
+    given = None if place is None else single_goal(place)
+    file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # whatever is wrong is said in one line
-    check_pace(file, name, the_robot)
+    check_pace(file, name or "", the_robot)
     spec = goals_spec(
-        robot, name, as_path=as_path, control_hz=control_hz, give_up_s=0.0 if wait else GIVE_UP_S
+        robot, name or "", as_path=as_path, control_hz=control_hz, give_up_s=0.0 if wait else GIVE_UP_S
     )
     from fulmar_ros.goal_node import GoalNode
     from fulmar_ros.runtime import run_node
 
     _, _, _, *arguments = command_line(spec)  # python -m module
-    raise typer.Exit(run_node(GoalNode, arguments))
+    raise typer.Exit(run_node(lambda request_exit: GoalNode(request_exit, goals=given), arguments))

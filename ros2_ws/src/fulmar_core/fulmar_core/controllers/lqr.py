@@ -121,6 +121,7 @@ class Lqr(Law):
         if not isinstance(robot.actuators, Thrusters):
             raise ValueError("the LQR allocates valves; this robot has none.")
         self._weights = gains
+        self._most_turn = np.deg2rad(gains.heading_error_limit_deg)
         dt = 1.0 / self.control_hz
         a, b = linear_model(robot, dt)
         velocity = (self.frame.tracks and gains.tracking_velocity) or gains.velocity
@@ -184,7 +185,7 @@ class Lqr(Law):
         if self.frame.tracks:
             return np.asarray(np.stack(now.motion, axis=-1) - inputs.goal.current)
         to_goal = np.stack(self._aim(inputs, now), axis=-1)
-        distance = np.linalg.norm(to_goal, axis=-1, keepdims=True)
+        distance = np.sqrt((to_goal * to_goal).sum(axis=-1, keepdims=True))
         limit = self._weights.position_error_limit * self.share_of_speed
         if self._weights.braking:
             brake = self.reach.along(-to_goal / np.maximum(distance, 1e-9), now.push[..., :2])[..., None]
@@ -192,8 +193,7 @@ class Lqr(Law):
             limit = np.minimum(limit, self.lead * fastest) + 1e-9
         parts = [-to_goal * (limit / np.maximum(distance, limit))]
         if self.frame.heads:
-            most = np.deg2rad(self._weights.heading_error_limit_deg)
-            parts.append(-np.clip(now.turn, -most, most)[..., None])
+            parts.append(-now.turn.clip(-self._most_turn, self._most_turn)[..., None])
         parts.append(np.stack(now.motion, axis=-1))
         return np.concatenate(parts, axis=-1)
 

@@ -15,6 +15,9 @@ from fulmar_core.health.suspicion import Suspicion
 
 ALLOWANCE = 1.0  # evidence that is forgotten in one second: errors of the model add up slowly [-]
 MOST = 6.0  # evidence of one measurement at most, as log-likelihood [-]
+OF_THE_MEAN = np.array(
+    [1, 1, 1, 0, 0, 0]
+)  # of pose and velocity, what is compared with a mean of measurements
 RELEASE = 6.0  # evidence for motion that ends a standstill: a third of a second of full thrust [-]
 
 
@@ -53,19 +56,12 @@ class HoldDetector:
         begun = self._count > 0
         off = seen.copy()
         off[..., :3] -= np.where(begun[..., None], self._place, seen[..., :3])
-        off[..., 2] -= 2.0 * np.pi * np.round(off[..., 2] / (2.0 * np.pi))
-        spread = self._spread * np.sqrt(1.0 + 1.0 / np.maximum(self._count, 1.0))[..., None] ** [
-            1,
-            1,
-            1,
-            0,
-            0,
-            0,
-        ]
-        still = 0.5 * np.sum((off / spread) ** 2, axis=-1)
-        gain = np.where(thrust | (still > surprise), np.clip(surprise - still, -MOST, MOST), 0.0)
+        off[..., 2] -= 2.0 * np.pi * (off[..., 2] / (2.0 * np.pi)).round()
+        spread = self._spread * np.sqrt(1.0 + 1.0 / np.maximum(self._count, 1.0))[..., None] ** OF_THE_MEAN
+        still = 0.5 * ((off / spread) ** 2).sum(axis=-1)
+        gain = np.where(thrust | (still > surprise), (surprise - still).clip(-MOST, MOST), 0.0)
         evidence = self._evidence + gain - np.where(self.held, 0.0, ALLOWANCE * dt)
-        self._evidence = np.clip(evidence, 0.0, np.where(self.held, RELEASE, np.inf))
+        self._evidence = evidence.clip(0.0, np.where(self.held, RELEASE, np.inf))
         self.held = np.where(self.held, self._evidence > 0.0, self._evidence > self._limit)
         self._evidence = np.where(self.held, np.minimum(self._evidence, RELEASE), self._evidence)
         anew = self._evidence <= 0.0

@@ -232,7 +232,7 @@ class ThrusterHealth:
 
 def _wrapped(angle: np.ndarray) -> np.ndarray:
     """As `planar.wrapped`, without asking which library an array is of: this runs at every control step."""
-    return angle - 2.0 * np.pi * np.round(angle * (0.5 / np.pi))
+    return angle - 2.0 * np.pi * (angle * (0.5 / np.pi)).round()
 
 
 def can_be_watched(robot: Robot) -> bool:

@@ -40,7 +40,8 @@ class ValveTrials:
             1 for those that are alive or have their trial, else 0; same shape.
         """
         dead = np.asarray(alive) < 0.5
-        if not dead.any() and self._dead_s is None:
+        if not dead.any() and (self._dead_s is None or opened is not None):
+            self._dead_s = None
             return alive
         if self._dead_s is None or self._dead_s.shape != dead.shape:
             self._dead_s = np.zeros(dead.shape)

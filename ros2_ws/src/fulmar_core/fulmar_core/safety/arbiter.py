@@ -18,9 +18,9 @@ class Mode(Enum):
     FAULT = "fault"  # safe command until the node is configured anew
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Flags:
-    """Everything that the decision depends on, besides the time."""
+    """Everything that the decision depends on, besides the time. Its owner changes it in place."""
 
     configured: bool = False
     activated: bool = False

@@ -46,7 +46,9 @@ class InertialUnit:
     def __init__(self, spec: ImuSpec) -> None:
         """Prepare for `reset`."""
         self._spec = spec
-        self._std, self._limit, self._quantum = (spec.part(name) for name in ("std", "limit", "quantum"))
+        self._std, limit, self._quantum = (spec.part(name) for name in ("std", "limit", "quantum"))
+        self._most = largest_reading(limit, self._quantum)
+        self._step = np.where(self._quantum > 0.0, self._quantum, 1.0)
 
     def reset(self, seed: int, number: int) -> None:
         """Forget the past.
@@ -84,7 +86,5 @@ class InertialUnit:
     def _read(self, truth: ImuSample) -> np.ndarray:
         reading = np.concatenate((truth.specific_force, truth.angular_velocity))
         reading = reading * self._scale + self._bias + self._std * self._rng.standard_normal(6)
-        most = largest_reading(self._limit, self._quantum)
-        step = np.where(self._quantum > 0.0, self._quantum, 1.0)
-        reading = np.clip(reading, -most, most)
-        return np.where(self._quantum > 0.0, np.round(reading / step) * step, reading)
+        reading = reading.clip(-self._most, self._most)
+        return np.where(self._quantum > 0.0, (reading / self._step).round() * self._step, reading)

@@ -1,0 +1,118 @@
+"""Messages as bytes on the wire whose stamp and numbers alone are read and written.
+
+Converting messages between rclpy and the middleware takes a large part of a control step. Messages of the control path
+have one layout for as long as a node lives: names and frames stay, a stamp and runs of doubles change.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+from rclpy.serialization import deserialize_message, serialize_message
+
+from fulmar_ros.message_reader import NS
+
+Numbers: TypeAlias = Sequence[float]
+LATEST_NS = 2**31 * NS  # seconds of a message have 32 bits
+_STAMP = struct.Struct("=iI")
+_STAMP_AT = 4  # behind the four bytes that name the encoding: the header comes first, its stamp first in it
+_TEXTS_AT = _STAMP_AT + _STAMP.size
+_WORD = 4  # counts and lengths have so many bytes, and lie at multiples of it
+
+
+def marks(count: int, *, after: int = 0) -> list[float]:
+    """Numbers to fill a message with whose place in its bytes is looked for: no message of ours holds them otherwise.
+
+    Args:
+        count: How many.
+        after: How many the message holds already.
+    """
+    return [math.pi * number for number in range(after + 1, after + count + 1)]
+
+
+class WireImage:
+    """Layout of one message in CDR, found by serialising it once.
+
+    The bytes that only fill up to the next multiple are of any value in received messages, and zero in written ones.
+    """
+
+    def __init__(self, message: Any, *runs: Numbers, texts: Sequence[str], counts: int = 0) -> None:
+        """Find where the numbers lie.
+
+        Args:
+            message: Begins with a header, then texts, then numbers.
+            runs: Numbers in the message that lie side by side, in the order of its fields. Each must occur once.
+            texts: Every text in the message, in the order of its fields, before the first run.
+            counts: Lengths of sequences between the last text and the first run.
+
+        Raises:
+            ValueError: A run is not in the message exactly once, or comes before the one before it; or the message has
+                more texts or counts than those.
+        """
+        image = serialize_message(message)
+        self._runs = [struct.Struct(f"={len(run)}d") for run in runs]
+        marks = [packing.pack(*run) for packing, run in zip(self._runs, runs, strict=True)]
+        self._places = [image.find(mark) for mark in marks]
+        if any(image.count(mark) != 1 for mark in marks) or any(a >= b for a, b in pairwise(self._places)):
+            raise ValueError(f"{type(message).__name__}: its numbers are not where they are looked for.")
+        # Frames, names and counts, with where each begins and ends.
+        self._fixed: list[tuple[int, int, bytes]] = []
+        self._image = bytearray(len(image))
+        self._image[:_WORD] = image[:_WORD]
+        self._image[self._places[0] :] = image[self._places[0] :]
+        at = _TEXTS_AT
+        for text in texts:
+            mark = text.encode() + b"\0"
+            end = image.index(mark, at + _WORD) + len(mark)  # behind its length
+            self._keep(image, at, end)
+            at = end + (-end) % _WORD
+        self._keep(image, at, at + counts * _WORD)
+        # The serialiser leaves room at the end, which a publisher does not send.
+        ends = range(self._places[-1] + self._runs[-1].size, len(image) + 1, _WORD)
+        length = next((end for end in ends if _holds(self._image[:end], message)), None)
+        if length is None:
+            raise ValueError(
+                f"{type(message).__name__}: {len(texts)} texts and {counts} counts are not its all."
+            )
+        del self._image[length:]
+
+    def _keep(self, image: bytes, begin: int, end: int) -> None:
+        self._image[begin:end] = image[begin:end]
+        if end > begin:
+            self._fixed.append((begin, end, image[begin:end]))
+
+    def write(self, time_ns: int, *runs: Numbers) -> bytes:
+        """The message with another stamp and other numbers.
+
+        Args:
+            time_ns: Stamp; the nearest that a message can hold [ns].
+            runs: As many numbers as the constructor got.
+        """
+        time_ns = min(max(time_ns, -LATEST_NS), LATEST_NS - 1)
+        _STAMP.pack_into(self._image, _STAMP_AT, *divmod(time_ns, NS))
+        for packing, place, run in zip(self._runs, self._places, runs, strict=True):
+            packing.pack_into(self._image, place, *run)
+        return bytes(self._image)
+
+    def read(self, data: bytes) -> tuple[int, list[tuple[float, ...]]] | None:
+        """Stamp [ns] and runs of a received message; None if its layout, frames or names are others."""
+        if len(data) < len(self._image) or data[:2] != self._image[:2]:  # a sender may leave room at the end
+            return None
+        for begin, end, expected in self._fixed:
+            if data[begin:end] != expected:
+                return None
+        seconds, rest = _STAMP.unpack_from(data, _STAMP_AT)
+        runs = [packing.unpack_from(data, at) for packing, at in zip(self._runs, self._places, strict=True)]
+        return seconds * NS + rest, runs
+
+
+def _holds(data: bytearray, message: Any) -> bool:
+    """Whether bytes are a message."""
+    try:
+        return deserialize_message(bytes(data), type(message)) == message
+    except RuntimeError:  # rclpy's error of bytes that end too early has no public name
+        return False
