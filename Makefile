@@ -102,14 +102,14 @@ policies: dev ## Make the shipped policies that are missing or out of date (unde
 replay-bags: dev ## Record the reference bags of the tests anew, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
 
-# What keeps the time of the wall clock runs alone, all else on two cores. 5: nothing of a part was asked for.
+# What keeps the time of the wall clock runs alone; all else in three processes, which wait for one another at times. 5: nothing of a part was asked for.
 define run_tests
 code=5; \
 run() { $(BIN)/python -m pytest "$$@" $(PYTEST_ARGS); }; \
 for part in "not real_time" real_time; do \
 	last=0; \
 	if [ "$$part" = real_time ]; then run tests/ros -m "$$part$(1)" || last=$$?; \
-	else run tests -n 2 --dist loadfile -m "$$part$(1)" || last=$$?; fi; \
+	else run tests -n 3 --dist loadfile -m "$$part$(1)" || last=$$?; fi; \
 	if [ $$last != 5 ] && { [ $$code = 5 ] || [ $$code = 0 ]; }; then code=$$last; fi; \
 done; \
 if [ $$code = 0 ]; then echo; echo "All tests passed."; \

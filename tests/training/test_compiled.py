@@ -64,6 +64,7 @@ def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None):
             np.testing.assert_allclose(our, their, atol=2e-3, err_msg=name)
 
 
+@pytest.mark.slow
 def test_compiled_worlds_move_as_in_numpy():
     assert_moves_as_in_numpy(ROBOT, TASK)
 
