@@ -102,7 +102,8 @@ policies: dev ## Make the shipped policies that are missing or out of date (unde
 replay-bags: dev ## Record the reference bags of the tests anew, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
 
-# What keeps the time of the wall clock runs alone; all else in three processes, which wait for one another at times. 5: nothing of a part was asked for.
+# What keeps the time of the wall clock runs alone; all else in three processes, since tests of nodes mostly wait.
+# 5: nothing of a part was asked for.
 define run_tests
 code=5; \
 run() { $(BIN)/python -m pytest "$$@" $(PYTEST_ARGS); }; \
