@@ -82,6 +82,7 @@ def test_a_list_of_faults_may_end_with_a_comma_and_must_name_one():
             faults_of("turtlebot2", names_in(nothing))
 
 
+@pytest.mark.slow
 def test_a_robot_that_goes_on_or_never_moved_does_not_pass_for_one_that_stopped(
     ros_domain: RosDomain, tmp_path: Path
 ):

@@ -75,7 +75,11 @@ def test_the_task_of_the_page_is_done_in_run_evaluation_and_rerun(
     ("name", "words"),
     [
         ("late:Observes", "task 'late:Observes': observe raised AssertionError: too fast"),
-        ("late:Measures", "task 'late:Measures': distance_from_goal returned the result that is not finite."),
+        pytest.param(
+            "late:Measures",
+            "task 'late:Measures': distance_from_goal returned the result that is not finite.",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_task_that_fails_on_the_way_ends_its_run_with_one_line_and_a_robot_that_stands(

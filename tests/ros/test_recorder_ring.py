@@ -18,6 +18,7 @@ from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 pytestmark = pytest.mark.real_time
 
 
+@pytest.mark.slow
 def test_a_ring_without_a_fault_leaves_nothing(record, node):
     recorder = record("mode:=ring")
     recorder.wait_until_recording("keeping 30 s for")
