@@ -20,6 +20,7 @@ from fulmar_core.episode import draw_episodes
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
+pytestmark = pytest.mark.slow  # every pair is drawn
 EPISODES = 300
 CURVE = [{"wall_s": 10.0 * i, "steps": 1000 * i, "success_rate": 1.0 - 0.8**i} for i in range(6)]
 EVERYWHERE = ("control_deviation", "collided")

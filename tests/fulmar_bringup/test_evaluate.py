@@ -51,6 +51,7 @@ def test_the_batch_is_judged_by_more_episodes_where_nobody_says_how_many(asked, 
         evaluate(f"evaluate floating_platform go_to_pose --controller {asked}")
 
 
+@pytest.mark.slow
 def test_waypoints_are_told_with_what_physics_allows(monkeypatch):
     monkeypatch.setattr("fulmar_bringup.evaluation.BOUNDED_EPISODES", 2)
     words = "evaluate turtlebot2 go_through_positions --controller classical --through batch --episodes 3"

@@ -167,9 +167,8 @@ def steered(robot: str, waypoints, *, gain: float, slow: float) -> np.ndarray:
     return np.stack(seen, axis=1)
 
 
-@pytest.mark.parametrize(
-    ("robot", "least"), [("turtlebot2", 0.65), pytest.param("kingfisher", 0.15, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("robot", "least"), [("turtlebot2", 0.65), ("kingfisher", 0.15)])
+@pytest.mark.slow
 def test_no_steering_beats_the_bound(robot, least):
     waypoints = courses(4, seed=4)
     most = bound(waypoints, 60.0, motions_of(load_robot(robot)), start_yaw=np.zeros(4)).goals
@@ -278,6 +277,7 @@ def test_a_boat_holds_what_drag_and_propellers_balance():
     assert speed == pytest.approx(math.sqrt(15.5 / 17.257603))
 
 
+@pytest.mark.slow
 def test_each_family_has_its_bound():
     waypoints = courses(1, seed=6)[0]
     names = {

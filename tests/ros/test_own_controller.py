@@ -79,7 +79,11 @@ def test_a_class_that_is_not_there_or_lacks_a_method_is_one_line(
     [
         pytest.param("wrong:Short", "command has shape (3,), must be (1, 2)", marks=pytest.mark.slow),
         ("wrong:NotANumber", "command for actuator 1 is not finite"),
-        ("wrong:Raises", "controller 'wrong:Raises' raised ZeroDivisionError: by hand"),
+        pytest.param(
+            "wrong:Raises",
+            "controller 'wrong:Raises' raised ZeroDivisionError: by hand",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_class_that_answers_nonsense_ends_its_run_with_one_line_and_a_robot_that_stands(

@@ -29,6 +29,7 @@ def test_a_ring_without_a_fault_leaves_nothing(record, node):
     assert not recorder.directory.exists()
 
 
+@pytest.mark.slow
 def test_a_ring_writes_the_goal_and_what_was_before_and_after_a_fault(record, node):
     recorder = record("mode:=ring", "before_fault_s:=0.5", "after_fault_s:=0.3")
     recorder.wait_until_recording("keeping 0.5 s for")

@@ -74,6 +74,7 @@ def test_a_lockstep_run_reaches_its_goal_and_says_so_in_json(
         assert commands == command_bytes(tmp_path / "again")
 
 
+@pytest.mark.slow
 def test_the_mock_backend_runs_without_mujoco(ros_domain: RosDomain, tmp_path: Path) -> None:
     """The same nodes on the core's own dynamics."""
     asked = (
@@ -207,6 +208,7 @@ def test_places_of_a_file_are_visited_one_after_another(ros_domain: RosDomain, t
     assert summary["goals_progress"] == "2 of 2 targets reached"
 
 
+@pytest.mark.slow
 def test_a_ring_without_a_fault_is_a_run_without_a_bag_or_a_verdict(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
