@@ -309,6 +309,7 @@ def test_a_simulated_platform_goes_where_the_command_tells_it(
     tmp_path, neighbour: Neighbour, plant: Any, controller: Any, ros_domain: RosDomain
 ) -> None:
     """`fulmar goals` in a process of its own, with a plant and an LQR that go to poses."""
+    neighbour.withdraw_command()  # a plant obeys no two nodes
     (tmp_path / "near.yaml").write_text("kind: poses\ntitle: near\nposes: [[0.3, 0.0, 0.0]]\n")
     command = start_fulmar(
         "goals", "near.yaml", "--robot", "floating_platform", env=ros_domain.env, cwd=tmp_path
