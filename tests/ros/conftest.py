@@ -48,10 +48,14 @@ def plant(neighbour: Neighbour) -> Iterator[PlantNode]:
 
 
 @pytest.fixture
-def controller(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[ControllerNode]:
-    """A real-time LQR node at 50 Hz."""
+def controller(
+    neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> Iterator[ControllerNode]:
+    """A real-time LQR node at 50 Hz, with the parameters that a test adds."""
     monkeypatch.setattr(sys, "argv", ["controller_node"])
     arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "control_hz:=50.0"]
+    for parameter in getattr(request, "param", ()):
+        arguments += ["-p", parameter]
     node = ControllerNode(make_lqr, lambda _code: None, cli_args=arguments)
     with spinning(node, lambda error: pytest.fail(repr(error))):
         neighbour.give_goal()

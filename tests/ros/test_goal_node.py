@@ -305,6 +305,7 @@ def test_a_pose_for_a_controller_that_takes_other_goals_ends_with_one_line(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("controller", [["odometry_may_repeat:=true"]], indirect=True)  # a mock has no noise
 def test_a_simulated_platform_goes_where_the_command_tells_it(
     tmp_path, neighbour: Neighbour, plant: Any, controller: Any, ros_domain: RosDomain
 ) -> None:
