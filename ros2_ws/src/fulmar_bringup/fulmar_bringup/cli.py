@@ -31,6 +31,7 @@ from fulmar_bringup.commands.run import run
 from fulmar_bringup.commands.swap import swap
 from fulmar_bringup.commands.teleop import teleop
 from fulmar_bringup.commands.train import train
+from fulmar_bringup.commands.up import up
 from fulmar_bringup.console import console, showing_warnings
 from fulmar_bringup.extras import advice_for
 from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
@@ -48,6 +49,7 @@ app = typer.Typer(
 )
 app.command("list")(list_names)
 app.command()(run)
+app.command()(up)
 app.command()(goals)
 app.command()(teleop)
 app.command()(estop)

@@ -32,11 +32,12 @@ from fulmar_bringup.node_table import (
 )
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
-from fulmar_bringup.progress import time_bar
+from fulmar_bringup.progress import state_words, time_bar
 from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
+from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_core.errors import ConfigError, FulmarError, RunFailed
 from fulmar_core.exit_codes import BAD_USAGE
 from fulmar_core.goal_files import load_goals
@@ -51,6 +52,7 @@ from policy_server.controllers import controller_entry
 
 # A ring that no fault has written tells nothing of the goal.
 _UNJUDGED: dict[str, Any] = {"success": None, "bag": None, "failure": None}
+STOPPED = "stopped by the user"
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
@@ -84,10 +86,7 @@ def conduct(request: RunRequest) -> RunOutcome:
             configuration.
         DeviceError: The device is not there.
     """
-    if request.plan.hardware and not request.plan.emulated:
-        check_presence(load_hardware(request.plan.hardware).driver)
-    with claimed_domain():
-        failure, plant_steps = _run(request)
+    failure, plant_steps = run_nodes(request, _watch)
     ring = request.plan.recording.mode == "ring"
     if ring and not failure and not request.record.exists():
         return RunOutcome({**summarise(_nothing_recorded(request)), **_UNJUDGED}, "")
@@ -109,15 +108,31 @@ def conduct(request: RunRequest) -> RunOutcome:
     return RunOutcome({**summary, "failure": failure or None}, failure)
 
 
-def _run(request: RunRequest) -> tuple[str, int]:
-    """Start, watch and stop everything.
+Watch = Callable[[RunRequest, RunPlan, Supervisor, ProcessGroup], str]
+
+
+def run_nodes(request: RunRequest, watch: Watch) -> tuple[str, int]:
+    """Start every node of a request, watch them, and stop them in order.
+
+    Args:
+        request: What to run.
+        watch: Called once the processes are started; gets them ready, waits for the end, and returns why the run
+            failed, empty if it did not.
 
     Returns:
         Why the run failed, empty if it did not; and how many commands the plant was given in lock step.
 
     Raises:
-        ConfigError: The plant refused its configuration.
+        ConfigError: As of `conduct`.
+        DeviceError: The device is not there.
     """
+    if request.plan.hardware and not request.plan.emulated:
+        check_presence(load_hardware(request.plan.hardware).driver)
+    with claimed_domain():
+        return _run(request, watch)
+
+
+def _run(request: RunRequest, watch: Watch) -> tuple[str, int]:
     plan = replace(request.plan, supervised=True)
     group = ProcessGroup()
     failure, plant, ends = "", Report(), list[Ended]()
@@ -133,12 +148,16 @@ def _run(request: RunRequest) -> tuple[str, int]:
                 for spec in specs:
                     group.start(spec)
             plant = overseer.plant
-            failure = _watch(request, plan, overseer, group)
+            try:
+                failure = watch(request, plan, overseer, group)
+            except KeyboardInterrupt as stop:
+                failure = str(stop) or STOPPED
+                overseer.stop_plant()  # a plant that goes on would miss the commands of a controller that ends
             # The controller first: the plant then shows that its actuators are safe, and the recorder sees it.
             ends += group.stop("controller")
             ends += group.stop("plant")
     except KeyboardInterrupt as stop:
-        failure = str(stop) or "stopped by the user"
+        failure = str(stop) or STOPPED
     finally:
         ends += group.stop_all()
         folders.close()
@@ -220,7 +239,7 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
             _wait_for_end(plan, overseer, group, moved, end_on_estop=request.end_on_estop)
     except RunFailed as error:
         time.sleep(LAST_WORDS_S)
-        return _with_plant_reaction(str(error), overseer)
+        return with_plant_reaction(str(error), overseer)
     return ""
 
 
@@ -228,13 +247,13 @@ def _wait_for_end(
     plan: RunPlan,
     overseer: Supervisor,
     group: ProcessGroup,
-    moved: Callable[[float], None],
+    moved: Callable[[float, str], None],
     *,
     end_on_estop: bool,
 ) -> None:
     """Watch a run until its time is over; an e-stop holds the robot meanwhile, and ends the run only if asked to."""
     began = time.monotonic()
-    plant_limit_s, controller_limit_s = _silence_limits_s(plan)
+    plant_limit_s, controller_limit_s = silence_limits_s(plan)
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
 
     def failed() -> bool:
@@ -246,13 +265,14 @@ def _wait_for_end(
 
     def running() -> None:
         raise_if_ended(group)
-        moved(_passed_s(plan, overseer.plant))
+        plant, controller = overseer.plant, overseer.controller
+        moved(passed_s(plan, plant), state_words(distance_of(controller.values), mode_of(plant, controller)))
         if failed():
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":
             raise RunFailed(f"controller: {overseer.controller.message}")
-        _raise_if_silent("controller", overseer.controller, controller_limit_s)
-        _raise_if_silent("plant", overseer.plant, plant_limit_s)
+        raise_if_silent("controller", overseer.controller, controller_limit_s)
+        raise_if_silent("plant", overseer.plant, plant_limit_s)
         if time.monotonic() - began > limit_s:
             raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
 
@@ -269,27 +289,33 @@ def _wait_for_end(
     running()
 
 
-def _passed_s(plan: RunPlan, plant: Report) -> float:
+def passed_s(plan: RunPlan, plant: Report) -> float:
     """How much of a run is over [s]."""
     if plan.hardware:
         return float(plant.values.get("ticks") or 0.0) * load_robot(plan.robot).timing.physics_dt
     return max(0.0, float(plant.values.get("sim_time_s") or 0.0) - SIMULATION_START_NS / 1e9)
 
 
-def _silence_limits_s(plan: RunPlan) -> tuple[float, float]:
+def silence_limits_s(plan: RunPlan) -> tuple[float, float]:
     """How long plant and controller may be silent, in wall-clock time [s]."""
     if plan.lockstep:
         return LOCKSTEP_SILENT_S, LOCKSTEP_SILENT_S
     return PLANT_SILENT_S, max(SILENT_S, 3.0 / (plan.control_hz * plan.rate))
 
 
-def _raise_if_silent(name: str, report: Report, limit_s: float) -> None:
+def raise_if_silent(name: str, report: Report, limit_s: float) -> None:
+    """Give up on a node that has reported and then fell silent for longer than a limit [s].
+
+    Raises:
+        RunFailed: It has.
+    """
     silent_s = time.monotonic() - report.heard
     if report.heard and silent_s > limit_s:
         raise RunFailed(f"{name}: has not reported for {silent_s:.1f} s; it hangs")
 
 
-def _with_plant_reaction(reason: str, overseer: Supervisor) -> str:
+def with_plant_reaction(reason: str, overseer: Supervisor) -> str:
+    """Why a run failed, and what the plant reported of it."""
     reaction = overseer.plant.message
     if overseer.plant.level == "error" and reaction not in reason:
         return f"{reason}; plant: {reaction}"

@@ -12,15 +12,7 @@ from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.external import adapter_path, check_external
 from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
-from fulmar_bringup.system import (
-    NONE,
-    Guards,
-    check_names,
-    default_control_hz,
-    default_guards,
-    default_hardware,
-    load_system,
-)
+from fulmar_bringup.system import NONE, Guards, default_hardware, varied_system
 from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
@@ -368,20 +360,28 @@ def list_nodes(
     Raises:
         ConfigError: Unknown name, or a mistake in a file.
     """
-    base = load_system(system or "mujoco_policy")
-    chosen = (robot or base.robot, task or base.task, controller or base.controller, backend or base.backend)
-    check_names(*chosen)
-    as_written = chosen == (base.robot, base.task, base.controller, base.backend)
-    hz = base.control_hz if as_written else default_control_hz(*chosen)
-    load_robot(chosen[0]).timing.substeps(hz)
-    plan = RunPlan(*chosen, control_hz=hz, policy=policy or "", guards=base.guards, recording=base.recorder)
+    chosen = varied_system(
+        system or "mujoco_policy",
+        robot=robot,
+        task=task,
+        controller=controller,
+        backend=backend,
+        hardware=hardware,
+    )
+    load_robot(chosen.robot).timing.substeps(chosen.control_hz)
+    plan = RunPlan(
+        chosen.robot,
+        chosen.task,
+        chosen.controller,
+        chosen.backend,
+        control_hz=chosen.control_hz,
+        policy=policy or "",
+        guards=chosen.guards,
+        recording=chosen.recorder,
+    )
     if plan.backend == "hardware":
-        path = default_hardware(plan.robot, hardware)
-        check_own_driver(load_hardware(path).driver)
-        guards = (
-            base.guards if base.backend == "hardware" else default_guards(plan.controller, "hardware", path)
-        )
-        plan = replace(plan, hardware=path, guards=guards)
+        plan = replace(plan, hardware=default_hardware(plan.robot, hardware))
+        check_own_driver(load_hardware(plan.hardware).driver)
     check_external(plan.controller, plan.guards, adapter=adapter, topic=topic, lockstep=False)
     plan = replace(plan, adapter=adapter_path(plan.robot, adapter), adapter_topic=topic or "")
     recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan))

@@ -91,6 +91,7 @@ def plan_run(
     remap: Sequence[str] = (),
     adapter: str | None = None,
     topic: str | None = None,
+    goals_later: bool = False,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -123,6 +124,7 @@ def plan_run(
         remap: Topics under other names, each `FROM:=TO`.
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.
+        goals_later: Whether goals come from outside while the system runs; `goal` and `goals` are None then.
 
     Returns:
         The request.
@@ -155,7 +157,7 @@ def plan_run(
     mission, drawn_start = episode.goal, _pose_of_state(episode.start)
     if hardware and not emulate:
         start = start or (0.0, 0.0, 0.0)  # where a robot stands is where its odometry begins
-        if goal is None and goals is None:
+        if goal is None and goals is None and not goals_later:
             raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None:
         if goal is not None:
@@ -168,7 +170,8 @@ def plan_run(
     if start is None and goals is None:
         check_starts(the_robot, the_task)
     start = start or drawn_start
-    _check_distance(the_robot, the_task, mission, start)
+    if not goals_later:
+        _check_distance(the_robot, the_task, mission, start)
     plan = RunPlan(
         robot=robot,
         task=task,

@@ -30,7 +30,27 @@ def step_bar(what: str, total: int) -> contextlib.AbstractContextManager[Callabl
     return _bar(what, total, TextColumn("{task.completed:,} of {task.total:,} steps"), TimeRemainingColumn())
 
 
-def time_bar(what: str, total_s: float) -> contextlib.AbstractContextManager[Callable[[float], None]]:
+@contextlib.contextmanager
+def live_line() -> Iterator[Callable[[float, float | None, str], None]]:
+    """Show one line about a system without a planned end.
+
+    Returns:
+        A context that gives a function to call with the time [s], the distance from the goal [m] and the mode.
+    """
+    with Progress(TextColumn("{task.description}"), console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("starting", total=None)
+        yield lambda time_s, distance_m, mode: bar.update(
+            task, description=f"{time_s:8.1f} s  {state_words(distance_m, mode)}"
+        )
+
+
+def state_words(distance_m: float | None, mode: str) -> str:
+    """Distance from the goal [m], if there is one, and the mode of a system."""
+    return f"{mode}, {distance_m:.2f} m from the goal" if distance_m is not None else mode
+
+
+@contextlib.contextmanager
+def time_bar(what: str, total_s: float) -> Iterator[Callable[..., None]]:
     """Show progress through simulated time.
 
     Args:
@@ -38,10 +58,18 @@ def time_bar(what: str, total_s: float) -> contextlib.AbstractContextManager[Cal
         total_s: Simulated time in all [s].
 
     Returns:
-        A context that gives a function to call with the time that has passed [s].
+        A context that gives a function to call with the time that has passed [s] and, if there are any, a few words.
     """
-    text = TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated")
-    return _bar(what, total_s, text, TimeElapsedColumn())
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated"),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task("", total=total_s)
+        yield lambda done_s, words="": bar.update(task, completed=done_s, description=words)
 
 
 @contextlib.contextmanager

@@ -38,6 +38,7 @@ from fulmar_ros.wire_watch import offers_of
 START_TIMEOUT_S = 30.0
 TELL_AGAIN_S = 0.5  # after an e-stop was silent, before the goal is told once more
 SUBSCRIBES_S = 1.0  # for an external controller that publishes already to subscribe its goal
+STOP_S = 1.0  # for a plant to come to rest when a run is stopped
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
 
 
@@ -255,6 +256,15 @@ class Supervisor:
                 time.sleep(0.005)
             if not future.result().success:
                 raise RunFailed(f"plant: could not be {what}: {self._reason_of_plant(last_words)}")
+
+    def stop_plant(self, within_s: float = STOP_S) -> None:
+        """Deactivate the plant, if it answers in time: its actuators are safe then, and it misses no command."""
+        if not self._plant_service.service_is_ready():
+            return
+        asked = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+        future, until_s = self._plant_service.call_async(asked), time.monotonic() + within_s
+        while not future.done() and time.monotonic() < until_s:
+            time.sleep(0.005)
 
     def _reason_of_plant(self, last_words: Callable[[], str]) -> str:
         until = time.monotonic() + REFUSAL_WORDS_S

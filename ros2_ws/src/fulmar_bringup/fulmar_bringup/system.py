@@ -82,6 +82,41 @@ def load_system(name: str) -> System:
     return system
 
 
+def varied_system(
+    name: str,
+    *,
+    robot: str | None = None,
+    task: str | None = None,
+    controller: str | None = None,
+    backend: str | None = None,
+    hardware: str | None = None,
+) -> System:
+    """A system file, each of its choices replaced by what is given; rate and guards follow.
+
+    Args:
+        name: Name of a file in `configs/systems`.
+        robot: Another robot.
+        task: Another task.
+        controller: Another controller.
+        backend: Another backend.
+        hardware: Hardware file, where the backend is hardware; the robot's own by default.
+
+    Raises:
+        ConfigError: Unknown name, or a mistake in a file.
+    """
+    base = load_system(name)
+    chosen = (robot or base.robot, task or base.task, controller or base.controller, backend or base.backend)
+    if chosen == (base.robot, base.task, base.controller, base.backend):
+        return base
+    check_names(*chosen)
+    guards = base.guards
+    if chosen[3] == "hardware" and base.backend != "hardware":
+        guards = default_guards(chosen[2], "hardware", default_hardware(chosen[0], hardware))
+    return System(
+        base.title, *chosen, control_hz=default_control_hz(*chosen), guards=guards, recorder=base.recorder
+    )
+
+
 def modules_of(
     controller: str, backend: str, *, guards: Guards = NONE, hardware: str = "", emulated: bool = False
 ) -> tuple[str, ...]:

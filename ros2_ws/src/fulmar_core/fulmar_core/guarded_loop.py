@@ -125,6 +125,11 @@ class GuardedLoop:
         with self._lock:
             self._change(**changes)
 
+    def at_goal(self) -> bool:
+        """Whether the newest measurement lies within the task's tolerance of the current target."""
+        with self._lock:
+            return self.newest is not None and self.mission.within_tolerance(self._newest_state)
+
     def activate(self) -> None:
         """Wait for fresh measurements."""
         with self._lock:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.terms import Errors
 from fulmar_core.trajectories import Judge, Trajectories, TrajectoryLog, first_steps, join, select
 
 __all__ = [
@@ -144,17 +145,8 @@ def _window(run: Trajectories, task: Task) -> int:
 
 def _inside(run: Trajectories, task: Task) -> np.ndarray:
     """Where an episode is inside every tolerance that the task has, shape (episodes, steps)."""
-    tolerance = task.tolerance
-    inside = np.ones(run.position_error.shape, dtype=bool)
-    for error, limit in (
-        (run.position_error, tolerance.position),
-        (run.heading_error, np.deg2rad(tolerance.heading_deg)),
-        (run.velocity_error, tolerance.velocity),
-        (run.yaw_rate_error, np.deg2rad(tolerance.yaw_rate_deg)),
-    ):
-        if limit > 0.0:
-            inside &= np.abs(error) <= limit
-    return inside
+    errors = Errors(run.position_error, run.heading_error, run.velocity_error, run.yaw_rate_error)
+    return task.tolerance.holds(errors)
 
 
 def _first(there: np.ndarray, run: Trajectories) -> np.ndarray:

@@ -143,6 +143,16 @@ class Mission:
         distance = self._task.distance_from_goal(state, self._loop.goal)
         return 0.0 if distance is None else float(distance[0])
 
+    def within_tolerance(self, state: PlanarState) -> bool:
+        """Whether a state lies within the task's tolerance of the current target.
+
+        Args:
+            state: Measured, shapes (1,).
+        """
+        if self._loop.goal is None:
+            return False
+        return bool(self._task.tolerance.holds(self._task.errors(state, self._loop.goal))[0])
+
     def _take(self, goal: Goal | None, *, anew: bool = True) -> None:
         """Let another goal count, from its first target on; its time begins now unless it goes on from one before."""
         self._given_goal = goal

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Mode = Literal["whole", "ring"]
-MODES: tuple[str, ...] = ("whole", "ring")
+Mode = Literal["whole", "ring", "goals"]
+MODES: tuple[str, ...] = ("whole", "ring", "goals")
 
 
 @dataclass(frozen=True)
 class Recording:
     """The section `recorder:` of a system file, and the parameters of the recorder node."""
 
-    mode: Mode = "whole"  # whole: everything; ring: only what was around a fault
+    mode: Mode = "whole"  # everything; only what was around a fault; a bag for each goal
     before_fault_s: float = 30.0  # ring: kept in memory and written when a fault shows [s]
     after_fault_s: float = 5.0  # ring: written after the last sign of a fault [s]
     split_mb: float = 1000.0  # a file that has grown to this is followed by a new one; 0: never [1e6 bytes]

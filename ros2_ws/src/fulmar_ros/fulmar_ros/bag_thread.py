@@ -29,7 +29,7 @@ RECORDING = "fulmar_recording"  # entry of `custom_data`: JSON of `Account`
 
 
 class Bag(Protocol):
-    """What the thread writes to: a `BagWriter` or a `BagRing`."""
+    """What the thread writes to: a `BagWriter`, a `BagRing` or a `BagPerGoal`."""
 
     @property
     def messages(self) -> int: ...  # noqa: D102 - as BagWriter's, all of them
@@ -176,7 +176,7 @@ class BagThread:
         began = time.monotonic()
         try:
             action()
-        except BagError as error:  # a ring that cannot begin its bag
+        except BagError as error:  # one that cannot begin its next bag
             self._problem = str(error)
             self._tell_once(self._problem, self._problem)
         except OSError as error:

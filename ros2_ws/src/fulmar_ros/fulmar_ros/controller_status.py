@@ -96,6 +96,8 @@ class ControllerStatus:
             "goal_refused": refusal.reason,
             "goal_refused_stamp_ns": str(refusal.stamp_ns),
             "goals_done": str(mission.done),
+            "goal_distance_m": f"{guard.flags.goal_distance:.3f}",
+            "at_goal": str(guard.at_goal()).lower(),
             WIRE_WARNINGS: BETWEEN.join(self.wire_problems),
             "steps": str(self.steps),
             "observation_age_ms": f"{age_ms:.1f}",

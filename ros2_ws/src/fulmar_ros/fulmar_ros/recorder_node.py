@@ -15,7 +15,8 @@ from rclpy.subscription import Subscription
 
 from fulmar_core.errors import BagError
 from fulmar_core.exit_codes import DONE, FAILED
-from fulmar_core.topics import COMMAND, VELOCITY_COMMAND, WIRES, Wire
+from fulmar_core.topics import COMMAND, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire
+from fulmar_ros.bag_per_goal import BagPerGoal
 from fulmar_ros.bag_ring import BagRing
 from fulmar_ros.bag_thread import BagThread
 from fulmar_ros.bag_writer import BagWriter, check_free
@@ -55,7 +56,8 @@ class RecorderNode(Node):
         # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
         self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}
         self._ring = self._new_ring() if settings.mode == "ring" else None
-        self._thread = BagThread(self._ring or self._open_bag(), on_error=self.get_logger().error)
+        whole = self._bag_per_goal if settings.mode == "goals" else self._open_bag
+        self._thread = BagThread(self._ring or whole(), on_error=self.get_logger().error)
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         commands: list[Subscription] = []
@@ -86,10 +88,10 @@ class RecorderNode(Node):
         short = ": memory is too small for more" if self._ring.cut_short else ""
         return f"ring: {self._ring.kept_s:.0f} s in memory, {len(self._ring.faults)} faults{short}"
 
-    def _open_bag(self) -> BagWriter:
-        """Make the bag, with its topics."""
+    def _open_bag(self, below: str = "") -> BagWriter:
+        """Make the bag, or one below its folder, with its topics."""
         bag = BagWriter(
-            self._directory,
+            self._directory / below,
             run_info=self._run_info,
             attachments=self._attachments,
             split_bytes=1e6 * self._settings.split_mb,
@@ -98,6 +100,20 @@ class RecorderNode(Node):
         for wire, topic in self._topics.items():
             bag.add_topic(topic, wire.type, wire.delivery)
         return bag
+
+    def _bag_per_goal(self) -> BagPerGoal:
+        """A bag for each goal, below the folder of all."""
+        check_free(self._directory)
+        return BagPerGoal(
+            lambda number: self._open_bag(f"goal_{number:03d}"),
+            goals={topic for wire, topic in self._topics.items() if wire.name in GOAL_WIRES},
+            latched=self._latched,
+        )
+
+    @property
+    def _latched(self) -> dict[str, int]:
+        """Latched topics, and how many messages of each hold on."""
+        return {topic: wire.latest for wire, topic in self._topics.items() if wire.delivery == "latched"}
 
     def _new_ring(self) -> BagRing:
         """A ring; that no bag could be written is told now, not at the fault.
@@ -114,9 +130,7 @@ class RecorderNode(Node):
             self._open_bag,
             before_s=self._settings.before_fault_s,
             after_s=self._settings.after_fault_s,
-            latched={
-                topic: wire.latest for wire, topic in self._topics.items() if wire.delivery == "latched"
-            },
+            latched=self._latched,
             fault_in=fault_finder(self._robot, self._topics),
         )
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import offset_to
@@ -76,6 +78,18 @@ class Tolerance:
         values = (self.position, self.heading_deg, self.velocity, self.yaw_rate_deg, self.hold_s)
         if min(values) < 0.0 or max(values) == 0.0:
             raise ValueError("tolerances must not be negative, and one must be greater than 0.")
+
+    def holds(self, errors: Errors) -> np.ndarray:
+        """Whether errors, as NumPy, lie within every tolerance that there is, shape (...,)."""
+        pairs = (
+            (errors.position, self.position),
+            (errors.heading, math.radians(self.heading_deg)),
+            (errors.velocity, self.velocity),
+            (errors.yaw_rate, math.radians(self.yaw_rate_deg)),
+        )
+        return np.asarray(
+            np.logical_and.reduce([np.abs(error) <= limit for error, limit in pairs if limit > 0.0])
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,181 @@
+"""A system that runs until it is stopped: goals, swaps and e-stops come from outside, and are reported as events."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from fulmar_bringup.conductor import (
+    LAST_WORDS_S,
+    STOPPED,
+    passed_s,
+    raise_if_silent,
+    run_nodes,
+    silence_limits_s,
+    with_plant_reaction,
+)
+from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
+from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.planning import PoseTuple, RunRequest, plan_run
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.starting import raise_if_ended, while_starting
+from fulmar_bringup.supervisor import Supervisor
+from fulmar_bringup.system import System
+from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
+from fulmar_core.errors import ConfigError, RunFailed
+from fulmar_core.recording import Recording
+from fulmar_core.tasks import load_task
+from fulmar_core.topics import SIMULATION_START_NS
+from policy_server.controllers import controller_entry
+
+Show = Callable[[float, float | None, str], None]  # time [s], distance from the goal [m], mode
+
+
+def plan_system(
+    system: System,
+    *,
+    record: Path,
+    command: str,
+    policy: Path | None = None,
+    hardware: str | None = None,
+    emulate: bool = False,
+    arm: bool = False,
+    scenario: str = "nominal",
+    seed: int = 0,
+    start: PoseTuple | None = None,
+    rate: float = 1.0,
+    recording: Recording | None = None,
+) -> RunRequest:
+    """Plan a system that has no end.
+
+    Args:
+        system: What to run.
+        record: Folder of the bag, or of all bags; must not exist.
+        command: Command line, for the record.
+        policy: Bundle; the shipped one by default.
+        hardware: Hardware file; the robot's own by default.
+        emulate: Whether an emulator stands in for the device.
+        arm: Whether an autopilot may be armed that the hardware file does not arm.
+        scenario: Name of the scenario.
+        seed: Seed.
+        start: Where a simulated robot begins; the origin by default.
+        rate: Simulated seconds a wall-clock second.
+        recording: Instead of the system's own.
+
+    Raises:
+        ConfigError: As of `plan_run`; or a bag for each goal, where goals stream.
+    """
+    request = plan_run(
+        robot=system.robot,
+        task=system.task,
+        controller=system.controller,
+        backend=system.backend,
+        policy=policy,
+        goal=None,
+        start=start or (0.0, 0.0, 0.0),
+        duration_s=None,
+        lockstep=False,
+        rate=rate,
+        control_hz=system.control_hz,
+        scenario=scenario,
+        seed=seed,
+        record=record,
+        command=command,
+        hardware=hardware,
+        emulate=emulate,
+        arm=arm,
+        guards={name: value for name, value in asdict(system.guards).items() if value},
+        goals_later=True,
+    )
+    kept = recording or system.recorder
+    if kept.mode == "goals" and load_task(system.task).goal_topic == "goal_velocity":
+        raise ConfigError(
+            f"velocities stream: task '{system.task}' gets no bag for each goal. Use --recording whole or ring."
+        )
+    return replace(request, plan=replace(request.plan, duration_s=0.0, recording=kept))
+
+
+def keep_up(request: RunRequest, emit: Emit, show: Show) -> str:
+    """Run a system until Ctrl-C, SIGTERM or the end of one of its nodes.
+
+    Args:
+        request: Of `plan_system`.
+        emit: Called with each event; see `SystemEvents`. The first is `started`.
+        show: Called several times a second with what a person wants to see.
+
+    Returns:
+        Why the system failed; empty where it was stopped.
+
+    Raises:
+        ConfigError: As of `conduct`.
+        DeviceError: The device is not there.
+    """
+    stopped = ""
+
+    def watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
+        nonlocal stopped
+        try:
+            _get_ready(request, plan, overseer, group)
+            emit("started", **_who(plan), bag=str(request.record))
+            _follow(plan, overseer, group, SystemEvents(emit), show)
+        except RunFailed as error:
+            time.sleep(LAST_WORDS_S)
+            return with_plant_reaction(str(error), overseer)
+        except KeyboardInterrupt as stop:
+            stopped = str(stop) or STOPPED
+            raise
+        finally:
+            trips = overseer.plant.values.get("watchdog_trips")
+            emit("stopping", reason=stopped, watchdog_trips=int(trips) if trips else None)
+        return ""
+
+    failure, _ = run_nodes(request, watch)
+    return "" if failure in (stopped, STOPPED) else failure
+
+
+def _who(plan: RunPlan) -> dict[str, Any]:
+    return {name: getattr(plan, name) for name in ("robot", "task", "controller", "backend", "control_hz")}
+
+
+def _get_ready(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
+    """Wait for the controller, give it what stands about, and start the plant."""
+    external = controller_entry(plan.controller).is_external
+    if external:
+        wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))
+    starting = while_starting(group, overseer)
+    if not external:
+        overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
+        now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
+        if not plan.hardware or plan.emulated:
+            overseer.give_obstacles(request.mission, time_ns=now_ns, alive=starting)
+    overseer.start_plant(starting, lambda: group.last_words("plant"))
+    if external:
+        wait_for_reader(plan, overseer, lambda: raise_if_ended(group))
+
+
+def _follow(
+    plan: RunPlan, overseer: Supervisor, group: ProcessGroup, events: SystemEvents, show: Show
+) -> None:
+    """Report what happens, until a node ends or falls silent.
+
+    Raises:
+        RunFailed: One did.
+    """
+    plant_limit_s, controller_limit_s = silence_limits_s(plan)
+    plant, controller = overseer.plant, overseer.controller
+
+    def report() -> bool:
+        time_s = round(passed_s(plan, plant), 3)
+        events.look(plant, controller, time_s)
+        show(time_s, distance_of(controller.values), mode_of(plant, controller))
+        return False
+
+    def running() -> None:
+        raise_if_ended(group)
+        raise_if_silent("controller", controller, controller_limit_s)
+        raise_if_silent("plant", plant, plant_limit_s)
+
+    overseer.wait_until(report, running)

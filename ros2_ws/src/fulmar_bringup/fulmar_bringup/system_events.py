@@ -1,0 +1,136 @@
+"""What happens to a running system, as events made of what its plant and controller report. Knows no ROS."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from fulmar_core.goal_sequence import HOLD_S
+from fulmar_core.safety.estop import HOLDS
+from fulmar_core.safety.watchdog import NO_COMMAND
+
+Emit = Callable[..., None]  # name of the event, and its fields by keyword
+NO_GOAL = ("", "0")
+
+
+class Reported(Protocol):
+    """The newest status of one node."""
+
+    level: str
+    message: str
+    values: dict[str, str]
+
+
+class SystemEvents:
+    """Compares each report with the one before, and emits an event for every change that an operator waits for.
+
+    The events, each with `time_s`, seconds of the robot's own time: `goal` (stamp_ns), `goal_refused` (reason),
+    `target` (done: targets of a path so far), `reached` (distance_m, after_s: within the task's tolerance for a
+    second), `swapped` (controller, sha256), `swap_refused` (reason), `estop` (reason), `reset`, `fault` (node, reason)
+    and `recovered` (node).
+    """
+
+    def __init__(self, emit: Emit) -> None:
+        """Begin with nothing known.
+
+        Args:
+            emit: Called with each event.
+        """
+        self._emit = emit
+        self._goal, self._goal_s = "0", 0.0
+        self._refused = "0"
+        self._done = 0
+        self._inside_s: float | None = (
+            None  # since when the robot is at its goal; infinite once that is reported
+        )
+        self._controller: tuple[str, str] | None = None
+        self._swap = ""
+        self._held = False
+        self._faults: dict[str, str] = {}
+
+    def look(self, plant: Reported, controller: Reported, time_s: float) -> None:
+        """Compare the newest reports with those before.
+
+        Args:
+            plant: Of the plant.
+            controller: Of the controller; empty values where it reports nothing.
+            time_s: The robot's own time [s].
+        """
+        self._look_at_estop(plant, time_s)
+        if controller.values:
+            self._look_at_controller(controller.values, time_s)
+            self._look_at_goal(controller.values, time_s)
+        # Until a controller acts there is no command to miss.
+        waits = plant.message.startswith(NO_COMMAND) and controller.values.get("mode") == "armed"
+        self._look_at_fault("plant", plant, time_s, excused=self._held or waits)
+        self._look_at_fault("controller", controller, time_s, excused=self._held)
+
+    def _look_at_estop(self, plant: Reported, time_s: float) -> None:
+        held = plant.message.startswith(HOLDS)
+        if held and not self._held:
+            self._emit("estop", time_s=time_s, reason=plant.message)
+        elif self._held and not held:
+            self._emit("reset", time_s=time_s)
+        self._held = held
+
+    def _look_at_controller(self, values: dict[str, str], time_s: float) -> None:
+        now = values.get("controller", ""), values.get("sha256", "")
+        if self._controller is not None and now != self._controller:
+            self._emit("swapped", time_s=time_s, controller=now[0], sha256=now[1])
+        self._controller = now
+        swap = values.get("swap", "")
+        if swap != self._swap and swap.startswith("refused"):
+            self._emit("swap_refused", time_s=time_s, reason=swap)
+        self._swap = swap
+
+    def _look_at_goal(self, values: dict[str, str], time_s: float) -> None:
+        refused = values.get("goal_refused_stamp_ns", "0")
+        if refused not in (*NO_GOAL, self._refused):
+            self._emit("goal_refused", time_s=time_s, reason=values.get("goal_refused", ""))
+        self._refused = refused
+        goal, done = values.get("goal_stamp_ns", "0"), int(values.get("goals_done", "0"))
+        if goal != self._goal:
+            self._goal, self._goal_s, self._done, self._inside_s = goal, time_s, 0, None
+            if goal not in NO_GOAL:
+                self._emit("goal", time_s=time_s, stamp_ns=int(goal))
+        if goal in NO_GOAL:
+            return
+        if done > self._done:
+            self._done = done
+            self._emit("target", time_s=time_s, done=done)
+        if values.get("at_goal") != "true":
+            self._inside_s = None if self._inside_s != math.inf else math.inf
+        elif self._inside_s is None:
+            self._inside_s = time_s
+        elif time_s - self._inside_s >= HOLD_S:
+            self._inside_s = math.inf
+            self._emit(
+                "reached",
+                time_s=time_s,
+                distance_m=float(values["goal_distance_m"]),
+                after_s=round(time_s - self._goal_s, 3),
+            )
+
+    def _look_at_fault(self, node: str, report: Reported, time_s: float, *, excused: bool) -> None:
+        before = self._faults.get(node, "")
+        now = report.message if report.level == "error" and not excused else ""
+        if now and not before:
+            self._emit("fault", time_s=time_s, node=node, reason=now)
+        elif before and not now and not excused:
+            self._emit("recovered", time_s=time_s, node=node)
+        if now or not excused:
+            self._faults[node] = now
+
+
+def distance_of(values: dict[str, Any]) -> float | None:
+    """Distance from the goal as a controller reports it [m]; None without a goal, or where it reports none."""
+    distance = float(values.get("goal_distance_m") or "inf")
+    return distance if math.isfinite(distance) and values.get("goal_stamp_ns", "0") not in NO_GOAL else None
+
+
+def mode_of(plant: Reported, controller: Reported) -> str:
+    """What a system is doing, in a word: `e-stop`, or the mode of its controller, or of its plant."""
+    if plant.message.startswith(HOLDS):
+        return "e-stop"
+    return controller.values.get("mode") or plant.values.get("mode") or "starting"
