@@ -25,6 +25,7 @@ from fulmar_ros.runtime import spinning
 from policy_server.controller_node import make_controller
 from policy_server.policy import Policy
 from policy_server.shipped import policies_directory
+from tests.ros.controllers import copy_of
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, asked_by_neighbour, until
 
 pytestmark = pytest.mark.real_time
@@ -119,19 +120,6 @@ def test_a_policy_whose_commands_are_refused_several_times_is_replaced(
     odometry.stop()
     assert all(np.isfinite(command).all() for command in neighbour.commands)
     assert int(values(neighbour)["rejections"]) >= 3
-
-
-def copy_of(folder: Path, name: str) -> Path:
-    """The shipped bundle with another note, so that its hash differs and its commands do not."""
-    from dataclasses import replace
-
-    from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
-
-    bundle = shutil.copytree(SHIPPED, folder / name)
-    passport = read_passport(bundle)
-    noted = replace(passport, training={**passport.training, "note": name})
-    write_bundle(bundle, (bundle / NETWORK).read_bytes(), read_golden(bundle), noted)
-    return bundle
 
 
 class Swapper:

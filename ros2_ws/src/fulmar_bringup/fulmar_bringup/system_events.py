@@ -11,7 +11,6 @@ from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
 
 Emit = Callable[..., None]  # name of the event, and its fields by keyword
-NO_GOAL = ("", "0")
 
 
 class Reported(Protocol):
@@ -38,8 +37,8 @@ class SystemEvents:
             emit: Called with each event.
         """
         self._emit = emit
-        self._goal, self._goal_s = "0", 0.0
-        self._refused = "0"
+        self._goals, self._goal_s = "0", 0.0
+        self._refused = ("", "0")
         self._done = 0
         self._inside_s: float | None = (
             None  # since when the robot is at its goal; infinite once that is reported
@@ -85,17 +84,14 @@ class SystemEvents:
         self._swap = swap
 
     def _look_at_goal(self, values: dict[str, str], time_s: float) -> None:
-        refused = values.get("goal_refused_stamp_ns", "0")
-        if refused not in (*NO_GOAL, self._refused):
-            self._emit("goal_refused", time_s=time_s, reason=values.get("goal_refused", ""))
+        refused = values.get("goal_refused", ""), values.get("goal_refused_stamp_ns", "0")
+        if refused[0] and refused != self._refused:
+            self._emit("goal_refused", time_s=time_s, reason=refused[0])
         self._refused = refused
-        goal, done = values.get("goal_stamp_ns", "0"), int(values.get("goals_done", "0"))
-        if goal != self._goal:
-            self._goal, self._goal_s, self._done, self._inside_s = goal, time_s, 0, None
-            if goal not in NO_GOAL:
-                self._emit("goal", time_s=time_s, stamp_ns=int(goal))
-        if goal in NO_GOAL:
-            return
+        goals, done = values.get("goals_received", "0"), int(values.get("goals_done", "0"))
+        if goals != self._goals:
+            self._goals, self._goal_s, self._done, self._inside_s = goals, time_s, 0, None
+            self._emit("goal", time_s=time_s, stamp_ns=int(values.get("goal_stamp_ns", "0")))
         if done > self._done:
             self._done = done
             self._emit("target", time_s=time_s, done=done)
@@ -126,7 +122,7 @@ class SystemEvents:
 def distance_of(values: dict[str, Any]) -> float | None:
     """Distance from the goal as a controller reports it [m]; None without a goal, or where it reports none."""
     distance = float(values.get("goal_distance_m") or "inf")
-    return distance if math.isfinite(distance) and values.get("goal_stamp_ns", "0") not in NO_GOAL else None
+    return distance if math.isfinite(distance) else None
 
 
 def mode_of(plant: Reported, controller: Reported) -> str:

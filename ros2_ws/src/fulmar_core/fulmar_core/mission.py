@@ -25,6 +25,7 @@ class Mission:
     Attributes:
         goal_stamp_ns: Of the newest goal; 0 without one [ns].
         obstacles_stamp_ns: Of the newest obstacles [ns].
+        goals_received: Goals that began something new; of velocities that follow one another, the first.
     """
 
     def __init__(self, loop: ControlLoop, *, streamed: bool = False) -> None:
@@ -47,6 +48,7 @@ class Mission:
         self._void: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # refused, or dropped
         self.goal_stamp_ns = 0
         self.obstacles_stamp_ns = 0
+        self.goals_received = 0
 
     @property
     def lacking(self) -> str:
@@ -75,11 +77,13 @@ class Mission:
             self._given.append(key)
         self.goal_stamp_ns = stamp_ns
         if self._schedule is not None:
+            self.goals_received += self._given_goal is None
             self._schedule.give(goal, stamp_ns)
             return False
         same = self._given_goal is not None and np.array_equal(self._given_goal.targets, goal.targets)
         if self._streamed and same:
             return False
+        self.goals_received += 1
         self._take(goal)
         return True
 

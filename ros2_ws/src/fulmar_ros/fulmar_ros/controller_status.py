@@ -60,7 +60,7 @@ class ControllerStatus:
         changed = (
             decision.mode,
             decision.reason.split(" (")[0][:24],
-            not self._goals_streamed and mission.goal_stamp_ns,
+            not self._goals_streamed and (mission.goal_stamp_ns, mission.goals_received),
             mission.obstacles_stamp_ns,
             refusal.stamp_ns,
             succession.rejections,
@@ -95,6 +95,7 @@ class ControllerStatus:
             "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),
             "goal_refused": refusal.reason,
             "goal_refused_stamp_ns": str(refusal.stamp_ns),
+            "goals_received": str(mission.goals_received),
             "goals_done": str(mission.done),
             "goal_distance_m": f"{guard.flags.goal_distance:.3f}",
             "at_goal": str(guard.at_goal()).lower(),

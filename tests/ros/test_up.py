@@ -1,0 +1,144 @@
+"""`fulmar up`: goals, a swap, an e-stop and its reset in one system, each as an event; whole bags at the end."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from geometry_msgs.msg import PoseStamped
+from rclpy.duration import Duration
+
+from fulmar_bringup.bag_reader import read_run
+from fulmar_bringup.robot_operator import Operator
+from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
+from fulmar_core.goal import goal_at
+from fulmar_ros.goal_messages import goal_message
+from tests.conftest import RosDomain
+from tests.ros.cli import child_running, fulmar, start_fulmar
+from tests.ros.controllers import copy_of
+from tests.ros.neighbour import ROBOT, Neighbour, until
+
+pytestmark = pytest.mark.real_time
+FAST = ("--rate", "4", "--json", "--record", "bag")
+
+
+class Up:
+    """A running system, and the events that it has printed."""
+
+    def __init__(self, system: str, *more: str, env: dict[str, str], cwd: Path) -> None:
+        self.process: psutil.Popen = start_fulmar("up", system, *FAST, *more, env=env, cwd=cwd)
+        self.events: list[dict[str, Any]] = []
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        for line in self.process.stdout:
+            self.events.append(json.loads(line))
+
+    @property
+    def names(self) -> list[str]:
+        return [event["event"] for event in self.events]
+
+    def wait_for(self, *names: str, timeout_s: float = 30.0) -> None:
+        """Until the last events are these."""
+        try:
+            until(lambda: self.names[-len(names) :] == list(names), timeout_s)
+        except AssertionError as error:
+            raise AssertionError(f"no {names} at the end of {self.events}") from error
+
+    def end(self, number: signal.Signals) -> int:
+        """Send a signal, and wait for the exit code."""
+        self.process.send_signal(number)
+        code = int(self.process.wait(20.0))
+        until(lambda: "stopped" in self.names)
+        return code
+
+
+@pytest.fixture
+def start(neighbour: Neighbour, ros_domain: RosDomain, tmp_path: Path) -> Iterator[Any]:
+    neighbour.withdraw_command()  # a plant obeys no two nodes
+    started: list[Up] = []
+
+    def begin(system: str, *more: str) -> Up:
+        started.append(Up(system, *more, env=ros_domain.env, cwd=tmp_path))
+        return started[-1]
+
+    yield begin
+    for up in started:
+        if up.process.poll() is None:
+            up.process.kill()
+
+
+def give(neighbour: Neighbour, x: float, y: float) -> None:
+    """A goal of a node with the default quality of service, which leaves at once."""
+    publisher = neighbour.node.create_publisher(PoseStamped, "goal_pose", 10)
+    until(lambda: publisher.get_subscription_count() >= 2)
+    neighbour.node.get_clock().sleep_for(Duration(seconds=0.1))
+    publisher.publish(goal_message(goal_at((x, y, 0.0)), "goal_pose", 0))
+    publisher.wait_for_all_acked(Duration(seconds=1.0))
+    neighbour.node.destroy_publisher(publisher)
+
+
+def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_other(
+    neighbour: Neighbour, start: Any, tmp_path: Path
+) -> None:
+    up = start("mujoco_policy", "--recording", "goals")
+    up.wait_for("started")
+    for place in ((0.4, 0.0), (0.4, 0.4), (0.0, 0.0)):
+        give(neighbour, *place)
+        up.wait_for("goal", "reached")
+    second = copy_of(tmp_path, "second")
+    person = Operator(neighbour.node)
+    assert person.say_swap(ROBOT, str(second), find_s=5.0, answer_s=10.0).startswith("done")
+    assert all(stopped.heard for stopped in person.stop_all(ROBOT))
+    until(lambda: "estop" in up.names)
+    assert all(done for done, _ in person.reset_all(ROBOT).values())
+    until(lambda: "reset" in up.names)
+    give(neighbour, 0.4, 0.0)
+    up.wait_for("goal", "reached")
+    assert up.end(signal.SIGTERM) == DONE
+    assert [name for name in up.names if name != "goal_refused"] == [
+        "started", *["goal", "reached"] * 3, "swapped", "estop", "reset", "goal", "reached", "stopping", "stopped",
+    ]  # fmt: skip
+    stopping, stopped = up.events[-2:]
+    assert (stopping["reason"], stopping["watchdog_trips"]) == ("stopped by SIGTERM", 0)
+    assert (stopped["failure"], len(stopped["bags"])) == (None, 4)
+    for number, bag in enumerate(stopped["bags"]):
+        record = read_run(tmp_path / bag)
+        assert not record.warnings
+        assert len(record.goals) == (2 if number < 3 else 1)  # its own, and the one that ended it
+    assert not record.applied.effort[-1].any()
+
+
+def test_ctrl_c_counts_no_trip_and_one_bag_holds_all(start: Any, tmp_path: Path) -> None:
+    up = start("mock_lqr")
+    up.wait_for("started")
+    assert up.end(signal.SIGINT) == DONE
+    assert up.names == ["started", "stopping", "stopped"]
+    assert up.events[1]["watchdog_trips"] == 0
+    assert up.events[2]["bags"] == ["bag"]
+    assert not read_run(tmp_path / "bag").warnings
+
+
+def test_a_node_that_dies_ends_the_system_with_its_name_and_a_whole_bag(start: Any, tmp_path: Path) -> None:
+    up = start("mock_lqr")
+    up.wait_for("started")
+    child_running(up.process, "policy_server.controller_node").kill()
+    assert up.process.wait(20.0) == FAILED
+    until(lambda: "stopped" in up.names)
+    assert "controller was killed by SIGKILL" in up.events[-1]["failure"]
+    record = read_run(tmp_path / "bag")
+    assert not record.warnings
+    assert not record.applied.effort[-1].any()
+
+
+def test_an_unknown_system_is_refused_with_the_nearest_name(ros_domain: RosDomain, tmp_path: Path) -> None:
+    done = fulmar("up", "mujoco_lqrr", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == BAD_USAGE
+    assert "mujoco_lqr" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
