@@ -15,6 +15,7 @@ import pytest
 
 ARGUMENTS = {
     "system", "robot", "task", "controller", "backend", "hardware", "policy", "goals", "adapter", "topic",
+    "emulate",
 }  # fmt: skip
 
 
@@ -95,7 +96,8 @@ def launch_with(load, monkeypatch):
             asked.update(kwargs)
             return rows
 
-        stand_in(monkeypatch, "fulmar_bringup.node_table", NodeSpec=Row, list_nodes=list_nodes)
+        stand_in(monkeypatch, "fulmar_bringup.node_table", NodeSpec=Row)
+        stand_in(monkeypatch, "fulmar_bringup.launched_system", list_nodes=list_nodes)
         return asked, start(load(), arguments)
 
     return launch
@@ -162,13 +164,13 @@ def test_the_end_of_any_node_ends_the_launch(launch_with):
 
 
 def test_the_launch_arguments_are_those_of_the_node_table():
-    from fulmar_bringup.node_table import list_nodes
+    from fulmar_bringup.launched_system import list_nodes
 
     assert set(inspect.signature(list_nodes).parameters) == ARGUMENTS
 
 
 def test_every_system_launches_the_nodes_of_the_table(repository, load):
-    from fulmar_bringup.node_table import list_nodes
+    from fulmar_bringup.launched_system import list_nodes
 
     systems = sorted(path.stem for path in (repository / "configs" / "systems").glob("*.yaml"))
     assert systems

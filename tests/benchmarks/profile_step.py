@@ -93,8 +93,9 @@ class Stopwatch:
 
 def serve(arguments: argparse.Namespace) -> None:
     """Start a plant, run the controller node in this process for some steps, and print the figures."""
-    from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
+    from fulmar_bringup.node_table import RunPlan
     from fulmar_bringup.processes import command_line
+    from fulmar_bringup.system_rows import system_rows
     from fulmar_core.goal import goal_at
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
@@ -141,8 +142,9 @@ def serve(arguments: argparse.Namespace) -> None:
             os._exit(0)  # the last words of a node would wait for the plant
 
     ControllerNode._on_odometry, ControllerWires.publish_command = begin, end
-    subprocess.Popen(command_line(plant_spec(plan, subscribers=1)), stdout=subprocess.DEVNULL)
-    _, _, module, *sys.argv = command_line(controller_spec(plan, subscribers=1))
+    rows = system_rows(plan)
+    subprocess.Popen(command_line(rows["plant"]), stdout=subprocess.DEVNULL)
+    _, _, module, *sys.argv = command_line(rows["controller"])
     sys.argv.insert(0, module)
     runpy.run_module(module, run_name="__main__", alter_sys=True)
 

@@ -17,7 +17,8 @@ from fulmar_bringup.bags.contents import open_bag
 from fulmar_bringup.bags.course import course_of
 from fulmar_bringup.commands.run import verdict
 from fulmar_bringup.external_ready import command_input, wait_for_publisher, wait_for_reader
-from fulmar_bringup.node_table import RunPlan, list_nodes
+from fulmar_bringup.launched_system import list_nodes
+from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import Report

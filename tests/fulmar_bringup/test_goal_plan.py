@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fulmar_bringup.goal_plan import default_task, is_endless, shown_path, start_of
-from fulmar_bringup.node_table import controller_spec, list_nodes, run_goals_spec
+from fulmar_bringup.launched_system import list_nodes
+from fulmar_bringup.node_table import controller_spec, run_goals_spec
 from fulmar_bringup.planning import plan_run
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal_files import load_goals

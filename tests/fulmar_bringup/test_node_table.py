@@ -7,10 +7,12 @@ from importlib.util import find_spec
 
 import pytest
 
-from fulmar_bringup.node_table import RunPlan, controller_spec, list_nodes, plant_spec, recorder_spec
+from fulmar_bringup.launched_system import list_nodes
+from fulmar_bringup.node_table import NodeSpec, RunPlan, controller_spec, plant_spec, recorder_spec
 from fulmar_bringup.system import Guards, default_control_hz, default_guards, load_system
+from fulmar_bringup.system_rows import check_rows, system_rows
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.paths import config_names
+from fulmar_core.paths import OWN_FOLDERS, config_names
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
 SYSTEMS = pytest.mark.parametrize("system", config_names("systems"))
@@ -107,17 +109,15 @@ def test_everything_of_a_plan_reaches_the_nodes():
     plan = replace(
         PLAN, scenario="uncertain", seed=7, start=(1.0, 2.0, 90.0), duration_s=3.0, lockstep=True, rate=2.0
     )
-    plant, controller = (
-        plant_spec(plan, subscribers=2).parameters,
-        controller_spec(plan, subscribers=3).parameters,
-    )
+    rows = system_rows(plan, record={})
+    plant, controller = rows["plant"].parameters, rows["controller"].parameters
     expected = {
         "robot": "floating_platform", "task": "go_to_pose", "backend": "mujoco", "scenario": "uncertain", "seed": 7,
         "start": [1.0, 2.0, 90.0], "control_hz": 50.0, "lockstep": True, "rate": 2.0, "duration_s": 3.0,
         "wait_for_subscribers": 2,
     }  # fmt: skip
     assert plant.items() >= expected.items()
-    assert controller.items() >= {"task": "go_to_pose", "lockstep": True, "wait_for_subscribers": 3}.items()
+    assert controller.items() >= {"task": "go_to_pose", "lockstep": True, "wait_for_subscribers": 2}.items()
 
 
 def test_a_bundle_goes_to_the_node_that_runs_one_alone():
@@ -200,3 +200,75 @@ def test_a_robot_that_only_motion_capture_sees_gets_an_estimator(hardware, estim
 def test_guards_without_meaning_are_refused(guards, words):
     with pytest.raises(ValueError, match=words):
         Guards(**guards)
+
+
+def test_plant_and_controller_wait_for_those_who_subscribe_their_topics():
+    def awaited(plan, record):
+        rows = system_rows(plan, record=record)
+        return [
+            row.parameters["wait_for_subscribers"]
+            for row in rows.values()
+            if row.name in ("plant", "controller")
+        ]
+
+    assert awaited(PLAN, {}) == [2, 2]  # recorder and controller; recorder and plant
+    assert awaited(PLAN, None) == [1, 1]
+    assert awaited(replace(PLAN, goals="/x/lab_pose.yaml"), {}) == [3, 2]
+    assert awaited(replace(PLAN, guards=Guards(estimator="mocap_imu")), {}) == [
+        2,
+        2,
+    ]  # poses: recorder, estimator
+    external = replace(PLAN, controller="external")
+    assert awaited(external, {}) == [1]
+    assert awaited(replace(external, lockstep=True), {}) == [2]
+
+
+def own_node(name="camera", inputs=(), outputs=("image",)):
+    return NodeSpec(name, "mine", "camera_node", "mine.camera_node", "/x", inputs=inputs, outputs=outputs)
+
+
+def test_two_nodes_of_one_name_are_refused():
+    with pytest.raises(
+        ConfigError, match=r"two nodes are called 'plant': sim_nodes.sim_node and mine.camera_node"
+    ):
+        system_rows(replace(PLAN, nodes=(own_node("plant"),)))
+
+
+def test_an_input_that_nothing_publishes_is_refused_with_the_nearest_topic():
+    with pytest.raises(
+        ConfigError, match=r"node 'camera' receives 'odmo', which nothing .* Did you mean 'odom'"
+    ):
+        system_rows(replace(PLAN, nodes=(own_node(inputs=("odmo",)),)))
+    assert "camera" in system_rows(replace(PLAN, nodes=(own_node(inputs=("odom", "estop", "image")),)))
+
+
+def test_exactly_one_node_of_every_system_publishes_the_clock_of_a_simulation():
+    for system in config_names("systems"):
+        rows = list_nodes(system=system)
+        assert sum("/clock" in row.outputs for row in rows) == (load_system(system).backend != "hardware")
+        check_rows(rows)
+
+
+def test_an_emulated_device_is_a_row_of_the_launch_file_too():
+    rows = by_name(list_nodes(robot="turtlebot2", task="go_to_position", controller="classical", backend="hardware",
+                              emulate="true"))  # fmt: skip
+    assert rows["plant"].parameters["port"] == rows["emulator"].parameters["link"]
+    with pytest.raises(ConfigError, match="the backend is mujoco"):
+        list_nodes(emulate="true")
+
+
+def test_a_system_file_names_nodes_of_its_own(tmp_path, monkeypatch):
+    (tmp_path / "systems").mkdir()
+    (tmp_path / "systems" / "seeing.yaml").write_text(
+        "title: with a camera\nrobot: floating_platform\ntask: go_to_pose\ncontroller: lqr\nbackend: mock\n"
+        "control_hz: 50.0\nnodes:\n"
+        "  - {name: camera, module: mine.camera_node, inputs: [odom], outputs: [image], parameters: {rate_hz: 5.0}}\n"
+    )
+    monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
+    row = by_name(list_nodes(system="seeing"))["camera"]
+    assert (row.module, row.executable, row.namespace) == (
+        "mine.camera_node",
+        "camera_node",
+        "/floating_platform",
+    )
+    assert (row.inputs, row.parameters) == (("odom",), {"rate_hz": 5.0})

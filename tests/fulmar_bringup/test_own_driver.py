@@ -7,7 +7,7 @@ import json
 import pytest
 
 from fulmar_bringup.commissioning.wires import wires_of
-from fulmar_bringup.node_table import list_nodes
+from fulmar_bringup.launched_system import list_nodes
 from fulmar_core.errors import ConfigError
 from hardware_drivers.settings import load_hardware
 from tests.fulmar_bringup.command_line import RUN, complaint

@@ -6,7 +6,7 @@ import json
 import re
 from pathlib import Path
 
-from fulmar_bringup.node_table import list_nodes
+from fulmar_bringup.launched_system import list_nodes
 from fulmar_core.paths import OWN_FOLDERS
 from tests.own_files import own_folder
 

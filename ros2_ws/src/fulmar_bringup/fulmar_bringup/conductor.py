@@ -17,19 +17,9 @@ import numpy as np
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.domains import claimed_domain
-from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.external_ready import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.goal_plan import is_endless, shown_path
-from fulmar_bringup.node_table import (
-    NodeSpec,
-    RunPlan,
-    commander_specs,
-    emulator_spec,
-    guard_specs,
-    plant_spec,
-    recorder_spec,
-    run_goals_spec,
-)
+from fulmar_bringup.node_table import NodeSpec, RunPlan
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import state_words, time_bar
@@ -38,6 +28,7 @@ from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import ConfigError, FulmarError, RunFailed
 from fulmar_core.exit_codes import BAD_USAGE
 from fulmar_core.goal_files import load_goals
@@ -138,7 +129,8 @@ def _run(request: RunRequest, watch: Watch) -> tuple[str, int]:
     failure, plant, ends = "", Report(), list[Ended]()
     folders = contextlib.ExitStack()
     try:
-        specs = _specs(request, plan, folders)
+        wires_folder = Path(folders.enter_context(_wires_folder()))
+        specs = list(system_rows(plan, record=_recording(request), wires_folder=wires_folder).values())
         for spec in specs:
             group.start(spec)
         with supervisor(plan.robot, load_task(plan.task)) as overseer:
@@ -167,19 +159,6 @@ def _run(request: RunRequest, watch: Watch) -> tuple[str, int]:
     return _with_ends(failure, ends), int(plant.values.get("steps", 0))
 
 
-def _specs(request: RunRequest, plan: RunPlan, folders: contextlib.ExitStack) -> list[NodeSpec]:
-    """Every node of a run, in the order of their start."""
-    specs, port = [recorder_spec(plan, **_recording(request))], ""
-    if plan.emulated:
-        emulation = emulation_of(load_hardware(plan.hardware), Path(folders.enter_context(_wires_folder())))
-        specs.append(emulator_spec(plan, emulation))
-        port = emulation.port
-    specs.append(plant_spec(plan, subscribers=_listeners(plan), port=port))
-    specs += guard_specs(plan)
-    specs += commander_specs(plan, subscribers=2)  # plant and recorder
-    return [*specs, run_goals_spec(plan)] if plan.goals else specs
-
-
 def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
     """Stop nodes that have just been started, all at once, before they publish anything.
 
@@ -194,17 +173,6 @@ def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
 def _wires_folder() -> tempfile.TemporaryDirectory[str]:
     """A folder for the wires of an emulator that are files."""
     return tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
-
-
-def _listeners(plan: RunPlan) -> int:
-    """Subscriptions that a plant waits for: of odometry, of poses in its place, or of what its actuators do."""
-    if plan.hardware and (plan.guards.estimator or not load_hardware(plan.hardware).measures_odometry):
-        return 1  # the recorder
-    if plan.guards.estimator:
-        return 2  # of the poses: estimator, recorder
-    # An external controller answers odometry in lock step; by the clock, only its owner knows where it measures.
-    answers = plan.lockstep or not controller_entry(plan.controller).is_external
-    return 1 + answers + bool(plan.goals)  # recorder, controller, goals
 
 
 def _with_ends(failure: str, ends: list[Ended]) -> str:

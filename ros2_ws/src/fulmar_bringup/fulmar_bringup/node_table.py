@@ -1,24 +1,40 @@
-"""The table of processes: which nodes a system is made of, with their parameters. Pure, starts nothing.
-
-Both `fulmar run` and `launch/system.launch.py` start exactly what this lists.
-"""
+"""The table of processes: each node that a system may have, with its parameters, inputs and outputs; starts nothing."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.emulation import Emulation
-from fulmar_bringup.external import adapter_path, check_external
-from fulmar_bringup.goal_plan import checked_goals, goal_path, is_path_of_places
-from fulmar_bringup.system import NONE, Guards, default_hardware, varied_system
+from fulmar_bringup.goal_plan import is_path_of_places
+from fulmar_bringup.system import NONE, Guards
+from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
-from hardware_drivers.own_driver import check_own_driver
+from fulmar_core.topics import (
+    ACTION,
+    ACTUATORS_STATE,
+    BLOCK,
+    CLOCK,
+    DEVICE_STATE,
+    ESTOP,
+    GOAL_WIRES,
+    IMU,
+    METADATA,
+    MOCAP,
+    OBSERVATION,
+    OBSTACLES,
+    ODOMETRY,
+    STATUS,
+    TRUTH,
+    WIRES,
+    Wire,
+    command_wire,
+    goal_wires,
+)
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
 
@@ -38,6 +54,9 @@ class NodeSpec:
     quiet: bool = False  # says only what is wrong
     remappings: dict[str, str] = field(default_factory=dict)  # topics under other names
     network: str = ""  # namespace of Linux that it runs in; empty: ours
+    inputs: tuple[str, ...] = ()  # topics without which it is of no use
+    outputs: tuple[str, ...] = ()  # topics that it publishes
+    observed: tuple[str, ...] = ()  # topics that it receives if they are there
 
 
 @dataclass(frozen=True)
@@ -71,15 +90,12 @@ class RunPlan:
         ""  # hardware file of an adapter, whose commands an external controller speaks; empty: none
     )
     adapter_topic: str = ""  # topic that it takes them from; empty: the file's
+    nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
 
 
-def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
-    """The node that controls.
-
-    Args:
-        plan: What to run.
-        subscribers: Subscriptions of the command to wait for, in lock step.
-    """
+def controller_spec(plan: RunPlan) -> NodeSpec:
+    """The node that controls."""
+    robot, task = load_robot(plan.robot), load_task(plan.task)
     parameters: dict[str, Parameter] = {
         "controller": plan.controller,
         "robot": plan.robot,
@@ -88,7 +104,6 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         "lockstep": plan.lockstep,
         "rate": plan.rate,
         "goals_streamed": bool(plan.goals),
-        "wait_for_subscribers": subscribers,
     }
     guards = plan.guards
     if controller_entry(plan.controller).runs_bundle:
@@ -109,6 +124,10 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
     on_hardware = plan.backend == "hardware" and not guards.estimator
     if on_hardware and not load_hardware(plan.hardware).seen_from_outside:
         parameters["odometry_may_repeat"] = True  # encoders of a base at rest do; motion capture never does
+    if plan.backend == "mock" or not (
+        plan.backend == "hardware" or load_scenario(plan.scenario).sensor_noise
+    ):
+        parameters["odometry_may_repeat"] = True  # so does a simulation without noise
     if plan.copies > 1:
         parameters["copies"] = plan.copies
     return NodeSpec(
@@ -120,6 +139,13 @@ def controller_spec(plan: RunPlan, *, subscribers: int = 0) -> NodeSpec:
         parameters,
         network=plan.controller_network,
         remappings=dict(plan.remappings),
+        inputs=(
+            ODOMETRY.name,
+            *(wire.name for wire in goal_wires(task.goal_topic)),
+            *((OBSTACLES.name,) if task.sees_obstacles else ()),
+            *((BLOCK.name,) if task.pushes else ()),
+        ),
+        outputs=(command_wire(robot).name, STATUS.name, METADATA.name, OBSERVATION.name, ACTION.name),
     )
 
 
@@ -136,27 +162,29 @@ def adapter_spec(plan: RunPlan) -> NodeSpec:
         f"/{plan.robot}",
         parameters,
         remappings=dict(plan.remappings),
+        outputs=(command_wire(load_robot(plan.robot)).name,),
     )
 
 
-def commander_specs(plan: RunPlan, *, subscribers: int = 0) -> tuple[NodeSpec, ...]:
-    """The node that commands the plant; none where an external controller does so without an adapter.
-
-    Args:
-        plan: What to run.
-        subscribers: As of `controller_spec`.
-    """
+def commander_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
+    """The node that commands the plant; none where an external controller does so without an adapter."""
     if not controller_entry(plan.controller).is_external:
-        return (controller_spec(plan, subscribers=subscribers),)
+        return (controller_spec(plan),)
     return (adapter_spec(plan),) if plan.adapter else ()
 
 
-def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSpec:
+def paced_wire(plan: RunPlan) -> Wire:
+    """The measurement whose subscribers a plant waits for: odometry, poses in its place, or what its actuators do."""
+    if plan.hardware and (plan.guards.estimator or not load_hardware(plan.hardware).measures_odometry):
+        return ACTUATORS_STATE
+    return MOCAP if plan.guards.estimator else ODOMETRY
+
+
+def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     """The node that simulates, or that drives a device.
 
     Args:
         plan: What to run.
-        subscribers: Subscriptions of the odometry to wait for before the first step.
         port: Where the device is, in the place of what the hardware file says.
     """
     parameters: dict[str, Parameter] = {
@@ -170,7 +198,6 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSp
         "lockstep": plan.lockstep,
         "rate": plan.rate,
         "duration_s": plan.duration_s,
-        "wait_for_subscribers": subscribers,
         "autostart": not plan.supervised,
     }
     if plan.guards.estop:
@@ -191,8 +218,13 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSp
             f"/{plan.robot}",
             parameters,
             remappings=dict(plan.remappings),
+            inputs=(command_wire(load_robot(plan.robot)).name,),
+            outputs=tuple({ACTUATORS_STATE.name, IMU.name, paced_wire(plan).name}),
         )
     parameters |= _motion_capture(plan)
+    block = (BLOCK.name,) if load_task(plan.task).pushes else ()
+    poses = (MOCAP.name,) if plan.guards.estimator or plan.mocap_hz else ()
+    odometry = () if plan.guards.estimator else (ODOMETRY.name,)
     return NodeSpec(
         "plant",
         "sim_nodes",
@@ -201,6 +233,8 @@ def plant_spec(plan: RunPlan, *, subscribers: int = 0, port: str = "") -> NodeSp
         f"/{plan.robot}",
         parameters,
         remappings=dict(plan.remappings),
+        inputs=(command_wire(load_robot(plan.robot)).name,),
+        outputs=(CLOCK.name, TRUTH.name, ACTUATORS_STATE.name, IMU.name, *odometry, *poses, *block),
     )
 
 
@@ -233,6 +267,7 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
         f"/{plan.robot}",
         parameters,
         remappings=dict(plan.remappings),
+        outputs=(DEVICE_STATE.name, MOCAP.name),
     )
 
 
@@ -256,6 +291,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         f"/{plan.robot}",
         {key: text for key, text in texts.items() if text} | unusual,
         remappings=dict(plan.remappings),
+        observed=tuple(wire.name for wire in WIRES if wire.recorded),
     )
 
 
@@ -279,7 +315,16 @@ def goals_spec(
     }
     if give_up_s:
         parameters["give_up_s"] = give_up_s
-    return NodeSpec("goals", "fulmar_ros", "goal_node", "fulmar_ros.goal_node", f"/{robot}", parameters)
+    return NodeSpec(
+        "goals",
+        "fulmar_ros",
+        "goal_node",
+        "fulmar_ros.goal_node",
+        f"/{robot}",
+        parameters,
+        inputs=(ODOMETRY.name,),
+        outputs=tuple(GOAL_WIRES),
+    )
 
 
 def run_goals_spec(plan: RunPlan) -> NodeSpec:
@@ -308,6 +353,7 @@ def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
                 space,
                 dict(parameters),
                 remappings=dict(plan.remappings),
+                outputs=(ESTOP.name,),
             )
         )
     if plan.guards.estimator:
@@ -321,73 +367,8 @@ def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
                 space,
                 chosen,
                 remappings=dict(plan.remappings),
+                inputs=(MOCAP.name, IMU.name),
+                outputs=(ODOMETRY.name,),
             )
         )
     return tuple(nodes)
-
-
-def list_nodes(
-    *,
-    system: str | None = None,
-    robot: str | None = None,
-    task: str | None = None,
-    controller: str | None = None,
-    backend: str | None = None,
-    policy: str | None = None,
-    goals: str | None = None,
-    hardware: str | None = None,
-    adapter: str | None = None,
-    topic: str | None = None,
-) -> tuple[NodeSpec, ...]:
-    """Nodes of a system, each of its choices replaced by what is given.
-
-    Args:
-        system: Name of a file in `configs/systems`; `mujoco_policy` by default.
-        robot: Another robot.
-        task: Another task.
-        controller: Another controller.
-        backend: Another backend.
-        policy: Folder of a bundle; the shipped one by default.
-        goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it somebody else gives goals.
-        hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
-        adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
-        topic: Topic that the adapter takes them from; the file's by default.
-
-    Returns:
-        Recorder, plant, controller and, with `goals`, the node that tells them. The row of an external controller is
-        not there, or is that of its adapter.
-
-    Raises:
-        ConfigError: Unknown name, or a mistake in a file.
-    """
-    chosen = varied_system(
-        system or "mujoco_policy",
-        robot=robot,
-        task=task,
-        controller=controller,
-        backend=backend,
-        hardware=hardware,
-    )
-    load_robot(chosen.robot).timing.substeps(chosen.control_hz)
-    plan = RunPlan(
-        chosen.robot,
-        chosen.task,
-        chosen.controller,
-        chosen.backend,
-        control_hz=chosen.control_hz,
-        policy=policy or "",
-        guards=chosen.guards,
-        recording=chosen.recorder,
-    )
-    if plan.backend == "hardware":
-        plan = replace(plan, hardware=default_hardware(plan.robot, hardware))
-        check_own_driver(load_hardware(plan.hardware).driver)
-    check_external(plan.controller, plan.guards, adapter=adapter, topic=topic, lockstep=False)
-    plan = replace(plan, adapter=adapter_path(plan.robot, adapter), adapter_topic=topic or "")
-    recorder = recorder_spec(plan, info=run_info(plan), files=attachments(plan))
-    nodes = recorder, plant_spec(plan), *guard_specs(plan), *commander_specs(plan)
-    if not goals:
-        return nodes
-    checked_goals(goals, load_robot(plan.robot), load_task(plan.task))
-    plan = replace(plan, goals=str(goal_path(goals)))
-    return *nodes, run_goals_spec(plan)

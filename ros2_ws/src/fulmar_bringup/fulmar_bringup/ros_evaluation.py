@@ -24,9 +24,10 @@ from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.judged_task import task_of
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, run_goals_spec
+from fulmar_bringup.node_table import RunPlan, run_goals_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode, episode_steps
@@ -188,9 +189,10 @@ def _roll_out_share(plan: RunPlan, numbers: range, domain: int, index: int) -> T
 
     group = ProcessGroup()
     try:
-        group.start(controller_spec(plan, subscribers=1))
+        rows = system_rows(replace(plan, supervised=True))
+        group.start(rows["controller"])
         with supervisor(plan.robot, load_task(plan.task)) as overseer:
-            arguments = command_line(plant_spec(replace(plan, supervised=True)))[3:]
+            arguments = command_line(rows["plant"])[3:]
             plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments)
             if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise RunFailed("the plant could not be configured")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,10 @@ from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import PoseTuple, RunRequest, plan_run
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import raise_if_ended, while_starting
-from fulmar_bringup.supervisor import Supervisor
+from fulmar_bringup.supervisor import Report, Supervisor
 from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
+from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_core.recording import Recording
 from fulmar_core.tasks import load_task
@@ -95,10 +96,19 @@ def plan_system(
         raise ConfigError(
             f"velocities stream: task '{system.task}' gets no bag for each goal. Use --recording whole or ring."
         )
-    return replace(request, plan=replace(request.plan, duration_s=0.0, recording=kept))
+    plan = replace(request.plan, duration_s=0.0, recording=kept, nodes=own_nodes(system))
+    return replace(request, plan=plan)
 
 
-def keep_up(request: RunRequest, emit: Emit, show: Show) -> str:
+@dataclass(frozen=True)
+class Ending:
+    """How a system came down."""
+
+    failure: str  # why it failed; empty where it was stopped
+    watchdog_trips: int | None  # of the plant; None where it has not reported any number
+
+
+def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
     """Run a system until Ctrl-C, SIGTERM or the end of one of its nodes.
 
     Args:
@@ -107,16 +117,17 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> str:
         show: Called several times a second with what a person wants to see.
 
     Returns:
-        Why the system failed; empty where it was stopped.
+        How it ended.
 
     Raises:
         ConfigError: As of `conduct`.
         DeviceError: The device is not there.
     """
-    stopped = ""
+    stopped, plant_report = "", Report()
 
     def watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
-        nonlocal stopped
+        nonlocal stopped, plant_report
+        plant_report = overseer.plant
         try:
             _get_ready(request, plan, overseer, group)
             emit("started", **_who(plan), bag=str(request.record))
@@ -126,14 +137,13 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> str:
             return with_plant_reaction(str(error), overseer)
         except KeyboardInterrupt as stop:
             stopped = str(stop) or STOPPED
+            emit("stopping", reason=stopped)
             raise
-        finally:
-            trips = overseer.plant.values.get("watchdog_trips")
-            emit("stopping", reason=stopped, watchdog_trips=int(trips) if trips else None)
         return ""
 
     failure, _ = run_nodes(request, watch)
-    return "" if failure in (stopped, STOPPED) else failure
+    trips = plant_report.values.get("watchdog_trips")
+    return Ending("" if failure in (stopped, STOPPED) else failure, int(trips) if trips else None)
 
 
 def _who(plan: RunPlan) -> dict[str, Any]:

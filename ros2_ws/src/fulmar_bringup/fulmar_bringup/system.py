@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import default_gains_note
@@ -53,6 +54,17 @@ DEFAULT_ESTIMATOR = "mocap_imu"
 
 
 @dataclass(frozen=True)
+class OwnNode:
+    """A node of the system's own: a Python module that is run as a script, in the namespace of the robot."""
+
+    name: str
+    module: str  # such as mypackage.camera_node; for the launch file also a package and an executable
+    inputs: tuple[str, ...] = ()  # topics without which it is of no use
+    outputs: tuple[str, ...] = ()  # topics that it publishes
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class System:
     """One file of `configs/systems`."""
 
@@ -64,6 +76,7 @@ class System:
     control_hz: float  # [Hz]
     guards: Guards = NONE
     recorder: Recording = Recording()
+    nodes: tuple[OwnNode, ...] = ()  # beside plant, controller, recorder and guards
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at."""
@@ -112,8 +125,14 @@ def varied_system(
     guards = base.guards
     if chosen[3] == "hardware" and base.backend != "hardware":
         guards = default_guards(chosen[2], "hardware", default_hardware(chosen[0], hardware))
-    return System(
-        base.title, *chosen, control_hz=default_control_hz(*chosen), guards=guards, recorder=base.recorder
+    return replace(
+        base,
+        robot=chosen[0],
+        task=chosen[1],
+        controller=chosen[2],
+        backend=chosen[3],
+        control_hz=default_control_hz(*chosen),
+        guards=guards,
     )
 
 

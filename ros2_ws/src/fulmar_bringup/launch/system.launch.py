@@ -1,6 +1,6 @@
 """Start under `ros2 launch` the same nodes that `fulmar run` starts.
 
-This file only translates. Which nodes there are is decided in `fulmar_bringup.node_table`.
+This file only translates. Which nodes there are is decided in `fulmar_bringup.system_rows`.
 """
 
 from launch import LaunchContext, LaunchDescription
@@ -10,7 +10,8 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from fulmar_bringup.launch_check import refuse_living_plants
-from fulmar_bringup.node_table import NodeSpec, list_nodes
+from fulmar_bringup.launched_system import list_nodes
+from fulmar_bringup.node_table import NodeSpec
 
 ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",
@@ -22,6 +23,7 @@ ARGUMENTS = {
     "policy": "folder of a policy bundle",
     "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
     "topic": "topic that the adapter takes, in the place of the file's",
+    "emulate": "true: with backend hardware, an emulator speaks for the device",
     "goals": "a file of configs/goals, without .yaml, that a node of its own tells",
 }
 

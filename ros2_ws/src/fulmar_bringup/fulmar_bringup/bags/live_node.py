@@ -25,9 +25,10 @@ from fulmar_bringup.bags.course import Course
 from fulmar_bringup.bags.rerun import Answers
 from fulmar_bringup.bags.told import ABSENT, Told
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan, controller_spec
+from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.system import Guards
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import BagError, RunFailed
 from fulmar_core.topics import (
     ACTION,
@@ -124,7 +125,7 @@ def rerun_through_node(
     with own_domain() as environment:
         group = ProcessGroup(environment)
         try:
-            group.start(controller_spec(plan, subscribers=1))
+            group.start(system_rows(plan)["controller"])
             return _exchange(_raw_messages(bag, course, odometry), course, group)
         finally:
             group.stop_all()

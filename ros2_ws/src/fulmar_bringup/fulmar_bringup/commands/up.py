@@ -130,9 +130,14 @@ def up(
     )
     tell = _print_json if as_json else _print_words
     with live_line() as show:
-        failure = keep_up(request, tell, show)
-    tell("stopped", failure=failure or None, bags=[str(bag) for bag in _bags(request.record)])
-    raise typer.Exit(FAILED if failure else DONE)
+        end = keep_up(request, tell, show)
+    tell(
+        "stopped",
+        failure=end.failure or None,
+        watchdog_trips=end.watchdog_trips,
+        bags=[str(bag) for bag in _bags(request.record)],
+    )
+    raise typer.Exit(FAILED if end.failure else DONE)
 
 
 def _bags(record: Path) -> list[Path]:

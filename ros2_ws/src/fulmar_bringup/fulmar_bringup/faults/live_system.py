@@ -13,25 +13,16 @@ from pathlib import Path
 import rclpy
 from rclpy.node import Node
 
-from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.faults.spoiler import Spoiler, source_of
 from fulmar_bringup.faults.surroundings import USUAL, Surroundings
 from fulmar_bringup.faults.two_hosts import TwoHosts
 from fulmar_bringup.faults.witness import Witness, wait_for
-from fulmar_bringup.node_table import (
-    NodeSpec,
-    RunPlan,
-    controller_spec,
-    emulator_spec,
-    guard_specs,
-    plant_spec,
-    recorder_spec,
-    run_goals_spec,
-)
+from fulmar_bringup.node_table import NodeSpec, RunPlan
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
 from fulmar_bringup.supervisor import Supervisor, supervisor
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import Robot, Rolling, load_robot
@@ -47,7 +38,6 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.runtime import spinning
-from hardware_drivers.settings import load_hardware
 
 MOVING_S = 20.0  # a robot that has far to go moves by then
 
@@ -182,20 +172,24 @@ def live_system(
 
 def _specs(request: RunRequest, about: Surroundings, robot: Robot, wires: Path) -> list[NodeSpec]:
     plan = request.plan
-    emulation = emulation_of(load_hardware(plan.hardware), wires) if plan.emulated else None
-    specs = [
-        recorder_spec(plan, directory=str(request.record)),
-        *([emulator_spec(plan, emulation)] if emulation else []),
-        plant_spec(plan, subscribers=1, port=emulation.port if emulation else ""),
-        *guard_specs(plan),
-        controller_spec(plan),
-        *([run_goals_spec(plan)] if plan.goals else []),
-        *([_teleop_spec(plan)] if about.by_hand else []),
-    ]
+    rows = system_rows(plan, record={"directory": str(request.record)}, wires_folder=wires)
+    specs = [*rows.values(), *([_teleop_spec(plan)] if about.by_hand else [])]
     commands = command_wire(robot)
     spoilt = [about.spoilt or commands, *([commands] if about.answers_pass else [])]
     sources = {_publisher_of(wire, plan): {wire.name: source_of(wire)} for wire in spoilt}
-    return [replace(spec, remappings=sources[spec.name]) if spec.name in sources else spec for spec in specs]
+    # Of a spoilt topic this process alone is the subscriber.
+    return [
+        replace(
+            spec,
+            remappings=sources[spec.name],
+            parameters={**spec.parameters, "wait_for_subscribers": 1}
+            if "wait_for_subscribers" in spec.parameters
+            else spec.parameters,
+        )
+        if spec.name in sources
+        else spec
+        for spec in specs
+    ]
 
 
 def _publisher_of(wire: Wire, plan: RunPlan) -> str:

@@ -12,11 +12,12 @@ import psutil
 
 from fulmar_bringup.bag_origin import run_info
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec, recorder_spec
+from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
 from fulmar_bringup.supervisor import Supervisor, supervisor
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import RunFailed
 from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
 from fulmar_core.robot import load_robot
@@ -120,9 +121,9 @@ def watched_system(request: RunRequest, environment: Mapping[str, str]) -> Itera
     with own_domain():
         group = ProcessGroup(environment)
         try:
-            group.start(recorder_spec(plan, directory=str(request.record), info=run_info(plan)))
-            group.start(plant_spec(plan, subscribers=2))
-            group.start(controller_spec(plan))
+            record = {"directory": str(request.record), "info": run_info(plan)}
+            for row in system_rows(plan, record=record).values():
+                group.start(row)
             with supervisor(plan.robot, load_task(plan.task)) as overseer:
                 _begin(request, plan, overseer, group)
                 yield WatchedSystem(group, overseer)

@@ -22,10 +22,11 @@ from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.benchmark.recorder.recorders import recorders
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan, controller_spec, plant_spec
+from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.starting import while_starting
 from fulmar_bringup.supervisor import Supervisor, supervisor
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import RunFailed
@@ -92,9 +93,10 @@ def _running(plan: RunPlan) -> Iterator[PlantNode]:
     task = load_task(plan.task)
     group = ProcessGroup()
     try:
-        group.start(controller_spec(plan))
+        rows = system_rows(plan)
+        group.start(rows["controller"])
         with supervisor(plan.robot, task) as overseer:
-            plant = PlantNode(make_backend, lambda _code: None, cli_args=command_line(plant_spec(plan))[3:])
+            plant = PlantNode(make_backend, lambda _code: None, cli_args=command_line(rows["plant"])[3:])
             if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise RunFailed("the plant could not be configured")
             with spinning(plant, overseer.fail):

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import psutil
 
-from fulmar_bringup.node_table import RunPlan, recorder_spec
+from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import child_environment, command_line
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import RunFailed
 
 START_TIMEOUT_S = 60.0
@@ -33,7 +34,7 @@ class Recorder:
         self.bag = bag
         self._output = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         self.process = psutil.Popen(
-            command_line(recorder_spec(plan, directory=str(bag))),
+            command_line(system_rows(plan, record={"directory": str(bag)})["recorder"]),
             env={**os.environ, **child_environment()},
             stdin=subprocess.DEVNULL,
             stdout=self._output,

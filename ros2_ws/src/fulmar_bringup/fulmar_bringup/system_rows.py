@@ -1,0 +1,137 @@
+"""The rows of a system: every node of a plan, in the order of its start, with whom each one waits for.
+
+`fulmar run`, `fulmar up`, the launch file, `evaluate --through ros`, the fault suite, re-runs through a node and the
+benchmarks start these rows, or some of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from fulmar_bringup.emulation import emulation_of
+from fulmar_bringup.node_table import (
+    NodeSpec,
+    RunPlan,
+    commander_specs,
+    emulator_spec,
+    guard_specs,
+    paced_wire,
+    plant_spec,
+    recorder_spec,
+    run_goals_spec,
+)
+from fulmar_bringup.system import System
+from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.robot import load_robot
+from fulmar_core.topics import WIRES, command_wire
+from hardware_drivers.settings import load_hardware
+from policy_server.controllers import controller_entry
+
+
+def system_rows(
+    plan: RunPlan,
+    *,
+    record: Mapping[str, str] | None = None,
+    wires_folder: Path | None = None,
+    port: str = "",
+) -> dict[str, NodeSpec]:
+    """Every row of a plan.
+
+    Args:
+        plan: What to run.
+        record: Of the recorder: arguments of `recorder_spec`; None: nothing is recorded.
+        wires_folder: Where the wires of an emulated device that are files are made.
+        port: Where a device is, in the place of what the hardware file says.
+
+    Returns:
+        Rows by name, in the order of their start.
+
+    Raises:
+        ConfigError: Two rows have one name, or a row has an input that nothing publishes.
+    """
+    rows = [recorder_spec(plan, **record)] if record is not None else []
+    if plan.emulated:
+        assert wires_folder is not None
+        emulation = emulation_of(load_hardware(plan.hardware), wires_folder)
+        rows.append(emulator_spec(plan, emulation))
+        port = port or emulation.port
+    rows += [plant_spec(plan, port=port), *guard_specs(plan), *commander_specs(plan)]
+    if plan.goals:
+        rows.append(run_goals_spec(plan))
+    rows += plan.nodes
+    check_rows(rows, outside=_from_outside(plan))
+    return {row.name: row for row in _with_listeners(rows, plan)}
+
+
+def own_nodes(system: System) -> tuple[NodeSpec, ...]:
+    """Rows of the nodes that a system file names beside those that every system has."""
+    return tuple(
+        NodeSpec(
+            node.name,
+            node.module.partition(".")[0],
+            node.module.rpartition(".")[2],
+            node.module,
+            f"/{system.robot}",
+            dict(node.parameters),
+            inputs=node.inputs,
+            outputs=node.outputs,
+        )
+        for node in system.nodes
+    )
+
+
+def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None:
+    """Refuse rows that cannot work together.
+
+    Args:
+        rows: All that run.
+        outside: Topics that come from elsewhere, beside those of operators and devices.
+
+    Raises:
+        ConfigError: Two have one name, or one has an input that nothing publishes.
+    """
+    rows = list(rows)
+    names = [row.name for row in rows]
+    for name in names:
+        if names.count(name) > 1:
+            modules = " and ".join(row.module for row in rows if row.name == name)
+            raise ConfigError(f"two nodes are called '{name}': {modules}. Give one of them another name.")
+    published = {topic for row in rows for topic in row.outputs}
+    published |= set(outside) | {wire.name for wire in WIRES if wire.source in ("operator", "device")}
+    for row in rows:
+        for topic in row.inputs:
+            if topic not in published:
+                raise ConfigError(
+                    f"node '{row.name}' receives '{topic}', which nothing in the system publishes."
+                    f"{did_you_mean(topic, sorted(published))}"
+                )
+
+
+def _from_outside(plan: RunPlan) -> set[str]:
+    """Topics of nodes that Fulmar does not start."""
+    found = set()
+    if controller_entry(plan.controller).is_external:
+        found.add(command_wire(load_robot(plan.robot)).name)
+    if plan.hardware:  # motion capture, or another node that knows where the robot is
+        found |= {"odom", "mocap/pose"}
+    return found
+
+
+def _with_listeners(rows: list[NodeSpec], plan: RunPlan) -> list[NodeSpec]:
+    """The same rows, where plant and controller wait until all their subscribers are matched."""
+    command, paced = command_wire(load_robot(plan.robot)).name, paced_wire(plan).name
+    # An external controller answers odometry in lock step; by the clock, only its owner knows where it measures.
+    answers = plan.lockstep and controller_entry(plan.controller).is_external
+    awaited = {"plant": _listeners(rows, paced) + answers, "controller": _listeners(rows, command)}
+    return [
+        replace(row, parameters={**row.parameters, "wait_for_subscribers": awaited[row.name]})
+        if row.name in awaited
+        else row
+        for row in rows
+    ]
+
+
+def _listeners(rows: Iterable[NodeSpec], topic: str) -> int:
+    return sum(topic in (*row.inputs, *row.observed) for row in rows)
