@@ -272,3 +272,16 @@ def test_a_system_file_names_nodes_of_its_own(tmp_path, monkeypatch):
         "/floating_platform",
     )
     assert (row.inputs, row.parameters) == (("odom",), {"rate_hz": 5.0})
+
+
+@pytest.mark.parametrize(
+    ("changes", "repeats"),
+    [
+        ({}, False),
+        ({"scenario": "ideal"}, True),
+        ({"backend": "mock"}, True),
+    ],
+)
+def test_measurements_without_noise_may_repeat_while_a_robot_stands(changes, repeats):
+    parameters = controller_spec(replace(PLAN, **changes)).parameters
+    assert parameters.get("odometry_may_repeat", False) is repeats
