@@ -44,7 +44,7 @@ def said(level: str, message: str, mode: str = "running") -> Report:
 def wait_for_end(monkeypatch: pytest.MonkeyPatch, *plants: Report, end_on_estop: bool = False) -> None:
     monkeypatch.setattr(conductor, "raise_if_ended", lambda _group: None)
     group = SimpleNamespace()
-    conductor._wait_for_end(PLAN, Overseer(*plants), group, lambda _s: None, end_on_estop=end_on_estop)
+    conductor._wait_for_end(PLAN, Overseer(*plants), group, lambda *_: None, end_on_estop=end_on_estop)
 
 
 def test_an_e_stop_holds_the_run_until_its_time_is_over(monkeypatch):

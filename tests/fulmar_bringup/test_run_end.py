@@ -43,7 +43,7 @@ class Group:
 
 
 def watched(mode: str, *reports: tuple[str, str], end_on_estop: bool = False) -> None:
-    _wait_for_end(PLAN, Overseer(mode, *reports), Group(), lambda _s: None, end_on_estop=end_on_estop)
+    _wait_for_end(PLAN, Overseer(mode, *reports), Group(), lambda *_: None, end_on_estop=end_on_estop)
 
 
 def test_a_late_command_ends_a_run_that_acts():
@@ -65,7 +65,7 @@ def test_an_error_of_the_plant_ends_a_run_also_if_a_command_takes_it_back_at_onc
 
     overseer.wait_until = wait_until
     with pytest.raises(RunFailed, match="no command for 493 ms"):
-        _wait_for_end(PLAN, overseer, Group(), lambda _s: None, end_on_estop=False)
+        _wait_for_end(PLAN, overseer, Group(), lambda *_: None, end_on_estop=False)
 
 
 def test_an_e_stop_ends_a_run_only_if_asked_to():
