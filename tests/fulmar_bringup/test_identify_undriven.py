@@ -42,6 +42,7 @@ def test_what_is_known_is_kept_and_what_the_run_does_not_tell_is_named_and_left_
     assert load_calibration(out).mass is not None
 
 
+@pytest.mark.slow
 def test_damage_of_a_bag_is_named(tmp_path):
     bag = write_run(tmp_path / "bag", Plan())
     (bag / "bag_1.mcap").write_bytes(b"not a bag at all")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episodes
@@ -26,6 +27,7 @@ def to_and_fro(robot, distance):
     return Episode(start, stack_goals([goal_at((0.0, 0.0, 0.0), (distance, 0.0, 0.0))]), drawn.world)
 
 
+@pytest.mark.slow
 def test_wheels_are_bounded_by_their_top_speed_and_by_how_fast_they_turn():
     robot = load_robot("turtlebot2")
     bound = waypoint_bound(robot, TASK, to_and_fro(robot, 4.0), 60.0)
