@@ -219,7 +219,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             parameters,
             remappings=dict(plan.remappings),
             inputs=(command_wire(load_robot(plan.robot)).name,),
-            outputs=tuple({ACTUATORS_STATE.name, IMU.name, paced_wire(plan).name}),
+            outputs=tuple(dict.fromkeys((ACTUATORS_STATE.name, IMU.name, paced_wire(plan).name))),
         )
     parameters |= _motion_capture(plan)
     block = (BLOCK.name,) if load_task(plan.task).pushes else ()
