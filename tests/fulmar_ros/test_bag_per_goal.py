@@ -79,3 +79,20 @@ def test_what_is_attached_late_is_in_every_bag_that_follows(recording):
     for folder in recording.folder.iterdir():
         (file,) = folder.glob("*.mcap")
         assert b"code" in file.read_bytes()
+
+
+def test_a_bag_that_cannot_be_closed_at_once_is_closed_later(recording, monkeypatch):
+    close, refusals = BagWriter.close, [OSError(28, "no room")]
+
+    def full_once(bag):
+        if refusals:
+            raise refusals.pop()
+        close(bag)
+
+    monkeypatch.setattr(BagWriter, "close", full_once)
+    recording.take("first", topic=GOAL)
+    with pytest.raises(OSError, match="no room"):
+        recording.take("second", topic=GOAL)
+    recording.take("a")
+    recording.take("third", topic=GOAL)
+    assert recording.words() == [["first", "second"], ["second", "a", "third"], ["third"]]

@@ -85,6 +85,7 @@ def give(neighbour: Neighbour, x: float, y: float) -> None:
     neighbour.node.destroy_publisher(publisher)
 
 
+@pytest.mark.slow
 def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_other(
     neighbour: Neighbour, start: Any, tmp_path: Path
 ) -> None:
@@ -117,6 +118,7 @@ def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_oth
     assert not record.applied.effort[-1].any()
 
 
+@pytest.mark.slow
 def test_ctrl_c_counts_no_trip_and_one_bag_holds_all(
     neighbour: Neighbour, start: Any, tmp_path: Path
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -143,7 +144,8 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
 
     failure, _ = run_nodes(request, watch)
     trips = plant_report.values.get("watchdog_trips")
-    return Ending("" if failure in (stopped, STOPPED) else failure, int(trips) if trips else None)
+    asked = re.fullmatch(rf"{STOPPED}|stopped by SIG[A-Z]+", failure)  # also while the nodes still start
+    return Ending("" if asked else failure, int(trips) if trips else None)
 
 
 def _who(plan: RunPlan) -> dict[str, Any]:

@@ -42,6 +42,7 @@ class BagPerGoal:
         self._next_try = 0.0
         self._repeated = 0  # latched messages that bags begin with
         self._bags = [open_bag(1)]
+        self._unclosed: list[BagWriter] = []
 
     @property
     def messages(self) -> int:
@@ -100,15 +101,23 @@ class BagPerGoal:
         if self._due and now >= self._next_try:
             self._next_try = now + RETRY_S
             self._begin()
+        self._close_old()
         self._bags[-1].tick(now)
 
     def close(self) -> None:
         """As `BagWriter.close`."""
+        self._close_old()
         self._bags[-1].close()
+
+    def _close_old(self) -> None:
+        """Close the bags of earlier goals; one that the disk refuses is tried again."""
+        while self._unclosed:
+            self._unclosed[-1].close()
+            self._unclosed.pop()
 
     def _begin(self) -> None:
         new = self._open_bag(len(self._bags) + 1)
-        self._bags[-1].close()
+        self._unclosed.append(self._bags[-1])
         self._bags.append(new)
         self._due = False
         for name, data in self._attachments.items():
