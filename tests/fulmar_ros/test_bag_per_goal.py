@@ -13,7 +13,7 @@ GOAL, OBSTACLES, S = "/robot/goal", "/robot/obstacles", 1_000_000_000
 
 
 class Recording:
-    """A bag for each goal, on a disk that refuses a bag when told so."""
+    """A bag for each goal, on a disk that refuses a bag while `refuses` is set."""
 
     def __init__(self, folder):
         self.folder, self.refuses = folder, False

@@ -52,12 +52,12 @@ class Up:
         except AssertionError as error:
             raise AssertionError(f"no {name} for the {times}. time in {self.events}") from error
 
-    def end(self, number: signal.Signals) -> int:
-        """Send a signal, and wait for the exit code."""
+    def end(self, number: signal.Signals) -> None:
+        """Send a signal, and wait for the end."""
         self.process.send_signal(number)
         code = int(self.process.wait(20.0))
-        until(lambda: "stopped" in self.names)
-        return code
+        self.wait_for("stopped")
+        assert code == DONE, self.events[-1]
 
 
 @pytest.fixture
@@ -104,7 +104,7 @@ def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_oth
     up.wait_for("reset")
     give(neighbour, 0.4, 0.0)
     up.wait_for("reached", 4)
-    assert up.end(signal.SIGTERM) == DONE
+    up.end(signal.SIGTERM)
     assert [name for name in up.names if name not in ("goal_refused", *LOAD)] == [
         "started", *["goal", "reached"] * 3, "swapped", "estop", "reset", "goal", "reached", "stopping", "stopped",
     ]  # fmt: skip
@@ -127,7 +127,7 @@ def test_ctrl_c_counts_no_trip_and_one_bag_holds_all(
     give(neighbour, 1.0, 0.0)
     up.wait_for("goal")
     until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
-    assert up.end(signal.SIGINT) == DONE
+    up.end(signal.SIGINT)
     assert up.names == ["started", "goal", "stopping", "stopped"]
     assert up.events[-1]["watchdog_trips"] == 0
     assert up.events[-1]["bags"] == ["bag"]

@@ -42,7 +42,7 @@ def list_nodes(
         controller: Another controller.
         backend: Another backend.
         policy: Folder of a bundle; the shipped one by default.
-        goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it somebody else gives goals.
+        goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it goals come from outside.
         hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.

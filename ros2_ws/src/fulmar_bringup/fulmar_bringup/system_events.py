@@ -10,6 +10,7 @@ from fulmar_core.goal_sequence import HOLD_S
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
 
+ARRIVES_S = 0.3  # after a controller reports that it acts, its command has arrived
 Emit = Callable[..., None]  # name of the event, and its fields by keyword
 
 
@@ -19,6 +20,7 @@ class Reported(Protocol):
     level: str
     message: str
     values: dict[str, str]
+    heard: float  # when it came, by a monotonic clock [s]
 
 
 class SystemEvents:
@@ -46,6 +48,7 @@ class SystemEvents:
         self._controller: tuple[str, str] | None = None
         self._swap = ""
         self._held = False
+        self._acts_since: float | None = None  # when the controller began to act [s]
         self._faults: dict[str, str] = {}
 
     def look(self, plant: Reported, controller: Reported, time_s: float) -> None:
@@ -60,10 +63,20 @@ class SystemEvents:
         if controller.values:
             self._look_at_controller(controller.values, time_s)
             self._look_at_goal(controller.values, time_s)
-        # Until a controller acts there is no command to miss.
-        waits = plant.message.startswith(NO_COMMAND) and controller.values.get("mode") == "armed"
+        waits = plant.message.startswith(NO_COMMAND) and not self._is_commanded(plant, controller)
         self._look_at_fault("plant", plant, time_s, excused=self._held or waits)
         self._look_at_fault("controller", controller, time_s, excused=self._held)
+
+    def _is_commanded(self, plant: Reported, controller: Reported) -> bool:
+        """Whether a plant can miss commands: its report is later than the first one of its controller.
+
+        A controller that reports nothing is an external one, whose commands nobody announces.
+        """
+        if controller.values.get("mode") == "armed":
+            self._acts_since = None
+        elif self._acts_since is None:
+            self._acts_since = controller.heard
+        return self._acts_since is not None and plant.heard - self._acts_since > ARRIVES_S
 
     def _look_at_estop(self, plant: Reported, time_s: float) -> None:
         held = plant.message.startswith(HOLDS)

@@ -59,9 +59,9 @@ def number_of(info: Mapping[str, Any], name: str, default: float) -> float:
 
 
 def begins_with_its_run(info: Mapping[str, Any]) -> bool:
-    """Whether a bag holds its run from the beginning, and not just what was about a fault, or a later goal."""
-    told = info.get("recording")
-    return not (isinstance(told, Mapping) and told.get("mode") in ("ring", "goals"))
+    """Whether a bag holds its run from the beginning, not only from a fault or a later goal on."""
+    recording = info.get("recording")
+    return not (isinstance(recording, Mapping) and recording.get("mode") in ("ring", "goals"))
 
 
 def presses_of(bag: Bag) -> tuple[Told, ...]:
