@@ -68,10 +68,7 @@ class SystemEvents:
         self._look_at_fault("controller", controller, time_s, excused=self._held)
 
     def _is_commanded(self, plant: Reported, controller: Reported) -> bool:
-        """Whether a plant can miss commands: its report is later than the first one of its controller.
-
-        A controller that reports nothing is an external one, whose commands nobody announces.
-        """
+        """Whether a plant can miss commands: it has reported since its controller began to act."""
         if controller.values.get("mode") == "armed":
             self._acts_since = None
         elif self._acts_since is None:
