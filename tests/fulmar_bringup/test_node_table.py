@@ -242,6 +242,11 @@ def test_an_input_that_nothing_publishes_is_refused_with_the_nearest_topic():
     assert "camera" in system_rows(replace(PLAN, nodes=(own_node(inputs=("odom", "estop", "image")),)))
 
 
+def test_a_second_clock_is_refused():
+    with pytest.raises(ConfigError, match="plant and camera publish /clock"):
+        system_rows(replace(PLAN, nodes=(own_node(outputs=("/clock",)),)))
+
+
 def test_exactly_one_node_of_every_system_publishes_the_clock_of_a_simulation():
     for system in config_names("systems"):
         rows = list_nodes(system=system)

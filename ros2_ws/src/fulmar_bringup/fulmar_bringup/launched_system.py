@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import shutil
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -84,6 +86,7 @@ def list_nodes(
         if plan.backend != "hardware":
             raise ConfigError(f"an emulator stands in for hardware, and the backend is {plan.backend}.")
         plan, wires = replace(plan, emulated=True), Path(tempfile.mkdtemp(prefix="fulmar_"))
+        atexit.register(shutil.rmtree, wires, ignore_errors=True)  # with the launch itself
     check_external(plan.controller, plan.guards, adapter=adapter, topic=topic, lockstep=False)
     plan = replace(plan, adapter=adapter_path(plan.robot, adapter), adapter_topic=topic or "")
     if goals:

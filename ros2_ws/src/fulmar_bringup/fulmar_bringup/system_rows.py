@@ -25,7 +25,7 @@ from fulmar_bringup.node_table import (
 from fulmar_bringup.system import System
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.robot import load_robot
-from fulmar_core.topics import WIRES, command_wire
+from fulmar_core.topics import CLOCK, WIRES, command_wire
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
 
@@ -90,7 +90,7 @@ def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None
         outside: Topics that come from elsewhere, beside those of operators and devices.
 
     Raises:
-        ConfigError: Two have one name, or one has an input that nothing publishes.
+        ConfigError: Two have one name or publish the clock, or one has an input that nothing publishes.
     """
     rows = list(rows)
     names = [row.name for row in rows]
@@ -98,6 +98,11 @@ def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None
         if names.count(name) > 1:
             modules = " and ".join(row.module for row in rows if row.name == name)
             raise ConfigError(f"two nodes are called '{name}': {modules}. Give one of them another name.")
+    clocks = [row.name for row in rows if CLOCK.name in row.outputs]
+    if len(clocks) > 1:
+        raise ConfigError(
+            f"{' and '.join(clocks)} publish {CLOCK.name}, and a system has one clock. Leave one out."
+        )
     published = {topic for row in rows for topic in row.outputs}
     published |= set(outside) | {wire.name for wire in WIRES if wire.source in ("operator", "device")}
     for row in rows:
