@@ -288,6 +288,8 @@ def test_the_recorder_keeps_everything_unless_asked_otherwise(plan):
 def test_an_unknown_way_to_record_is_refused_with_the_nearest(plan):
     with pytest.raises(UnknownNameError, match="Did you mean 'ring'"):
         plan(recording="rign")
+    with pytest.raises(ConfigError, match="a run has one bag"):
+        plan(recording="goals")
 
 
 def test_the_system_file_says_how_to_record(plan, tmp_path, monkeypatch):

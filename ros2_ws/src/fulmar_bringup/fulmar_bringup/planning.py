@@ -190,7 +190,7 @@ def plan_run(
         emulated=emulate,
         arm=arm,
         guards=watched,
-        recording=chosen_recording(controller, backend, recording),
+        recording=_recording_of_run(controller, backend, recording),
         copies=copies,
         controller_network=controller_network,
         mocap_hz=_checked_mocap(mocap_hz, hardware, emulate=emulate, lockstep=lockstep),
@@ -371,19 +371,33 @@ def checked_rate(robot: Robot, control_hz: float) -> float:
     return control_hz
 
 
-def chosen_recording(controller: str, backend: str, mode: str | None) -> Recording:
-    """What the system file says of the recorder, in another mode where one is given.
+def chosen_recording(usual: Recording, mode: str | None) -> Recording:
+    """How to record, in another mode than usual where one is given.
 
     Raises:
         ConfigError: There is no such mode.
     """
-    system = system_of(controller, backend)
-    recording = system.recorder if system else Recording()
     if mode is None:
-        return recording
+        return usual
     if mode not in MODES:
         raise UnknownNameError("recording", mode, MODES)
-    return replace(recording, mode=cast(Mode, mode))
+    return replace(usual, mode=cast(Mode, mode))
+
+
+def _recording_of_run(controller: str, backend: str, mode: str | None) -> Recording:
+    """How the matching system file records, or as asked; a run has one bag.
+
+    Raises:
+        ConfigError: There is no such mode, or it makes several bags.
+    """
+    system = system_of(controller, backend)
+    usual = system.recorder if system else Recording()
+    if usual.mode == "goals":
+        usual = replace(usual, mode="whole")
+    chosen = chosen_recording(usual, mode)
+    if chosen.mode == "goals":
+        raise ConfigError("a run has one bag: --recording goals is for `fulmar up`. Leave it out.")
+    return chosen
 
 
 def check_beat(control_hz: float, rate: float) -> None:

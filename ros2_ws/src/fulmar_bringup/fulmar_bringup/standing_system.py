@@ -20,7 +20,7 @@ from fulmar_bringup.conductor import (
 )
 from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
 from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.planning import PoseTuple, RunRequest, plan_run
+from fulmar_bringup.planning import PoseTuple, RunRequest, chosen_recording, plan_run
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import raise_if_ended, while_starting
 from fulmar_bringup.supervisor import Report, Supervisor
@@ -28,7 +28,6 @@ from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
 from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.errors import ConfigError, RunFailed
-from fulmar_core.recording import Recording
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from policy_server.controllers import controller_entry
@@ -49,7 +48,7 @@ def plan_system(
     seed: int = 0,
     start: PoseTuple | None = None,
     rate: float = 1.0,
-    recording: Recording | None = None,
+    recording: str | None = None,
 ) -> RunRequest:
     """Plan a system that has no end.
 
@@ -65,7 +64,7 @@ def plan_system(
         seed: Seed.
         start: Where a simulated robot begins; the origin by default.
         rate: Simulated seconds a wall-clock second.
-        recording: Instead of the system's own.
+        recording: A mode of `fulmar_core.recording` instead of the system's own.
 
     Raises:
         ConfigError: As of `plan_run`; or a bag for each goal, where goals stream.
@@ -92,7 +91,7 @@ def plan_system(
         guards={name: value for name, value in asdict(system.guards).items() if value},
         goals_later=True,
     )
-    kept = recording or system.recorder
+    kept = chosen_recording(system.recorder, recording)
     if kept.mode == "goals" and load_task(system.task).goal_topic == "goal_velocity":
         raise ConfigError(
             f"velocities stream: task '{system.task}' gets no bag for each goal. Use --recording whole or ring."

@@ -69,11 +69,6 @@ class BagPerGoal:
         """Bytes that the disk has not taken yet."""
         return sum(bag.waiting for bag in self._bags)
 
-    @property
-    def count(self) -> int:
-        """Bags so far."""
-        return len(self._bags)
-
     def write(self, topic: str, data: bytes, *, log_ns: int) -> None:
         """As `BagWriter.write`; a new goal gets its bag with the next `tick`."""
         self._bags[-1].write(topic, data, log_ns=log_ns)
@@ -105,9 +100,11 @@ class BagPerGoal:
         self._bags[-1].tick(now)
 
     def close(self) -> None:
-        """As `BagWriter.close`."""
-        self._close_old()
-        self._bags[-1].close()
+        """As `BagWriter.close`, also where the disk refuses to close an earlier one."""
+        try:
+            self._close_old()
+        finally:
+            self._bags[-1].close()
 
     def _close_old(self) -> None:
         """Close the bags of earlier goals; one that the disk refuses is tried again."""

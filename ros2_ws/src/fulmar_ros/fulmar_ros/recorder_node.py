@@ -15,7 +15,7 @@ from rclpy.subscription import Subscription
 
 from fulmar_core.errors import BagError
 from fulmar_core.exit_codes import DONE, FAILED
-from fulmar_core.topics import COMMAND, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire
+from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire
 from fulmar_ros.bag_per_goal import BagPerGoal
 from fulmar_ros.bag_ring import BagRing
 from fulmar_ros.bag_thread import BagThread
@@ -106,7 +106,9 @@ class RecorderNode(Node):
         check_free(self._directory)
         return BagPerGoal(
             lambda number: self._open_bag(f"goal_{number:03d}"),
-            goals={topic for wire, topic in self._topics.items() if wire.name in GOAL_WIRES},
+            goals={
+                topic for wire, topic in self._topics.items() if wire in (*GOAL_WIRES.values(), GOAL_POSES)
+            },
             latched=self._latched,
         )
 

@@ -7,7 +7,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import typer
 
@@ -20,9 +20,7 @@ from fulmar_bringup.commands.arguments import (
 )
 from fulmar_bringup.console import console, output
 from fulmar_bringup.progress import live_line
-from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import DONE, FAILED
-from fulmar_core.recording import MODES, Mode
 
 
 def up(
@@ -104,8 +102,6 @@ def up(
     )
     if estop:
         chosen = replace(chosen, guards=replace(chosen.guards, estop=True))
-    if recording is not None and recording not in MODES:
-        raise UnknownNameError("recording", recording, MODES)
     request = plan_system(
         chosen,
         record=record or default_record(chosen.robot, chosen.controller),
@@ -118,7 +114,7 @@ def up(
         seed=seed,
         start=read_pose(start, "--start"),
         rate=rate,
-        recording=replace(chosen.recorder, mode=cast(Mode, recording)) if recording else None,
+        recording=recording,
     )
     plan = request.plan
     if note := gains_note(plan.robot, plan.controller):
@@ -128,10 +124,10 @@ def up(
             plan.controller, plan.backend, guards=plan.guards, hardware=plan.hardware, emulated=emulate
         )
     )
-    tell = _print_json if as_json else _print_words
+    report = _print_json if as_json else _print_words
     with live_line() as show:
-        end = keep_up(request, tell, show)
-    tell(
+        end = keep_up(request, report, show)
+    report(
         "stopped",
         failure=end.failure or None,
         watchdog_trips=end.watchdog_trips,

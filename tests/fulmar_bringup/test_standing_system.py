@@ -1,0 +1,70 @@
+"""A system without an end: its plan, its ending, and the line that shows how it is."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from fulmar_bringup.progress import live_line
+from fulmar_bringup.standing_system import Ending, keep_up, plan_system
+from fulmar_bringup.system import varied_system
+from fulmar_core.errors import ConfigError, UnknownNameError
+
+
+@pytest.fixture
+def plan(tmp_path):
+    """Function that plans a system."""
+
+    def planned(system="mujoco_lqr", *, changes=None, **more):
+        chosen = varied_system(system, **(changes or {}))
+        return plan_system(chosen, record=tmp_path / "bag", command="fulmar up", **more).plan
+
+    return planned
+
+
+def test_a_system_has_no_end_and_begins_at_the_origin(plan):
+    planned = plan()
+    assert (planned.duration_s, planned.start, planned.control_hz) == (0.0, (0.0, 0.0, 0.0), 50.0)
+    assert plan(start=(1.0, 2.0, 90.0)).start == (1.0, 2.0, 90.0)
+
+
+def test_on_hardware_goals_come_later_and_an_e_stop_runs(plan):
+    planned = plan(changes={"robot": "turtlebot2", "task": "go_to_position", "controller": "classical",
+                            "backend": "hardware"})  # fmt: skip
+    assert planned.hardware.endswith("turtlebot2.yaml")
+    assert planned.guards.estop
+
+
+def test_velocities_get_no_bag_for_each_goal(plan):
+    assert plan(recording="goals").recording.mode == "goals"
+    with pytest.raises(ConfigError, match="velocities stream"):
+        plan(changes={"task": "track_velocities"}, recording="goals")
+    with pytest.raises(UnknownNameError, match="Did you mean 'goals'"):
+        plan(recording="goal")
+
+
+@pytest.mark.parametrize(
+    ("reason", "failure"),
+    [
+        ("stopped by the user", ""),
+        ("stopped by SIGTERM", ""),  # while the nodes still start
+        ("stopped by SIGTERM; recorder ended with exit code 1 when it was stopped",) * 2,
+        ("controller was killed by SIGKILL before the run was over",) * 2,
+    ],
+)
+def test_a_system_that_is_stopped_has_not_failed(reason, failure, monkeypatch):
+    monkeypatch.setattr("fulmar_bringup.standing_system.run_nodes", lambda *_: (reason, 0))
+    assert keep_up(None, None, None) == Ending(failure, None)
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_the_live_line_is_for_terminals_alone(terminal, monkeypatch):
+    screen = io.StringIO()
+    monkeypatch.setattr(
+        "fulmar_bringup.progress.console", Console(file=screen, force_terminal=terminal, width=80)
+    )
+    with live_line() as show:
+        show(12.3, 0.42, "active")
+    assert ("12.3 s  active, 0.42 m from the goal" in screen.getvalue()) == terminal
