@@ -22,6 +22,17 @@ class RosDomain:
     env: dict[str, str]  # environment of every process that shall see it
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--seeds 20` repeats what depends on chance: pytest tests/ros/test_six_nozzles.py --seeds 20."""
+    parser.addoption("--seeds", type=int, default=1, help="seeds of each test that takes `seed_of_series`")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Give a test that takes `seed_of_series` each seed from 1 on."""
+    if "seed_of_series" in metafunc.fixturenames:
+        metafunc.parametrize("seed_of_series", range(1, metafunc.config.getoption("seeds") + 1))
+
+
 def pytest_collection_finish() -> None:
     """Exempt every imported module from the garbage collection between tests of ROS nodes."""
     gc.collect()

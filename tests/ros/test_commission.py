@@ -33,9 +33,20 @@ DRIVERS = (  # one file of each kind
 STARTS_S = 40.0
 
 
-def commissioned(hardware: str, wiring: str, ros_domain: RosDomain, cwd: Path, *more: str):
+def commissioned(hardware: str, wiring: str, ros_domain: RosDomain, cwd: Path, *more: str, seed: int = 5):
     arm = ("--arm",) if isinstance(load_hardware(hardware).driver, MavlinkBoat) else ()
-    asked = ("commission", hardware, "--emulate", "--wiring", wiring, "--seed", "5", "--yes", *arm, "--json")
+    asked = (
+        "commission",
+        hardware,
+        "--emulate",
+        "--wiring",
+        wiring,
+        "--seed",
+        str(seed),
+        "--yes",
+        *arm,
+        "--json",
+    )
     return fulmar(*asked, *more, env=ros_domain.env, cwd=cwd, timeout_s=150.0)
 
 
@@ -48,6 +59,17 @@ def test_a_shuffled_wiring_is_found_and_written(hardware, ros_domain, tmp_path):
     written = load_hardware(str(tmp_path / "mine.yaml")).driver
     assert list(getattr(written, found["key"])) == found[found["key"]]
     assert found["seconds"] < 60.0
+
+
+@pytest.mark.parametrize("hardware", DRIVERS)
+def test_each_wire_is_identified_or_named(hardware, seed_of_series, ros_domain, tmp_path):
+    wiring = ("shuffled", "inverted", "dead")[seed_of_series % 3]
+    done = commissioned(hardware, wiring, ros_domain, tmp_path, seed=100 + seed_of_series)
+    found = json_of(done.stdout)
+    assert found["right"], (found, done.stderr)
+    if wiring == "dead":
+        assert len(found["dead"]) == 1
+        assert any(f"{found['dead'][0]} does not answer" in problem for problem in found["problems"])
 
 
 @pytest.mark.parametrize("hardware", ["zero_g_lab", "turtlebot2"])

@@ -19,6 +19,7 @@ from fulmar_bringup.robot_operator import Operator
 from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
 from fulmar_core.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
+from policy_server.shipped import shipped_policy
 from tests.conftest import RosDomain
 from tests.ros.cli import child_running, fulmar, start_fulmar
 from tests.ros.controllers import copy_of
@@ -116,6 +117,21 @@ def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_oth
         assert not record.warnings
         assert len(record.goals) == (2 if number < 3 else 1)  # its own, and the one that ended it
     assert not record.applied.effort[-1].any()
+
+
+@pytest.mark.slow
+def test_the_controller_of_a_recorded_system_takes_every_swap(
+    seed_of_series: int, neighbour: Neighbour, ros_domain: RosDomain, start: Any, tmp_path: Path
+) -> None:
+    """To a copy and back, each asked by a command of its own."""
+    up = start("mock_policy")
+    up.wait_for("started")
+    second = copy_of(tmp_path, "second")
+    for number, folder in enumerate([second, shipped_policy(ROBOT, "go_to_pose")] * 5, start=1):
+        done = fulmar("swap", ROBOT, str(folder), env=ros_domain.env, cwd=tmp_path)
+        assert done.returncode == DONE, done.stderr
+        up.wait_for("swapped", number)
+    up.end(signal.SIGTERM)
 
 
 @pytest.mark.slow
