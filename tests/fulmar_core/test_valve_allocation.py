@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fulmar_core.actuators.thrusters import Nozzle
+from fulmar_core.controllers import valve_allocation
 from fulmar_core.controllers.valve_allocation import ValveAllocation
 from fulmar_core.robot import load_robot
 
@@ -70,7 +71,46 @@ def test_a_batch_is_answered_like_its_members():
     np.testing.assert_array_equal(together, [ALLOCATION.best(row) for row in wanted])
 
 
-def test_too_many_valves_for_a_table_are_refused():
-    nozzles = tuple(Nozzle(f"n{i}", (0.1 * i, 0.0, 0.0), (0.0, 1.0, 0.0)) for i in range(13))
-    with pytest.raises(ValueError, match=r"13 valves make too many combinations \(at most 12"):
-        ValveAllocation(replace(THRUSTERS, nozzles=nozzles), weight=WEIGHT, valve_cost=0.0)
+def bank_of(count, shared):
+    """Nozzles at random places of a disc, in random directions."""
+    rng = np.random.default_rng(count)
+    place, heading = rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    arm = rng.uniform(0.2, 0.4, count)
+    nozzles = tuple(
+        Nozzle(f"n{i}", (r * np.cos(a), r * np.sin(a), 0.0), (np.cos(d), np.sin(d), 0.0))
+        for i, (r, a, d) in enumerate(zip(arm, place, heading, strict=True))
+    )
+    return replace(THRUSTERS, nozzles=nozzles, shared_pressure=shared)
+
+
+@pytest.mark.parametrize("shared", [True, False])
+@pytest.mark.parametrize("searched", [True, False])
+def test_banks_of_14_valves_are_answered_like_all_combinations(searched, shared, monkeypatch):
+    """To 16 valves from a table. Beyond it a search finds the best of a shared line, and else nearly the best."""
+    if searched:
+        monkeypatch.setattr(valve_allocation, "MOST_IN_TABLE", 4096)
+    bank = bank_of(14, shared)
+    allocation = ValveAllocation(bank, weight=WEIGHT, valve_cost=VALVE_COST)
+    assert len(allocation.every[0]) < 4096
+    every = np.array(list(itertools.product((0.0, 1.0), repeat=14)))
+    wanted = np.random.default_rng(3).normal(size=(40, 3))
+    chosen = allocation.best(wanted)
+    np.testing.assert_array_equal(chosen, [allocation.best(row) for row in wanted])
+    gaps = np.array(
+        [costs(v, row, bank) - costs(every, row, bank).min() for v, row in zip(chosen, wanted, strict=True)]
+    )
+    gaps /= np.einsum("ri,ij,rj->r", wanted, WEIGHT, wanted)  # the cost of doing nothing
+    assert np.max(gaps) < (0.1 if searched and not shared else 1e-9)
+    assert np.median(gaps) < 1e-9
+
+
+@pytest.mark.parametrize("count", [16, 24])
+@pytest.mark.parametrize("shared", [True, False])
+def test_a_dead_valve_of_a_large_bank_stays_closed(count, shared):
+    allocation = ValveAllocation(bank_of(count, shared), weight=WEIGHT, valve_cost=VALVE_COST)
+    wanted = np.random.default_rng(4).normal(size=(20, 3))
+    alive = np.ones((20, count))
+    alive[np.arange(20), np.argmax(allocation.best(wanted), axis=-1)] = 0.0
+    chosen = allocation.best(wanted, alive, dearer=np.full(20, 0.001))
+    assert chosen.any()
+    assert not np.any(chosen * (1.0 - alive))

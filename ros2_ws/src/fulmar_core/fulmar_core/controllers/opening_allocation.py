@@ -14,7 +14,6 @@ import itertools
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.valve_allocation import MAX_VALVES
 from fulmar_core.rotation import Array
 
 MOST = 4  # corners in a mixture: one more than a wrench has numbers
@@ -33,8 +32,6 @@ class OpeningAllocation:
             valve_cost: Cost of a fully open valve, >= 0.
         """
         count = len(thrusters.nozzles)
-        if count > MAX_VALVES:
-            raise ValueError(f"{count} valves make too many combinations (at most {MAX_VALVES} valves).")
         if not thrusters.shared_pressure:
             raise ValueError(
                 "valves that open by degrees need 'shared_pressure'; there is no allocation without."

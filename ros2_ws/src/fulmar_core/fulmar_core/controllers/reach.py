@@ -15,26 +15,13 @@ class Reach:
     """The forces that valves can bring up in the plane, as a convex polygon."""
 
     def __init__(self, thrusters: Thrusters) -> None:
-        """Find the polygon's sides: lines through two corners that leave all others on one side.
+        """Find the polygon's sides.
 
-        With a shared pressure line the corners are what single valves do, else what combinations do.
+        With a shared pressure line it is the hull of what single valves do; without, the sum of what each does or
+        leaves undone (a zonotope), whose sides lie along the nozzles.
         """
-        count = len(thrusters.nozzles)
-        alone = np.eye(count)
-        combinations = (
-            alone
-            if thrusters.shared_pressure
-            else np.array(list(itertools.product((0.0, 1.0), repeat=count)))
-        )
-        force = thrusters.wrench_in_body(combinations)[0][:, :2]
-        corners = np.unique(np.round(np.vstack((force, np.zeros(2))), 9), axis=0)
-        sides = []
-        for a, b in itertools.permutations(range(len(corners)), 2):
-            x, y = corners[b] - corners[a]
-            normal = np.array([y, -x]) / np.hypot(x, y)
-            level = float(normal @ corners[a])
-            if np.all(corners @ normal <= level + 1e-6):
-                sides.append((*normal, level))
+        alone = thrusters.wrench_in_body(np.eye(len(thrusters.nozzles)))[0][:, :2]
+        sides = _hull(alone) if thrusters.shared_pressure else _zonotope(alone)
         table = np.unique(np.round(np.array(sides), 6), axis=0)
         self._normals, self._levels = table[:, :2], table[:, 2]
 
@@ -56,3 +43,25 @@ class Reach:
         steep = direction @ self._normals.T
         most = np.where(steep > 1e-6, room / np.maximum(steep, 1e-6), UNBOUNDED)
         return np.asarray(np.maximum(np.min(most, axis=-1), 0.0))
+
+
+def _hull(forces: np.ndarray) -> list[tuple[float, float, float]]:
+    """Lines through two corners that leave all others on one side: normals and levels."""
+    corners = np.unique(np.round(np.vstack((forces, np.zeros(2))), 9), axis=0)
+    sides = []
+    for a, b in itertools.permutations(range(len(corners)), 2):
+        x, y = corners[b] - corners[a]
+        normal = np.array([y, -x]) / np.hypot(x, y)
+        level = float(normal @ corners[a])
+        if np.all(corners @ normal <= level + 1e-6):
+            sides.append((*normal, level))
+    return sides
+
+
+def _zonotope(forces: np.ndarray) -> list[tuple[float, float, float]]:
+    """Lines along each force, and across it for banks whose forces are all parallel: normals and levels."""
+    along = forces / np.hypot(*forces.T)[:, None]
+    across = np.stack((along[:, 1], -along[:, 0]), axis=-1)
+    normals = np.concatenate((along, -along, across, -across))
+    levels = np.maximum(forces @ normals.T, 0.0).sum(axis=0)
+    return [(x, y, level) for (x, y), level in zip(normals.tolist(), levels.tolist(), strict=True)]

@@ -1,19 +1,25 @@
 """Which valves to open for a wanted wrench, when valves share one pressure line.
 
 With n open valves giving 1/n each, wrenches do not add up, so the usual pseudo-inverse or linear programme is
-wrong here. The set of reachable wrenches is finite, though, and small: we list it once and look up the best.
+wrong here. The set of reachable wrenches is finite, though: we list it once and look up the best. Where it is too
+large, the table holds what few valves do, and its best is improved by changing one valve or two at a time.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.rotation import Array
 
-MAX_VALVES = 12  # 4,096 combinations; beyond it the table costs more than it is worth
+MOST_IN_TABLE = 2**16  # combinations; 16 valves take 0.2 ms a wrench, and more are searched for in less
+MOST_LISTED = 2**12  # for those who weigh every combination in every step
+ROUNDING = 1e-12  # a smaller gain is none
+STARTS = 8  # combinations of the table that are improved
+MOST_CHANGES = 12  # of one valve or two; banks of 17 to 24 valves need 0 to 5
 
 
 class ValveAllocation:
@@ -21,7 +27,8 @@ class ValveAllocation:
 
     Attributes:
         every: Commands (k, n), wrenches (k, 3), and costs of these without the part that depends on what is wanted,
-        (k,). weight: Cost of a wrench error, shape (3, 3).
+            (k,); all combinations, or those of few valves where all would be more than `MOST_LISTED`.
+        weight: Cost of a wrench error, shape (3, 3).
     """
 
     def __init__(self, thrusters: Thrusters, *, weight: np.ndarray, valve_cost: float) -> None:
@@ -33,17 +40,13 @@ class ValveAllocation:
             valve_cost: Cost of each open valve, >= 0; settles ties in favour of less gas.
         """
         count = len(thrusters.nozzles)
-        if count > MAX_VALVES:
-            raise ValueError(f"{count} valves make too many combinations (at most {MAX_VALVES} valves).")
-        commands = np.array(list(itertools.product((0.0, 1.0), repeat=count)))
-        force, torque = thrusters.wrench_in_body(commands)
-        wrench = np.concatenate((force[:, 0:2], torque[:, 2:3]), axis=1)
-        cost = valve_cost * commands.sum(axis=1)
-        # (w - w*)ᵀ H (w - w*) + cost, less the part that does not depend on the choice.
-        offset = np.einsum("ki,ij,kj->k", wrench, weight, wrench) + cost
-        keep = _cheapest_of_equal_wrench(wrench, cost)
-        self.every, self._worth = (commands, wrench, offset), (commands[keep], wrench[keep], offset[keep])
-        self.weight = weight
+        self._thrusters, self._valve_cost, self.weight = thrusters, valve_cost, weight
+        self._whole = 2**count <= MOST_IN_TABLE
+        few = self._listed(_few(count) if 2**count > MOST_LISTED else _all(count))
+        self.every, self._table = few, self._listed(_all(count)) if self._whole else few
+        keep = _cheapest_of_equal_wrench(self._table[1], valve_cost * self._table[0].sum(axis=1))
+        self._worth = tuple(each[keep] for each in self._table)
+        self._changes = np.vstack((np.zeros(count), _of_size(count, 1), _of_size(count, 2)))
 
     def best(self, wanted: Array, alive: Array | None = None, dearer: Array | None = None) -> Array:
         """Combination with the least weighted error.
@@ -59,13 +62,71 @@ class ValveAllocation:
             Valves, open (1) or closed (0), shape (..., n).
         """
         some_dead = alive is not None and not np.all(alive)
-        commands, wrench, offset = self.every if some_dead else self._worth
+        commands, wrench, offset = self._table if some_dead else self._worth
         cost = offset - 2.0 * (np.asarray(wanted) @ self.weight) @ wrench.T
         if dearer is not None:
             cost = cost + np.asarray(dearer)[..., None] * commands.sum(axis=-1)
         if some_dead:
             cost = np.where((1.0 - np.asarray(alive)) @ commands.T > 0.5, np.inf, cost)
-        return commands[np.argmin(cost, axis=-1)]
+        if self._whole:
+            return commands[np.argmin(cost, axis=-1)]
+        starts = commands[np.argpartition(cost, STARTS, axis=-1)[..., :STARTS]]
+        return self._improved(starts, np.asarray(wanted), alive, dearer)
+
+    def _improved(self, valves: Array, wanted: Array, alive: Array | None, dearer: Array | None) -> Array:
+        """Change the one valve or the two that gain most until nothing gains, from each start, shape (..., starts, n).
+
+        Returns:
+            The best that any start led to, shape (..., n).
+        """
+        price = self._valve_cost + (0.0 if dearer is None else np.asarray(dearer)[..., None, None])
+        lost = None if alive is None else (1.0 - np.asarray(alive))[..., None, None, :]
+        for _ in range(MOST_CHANGES):
+            tried = np.abs(valves[..., None, :] - self._changes)  # the first is no change
+            miss = self._wrench(tried) - wanted[..., None, None, :]
+            cost = np.sum((miss @ self.weight) * miss, axis=-1) + price * tried.sum(axis=-1)
+            if lost is not None:
+                cost = np.where(np.sum(lost * tried, axis=-1) > 0.5, np.inf, cost)
+            least = np.min(cost, axis=-1)
+            gains = least < cost[..., 0] - ROUNDING
+            best = np.take_along_axis(tried, np.argmin(cost, axis=-1)[..., None, None], axis=-2)[..., 0, :]
+            valves = np.where(gains[..., None], best, valves)
+            if not np.any(gains):
+                break
+        return np.take_along_axis(valves, np.argmin(least, axis=-1)[..., None, None], axis=-2)[..., 0, :]
+
+    def _listed(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Commands, their wrenches, and (w - w*)ᵀ H (w - w*) + gas less the part that does not depend on the choice."""
+        wrench = self._wrench(commands)
+        offset = np.einsum("ki,ij,kj->k", wrench, self.weight, wrench)
+        return commands, wrench, offset + self._valve_cost * commands.sum(axis=1)
+
+    def _wrench(self, commands: Array) -> np.ndarray:
+        """Force ahead and to the left, and yaw moment, shape (..., 3)."""
+        force, torque = self._thrusters.wrench_in_body(commands)
+        return np.concatenate((force[..., 0:2], torque[..., 2:3]), axis=-1)
+
+
+def _all(count: int) -> np.ndarray:
+    """Every combination, shape (2^count, count)."""
+    return np.array(list(itertools.product((0.0, 1.0), repeat=count)))
+
+
+def _few(count: int) -> np.ndarray:
+    """Combinations of as many open valves as `MOST_LISTED` allows, shape (k, count)."""
+    sizes = itertools.takewhile(
+        lambda size: sum(math.comb(count, each) for each in range(size + 1)) <= MOST_LISTED,
+        range(count),
+    )
+    return np.vstack([_of_size(count, size) for size in sizes])
+
+
+def _of_size(count: int, size: int) -> np.ndarray:
+    """All combinations of so many open valves, shape (k, count)."""
+    chosen = np.array(list(itertools.combinations(range(count), size)), dtype=int)
+    commands = np.zeros((len(chosen), count))
+    np.put_along_axis(commands, chosen, 1.0, axis=-1)
+    return commands
 
 
 def _cheapest_of_equal_wrench(wrench: np.ndarray, cost: np.ndarray) -> np.ndarray:
