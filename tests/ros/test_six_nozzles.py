@@ -99,7 +99,7 @@ def test_with_air_that_comes_late_and_a_hand_that_holds_it_it_reaches_its_goal(
 ) -> None:
     summary = run(own, tmp_path, "late_and_held", seed_of_series, 18)
     assert summary["success"], summary
-    assert summary["believed_dead"] == []
+    assert not summary["beliefs"]  # a hand may look like a dead valve for some seconds
     logging.info(f"{summary['final_position_error_m']:.3f} m, {summary['final_heading_error_deg']:.1f} deg")
 
 
