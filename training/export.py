@@ -22,6 +22,7 @@ from fulmar_core.policy_bundle import FORMAT, Golden, Passport, action_of, write
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
+from training.golden_limits import with_limits
 from training.interrupt import polite_interrupt
 from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record
@@ -146,7 +147,7 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
 
 
 def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
-    """What the network makes of held-out episodes at their start, and a few commands later.
+    """What the network makes of held-out episodes at their start, a few commands later, and at limits.
 
     Where it hands over to a specialist, every other robot is told of a loss that strands it.
     """
@@ -174,4 +175,5 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
         moments.append((seen, memory, command, logits, after))
         simulation.move(loop.take(inputs, command).command)
         memory = after
-    return Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))
+    golden = Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))
+    return with_limits(golden, network.infer, robot.actuators.scale, action_of(robot))

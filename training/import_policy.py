@@ -21,6 +21,7 @@ from fulmar_core.tasks import Task, load_task
 from training.agent_config import Activations, find_activations
 from training.foreign_checkpoint import FeedForward, Format, read_checkpoint
 from training.foreign_onnx import ForeignOnnx
+from training.golden_limits import with_limits
 from training.onnx_graph import Graph, Tensor, open_model
 from training.roboran_observation import Layout, layout_for, write_observation
 
@@ -182,22 +183,28 @@ def _origin(
 
 
 def _golden(source: Source, adapter: _Adapter, robot: Robot, task: Task) -> Golden:
-    """What the source network, in its own library, makes of held-out episodes: their start and a few commands later."""
+    """What the source network, in its own library, makes of held-out episodes and at limits; see `export`."""
     worlds = GOLDEN_VECTORS // 2
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=worlds, seed=HELD_OUT_SEED, training=True
     )
     before, after = open_model(adapter.before()), open_model(adapter.after(source.outputs))
     last = np.zeros((worlds, adapter.memory), dtype=np.float32)
+
+    def infer(seen: np.ndarray, memory: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        (given,) = before.run(None, {"observation": seen, "memory": memory})
+        command, logits, next_memory = after.run(None, {"network_output": source.infer(given)})
+        return command, logits, next_memory
+
     moments = []
     for _ in range(GOLDEN_STEPS + 1):
         seen = np.asarray(simulation.observe(), dtype=np.float32)
-        (given,) = before.run(None, {"observation": seen, "memory": last})
-        command, logits, memory = after.run(None, {"network_output": source.infer(given)})
+        command, logits, memory = infer(seen, last)
         moments.append((seen, last, command, logits, memory))
         simulation.step(command)
         last = memory
-    return Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))
+    golden = Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))
+    return with_limits(golden, infer, robot.actuators.scale, action_of(robot))
 
 
 def as_format(text: str | None) -> Format | None:

@@ -1,0 +1,41 @@
+"""Golden vectors at both limits of every action."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fulmar_core.policy_bundle import Golden, read_bundle
+from policy_server.shipped import policies_directory
+from training.golden_limits import reached, with_limits
+
+BUNDLES = sorted(folder for folder in policies_directory().iterdir() if folder.is_dir())
+
+
+@pytest.mark.parametrize("folder", BUNDLES, ids=lambda folder: folder.name)
+def test_a_shipped_bundle_is_checked_at_every_limit(folder):
+    bundle = read_bundle(folder)
+    passport = bundle.passport
+    assert reached(bundle.golden().commands, np.array(passport.command_scale), passport.action).all()
+
+
+def infer(seen, memory):
+    logits = seen @ np.array([[1.0, -0.5]], dtype=np.float32)
+    return np.clip(logits, -1.0, 1.0) * np.float32(2.0), logits, memory
+
+
+def golden(*seen):
+    seen, memory = np.array(seen, dtype=np.float32)[:, None], np.zeros((len(seen), 0), np.float32)
+    commands, logits, after = infer(seen, memory)
+    return Golden(seen, memory, commands, logits, after)
+
+
+def test_limits_that_no_vector_is_at_come_from_the_least_stretched_observation():
+    found = with_limits(golden(0.9, -1.1), infer, np.array([2.0, 2.0]), "continuous")
+    np.testing.assert_allclose(found.observations[:, 0], [0.9, -1.1, 2.2, 1.1, -2.2])
+    assert reached(found.commands, np.array([2.0, 2.0]), "continuous").all()
+
+
+def test_vectors_at_every_limit_stay_as_they_are():
+    complete = golden(3.0, -3.0)
+    assert with_limits(complete, infer, np.array([2.0, 2.0]), "continuous") is complete
