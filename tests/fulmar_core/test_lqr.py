@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, fields, replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from fulmar_core.actuators.thrusters import Nozzle
 from fulmar_core.config import load_config
-from fulmar_core.controllers.classical import load_lqr
+from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.lqr import Lqr, LqrWeights, linear_model
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
@@ -25,6 +26,7 @@ from tests.inputs import inputs_at, inputs_of
 
 ROBOT, POSE, POSITION = load_robot("floating_platform"), load_task("go_to_pose"), load_task("go_to_position")
 SPEED = load_task("track_velocities")
+load_lqr = partial(load_classical, law="lqr")
 WEIGHTS = load_config(LqrWeights, config_path("controllers", "floating_platform_lqr"))
 
 

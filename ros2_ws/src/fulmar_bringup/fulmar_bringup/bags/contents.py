@@ -39,25 +39,17 @@ class Topic:
         """Number of messages."""
         return len(self.data)
 
-    def from_time(self, start_ns: int, end_ns: int) -> Topic:
-        """The messages that were recorded from a time on and before another [ns]."""
-        return self._of([i for i, log_ns in enumerate(self.log_ns) if start_ns <= log_ns < end_ns])
-
     def readable(self) -> Topic:
         """The messages that are what the type says."""
-        return (
-            self._of(sorted(set(range(len(self))).difference(self.unreadable))) if self.unreadable else self
-        )
-
-    def _of(self, kept: list[int]) -> Topic:
-        lost = set(self.unreadable)
+        if not self.unreadable:
+            return self
+        kept = sorted(set(range(len(self))).difference(self.unreadable))
         return Topic(
             self.name,
             self.type,
             [self.data[i] for i in kept],
             [self.log_ns[i] for i in kept],
             [self.sequence[i] for i in kept],
-            [place for place, i in enumerate(kept) if i in lost],
         )
 
 

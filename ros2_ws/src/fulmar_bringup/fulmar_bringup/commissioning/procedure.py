@@ -32,7 +32,6 @@ BRAKES = (
 )  # of the share that moved it; astern, propellers push less. Our values, as the next two
 CREEPS = 0.01  # a boat that is slower need not be stopped before the next pulse [m/s]
 SPEED_OVER_S = 0.5  # a speed is averaged over so long [s]
-MOVES_BY_ITSELF = 0.3  # of one nozzle's thrust, with every wire closed
 Say = Callable[[str], None]
 
 

@@ -181,8 +181,3 @@ def _find_gains(robot: Robot, entry: Entry) -> Path | None:
             f"controllers/{name}.yaml beside robots/ of your own, as {config_path('controllers', others[0])} is."
         )
     return None
-
-
-def load_lqr(robot: Robot, task: Task, *, control_hz: float | None = None) -> Law:
-    """The LQR of a robot with thrusters; arguments and errors as of `load_classical`."""
-    return load_classical(robot, task, control_hz=control_hz, law="lqr")
