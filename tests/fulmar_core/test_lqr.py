@@ -240,12 +240,23 @@ def test_weights_without_a_word_on_obstacles_are_refused_where_some_stand():
         Lqr(ROBOT, load_task("go_to_position_with_obstacles"), replace(WEIGHTS, speed_around=0.0))
 
 
-@pytest.mark.parametrize("hz", [None, 5.0])
-def test_a_robot_with_too_many_valves_is_refused_with_its_rate(hz):
-    nozzles = tuple(Nozzle(f"n{i}", (0.1, 0.1 * i, 0.0), (1.0, 0.0, 0.0)) for i in range(13))
-    robot = replace(ROBOT, actuators=replace(ROBOT.actuators, nozzles=nozzles))
-    with pytest.raises(ConfigError, match="lqr for 'floating_platform' at 5 Hz: 13 valves"):
-        load_lqr(robot, POSE, control_hz=hz)
+@pytest.mark.parametrize("count", [16, 24])
+@pytest.mark.parametrize("shared", [True, False])
+def test_it_brings_platforms_of_many_nozzles_home(count, shared):
+    """Pairs on each of many arms; without a shared line as strong as with one while all arms push."""
+    arms = 2.0 * np.pi * np.arange(count // 2) / (count // 2)
+    nozzles = tuple(
+        Nozzle(f"n{i}_{j}", (0.3 * np.cos(a), 0.3 * np.sin(a), 0.0), (-s * np.sin(a), s * np.cos(a), 0.0))
+        for i, a in enumerate(arms)
+        for j, s in enumerate((1.0, -1.0))
+    )
+    thrust = 1.0 if shared else 4.0 / count
+    bank = replace(ROBOT.actuators, nozzles=nozzles, shared_pressure=shared, thrust=thrust)
+    robot = replace(ROBOT, actuators=bank)
+    run = roll_out_in_batch(
+        Lqr(robot, POSE, WEIGHTS), robot, POSE, load_scenario("ideal"), episodes=4, seed=5
+    )
+    assert successes(run, POSE).all()
 
 
 def test_a_rate_that_the_physics_cannot_keep_is_refused():
