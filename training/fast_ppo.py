@@ -2,7 +2,7 @@
 
 Same loss, same buffer, same files, policies and callbacks; what differs is how it is computed:
 
-- hidden layers in bfloat16 where the processor has it, output layers and all losses in float32;
+- hidden layers in bfloat16 if asked for, output layers and all losses in float32;
 - gradients written out, since PyTorch's bookkeeping costs as much as the arithmetic of such small networks;
 - all samples in one matrix, shuffled once an epoch and cut into contiguous minibatches;
 - values and log-probabilities of a rollout in one pass at its end, by the very network that the update begins
@@ -24,8 +24,9 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch.nn.utils import clip_grad_norm_
 
 from training.action_law import ActionLaw, action_law
-from training.fast_mlp import FastMlp, fast_precision
+from training.fast_mlp import FastMlp
 from training.muon import MuonAndAdam, hidden_matrices
+from training.settings import Precision
 
 _COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
 
@@ -33,9 +34,16 @@ _COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
 class FastPPO(PPO):
     """PPO for an `MlpPolicy` of separate tanh networks over MultiBinary, MultiDiscrete or Box actions, on a CPU."""
 
-    def __init__(self, *args: Any, muon: bool = False, **more: Any) -> None:
-        """Build it; see `PPO` for everything but whether hidden layers learn by Muon (`training.muon`)."""
-        self.muon = muon
+    def __init__(self, *args: Any, muon: bool = False, precision: Precision = "float32", **more: Any) -> None:
+        """Build it; see `PPO` for everything but what concerns hidden layers.
+
+        Args:
+            args: Of `PPO`.
+            muon: Whether they learn by Muon (`training.muon`).
+            precision: Number type that they are computed in.
+            more: Of `PPO`.
+        """
+        self.muon, self.precision = muon, precision
         super().__init__(*args, **more)
 
     def _setup_model(self) -> None:
@@ -47,7 +55,7 @@ class FastPPO(PPO):
         super()._setup_model()
         if self.muon:
             self._use_muon()
-        self._networks(fast_precision())  # refuses other policies
+        self._networks()  # refuses other policies
 
     def _use_muon(self) -> None:
         policy = self.policy
@@ -61,8 +69,8 @@ class FastPPO(PPO):
     def _excluded_save_params(self) -> list[str]:
         return [*super()._excluded_save_params(), "_actor", "_critic", "_law"]
 
-    def _networks(self, precision: torch.dtype) -> None:
-        policy = self.policy
+    def _networks(self) -> None:
+        policy, precision = self.policy, getattr(torch, self.precision)
         self._law: ActionLaw = action_law(policy)
         self._actor = FastMlp(policy.mlp_extractor.policy_net, policy.action_net, precision)
         self._critic = FastMlp(policy.mlp_extractor.value_net, policy.value_net, precision)

@@ -17,6 +17,8 @@ from fulmar_core.robot import Robot
 from fulmar_core.symmetry import Symmetry
 from fulmar_core.tasks import Task
 
+Precision = Literal["float32", "bfloat16"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class OnPolicy:
@@ -59,6 +61,9 @@ class Ppo(OnPolicy):
     fast: bool = True  # our faster computation of it instead of the one of Stable-Baselines3
     lessons: int = 0  # updates in which it first imitates the classical law of the robot's family
     optimizer: Literal["adam", "muon"] = "adam"  # muon, for hidden layers, learns more from fewer samples
+    # Of hidden layers while they learn: bfloat16 takes half the time where the processor multiplies it (avx512_bf16 or
+    # amx_bf16 in /proc/cpuinfo), and more elsewhere. No processor chooses by itself: a seed asks for one policy.
+    precision: Precision = "float32"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,6 +237,8 @@ class TrainingSettings:
             raise ValueError("'lessons' are for the fast PPO.")
         if isinstance(algorithm, Ppo) and algorithm.optimizer != "adam" and not algorithm.fast:
             raise ValueError(f"'optimizer: {algorithm.optimizer}' is for the fast PPO.")
+        if isinstance(algorithm, Ppo) and algorithm.precision != "float32" and not algorithm.fast:
+            raise ValueError(f"'precision: {algorithm.precision}' is for the fast PPO.")
         if self.specialist and (not self.told or isinstance(algorithm, RecurrentPpo)):
             raise ValueError(
                 "'specialist' needs 'told', to know when its time has come, and a network without memory."

@@ -12,7 +12,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from torch import nn
 
 from training.action_law import action_law
-from training.fast_mlp import FastMlp, fast_precision
+from training.fast_mlp import FastMlp
 from training.fast_ppo import FastPPO
 
 MULTI_BINARY, BOX = spaces.MultiBinary(3), spaces.Box(-1.0, 1.0, (2,))
@@ -37,15 +37,12 @@ class Drift(gymnasium.Env):
         return self.at, reward, bool(self.at[0] > 2.0), self.age >= 5, {}
 
 
-def learner(kind, action_space, *, precision=torch.float32, **kwargs):
+def learner(kind, action_space, **kwargs):
     env = make_vec_env(lambda: Drift(action_space), n_envs=8, seed=1)
-    made = kind("MlpPolicy", env, n_steps=8, batch_size=16, n_epochs=2, seed=1, device="cpu", **kwargs)
-    if isinstance(made, FastPPO):
-        made._networks(precision)
-    return made
+    return kind("MlpPolicy", env, n_steps=8, batch_size=16, n_epochs=2, seed=1, device="cpu", **kwargs)
 
 
-@pytest.mark.parametrize(("precision", "near"), [(torch.float32, 1e-5), (fast_precision(), 3e-2)])
+@pytest.mark.parametrize(("precision", "near"), [(torch.float32, 1e-5), (torch.bfloat16, 3e-2)])
 def test_outputs_and_gradients_are_those_of_torch(precision, near):
     torch.manual_seed(1)
     hidden = nn.Sequential(nn.Linear(4, 16), nn.Tanh(), nn.Linear(16, 8), nn.Tanh())
@@ -187,7 +184,7 @@ def test_a_loaded_learner_is_the_one_that_was_saved(tmp_path):
     "space", [MULTI_BINARY, *(pytest.param(space, marks=pytest.mark.slow) for space in (ORDERS, BOX))]
 )
 def test_it_learns(space):
-    fast = learner(FastPPO, space, learning_rate=3e-3, precision=fast_precision())
+    fast = learner(FastPPO, space, learning_rate=3e-3, precision="bfloat16")
     fast.learn(6_000)
     seen = np.random.default_rng(1).normal(size=(500, 4)).astype(np.float32)
     actions = fast.predict(seen, deterministic=True)[0]
