@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fulmar_bringup.benchmark.estimator.comparison import (
+from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.robot import load_robot
+from tests.benchmarks.estimator.comparison import (
     DELAY_LIMIT_S,
     MEAN,
     RATES_HZ,
@@ -17,10 +19,8 @@ from fulmar_bringup.benchmark.estimator.comparison import (
     tell_by_mean,
     verdict,
 )
-from fulmar_bringup.benchmark.estimator.drive import TICK_S, Drive, drives
-from fulmar_bringup.benchmark.estimator.thirty_poses import POSES, ThirtyPoses
-from fulmar_core.estimation.settings import load_estimator
-from fulmar_core.robot import load_robot
+from tests.benchmarks.estimator.drive import TICK_S, Drive, drives
+from tests.benchmarks.estimator.thirty_poses import POSES, ThirtyPoses
 
 pytest.importorskip("filterpy")
 ROBOT = load_robot("floating_platform")

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from fulmar_bringup.benchmark.closed_loops import FIRST_SEED, Campaign, Command, Episode, measure
-from fulmar_bringup.benchmark.hardware import CASES, cases_of
 from fulmar_core.errors import UnknownNameError
+from tests.benchmarks.closed_loops import FIRST_SEED, Campaign, Command, Episode, measure
+from tests.benchmarks.hardware import CASES, cases_of
 
 
 @dataclass(frozen=True)

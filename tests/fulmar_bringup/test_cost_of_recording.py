@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_bringup.benchmark.recorder.cost import with_missing
+from tests.benchmarks.recorder.cost import with_missing
 
 
 def test_commands_that_were_not_taken_count_as_late_as_the_stretch_is_long():

@@ -11,9 +11,9 @@ from fulmar_core.robot import load_robot
 
 pytest.importorskip("mujoco")
 
-from fulmar_bringup.benchmark.identification.campaign import document_of, run_identification
-from fulmar_bringup.benchmark.identification.machines import draw_machine
-from fulmar_bringup.benchmark.identification.trial import Trial, run_trial
+from tests.benchmarks.identification.campaign import document_of, run_identification
+from tests.benchmarks.identification.machines import draw_machine
+from tests.benchmarks.identification.trial import Trial, run_trial
 
 ASKED = ("mass", "yaw_inertia", "thrust")
 

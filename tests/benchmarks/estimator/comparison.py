@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from fulmar_bringup.benchmark.estimator.drive import TICK_S, Drive
-from fulmar_bringup.benchmark.estimator.thirty_poses import ThirtyPoses
 from fulmar_core.estimation.estimator import Estimator
 from fulmar_core.estimation.settings import EstimatorSettings
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw
 from fulmar_core.sensors.imu import ImuSample
+from tests.benchmarks.estimator.drive import TICK_S, Drive
+from tests.benchmarks.estimator.thirty_poses import ThirtyPoses
 
 MEAN, POSES_ALONE, WITH_IMU = "mean of 30 poses", "Fulmar, poses alone", "Fulmar, poses and inertial unit"
 SETTLE_S = 2.0  # before anything is judged: every method has its buffer full then

@@ -54,8 +54,8 @@ def recorder(
 
     fulmar benchmark recorder --parts loss,kills --loss-s 30 --kills 10 --json
     """
-    from fulmar_bringup.benchmark.recorder.document import PARTS, Asked, measure
     from fulmar_bringup.extras import require
+    from tests.benchmarks.recorder.document import PARTS, Asked, measure
 
     names = tuple(name.strip() for name in parts.split(","))
     for name in names:

@@ -50,10 +50,10 @@ def estimator(
     from fulmar_core.robot import load_robot
 
     require("filterpy", *(["matplotlib"] if picture else []))
-    from fulmar_bringup.benchmark.estimator.comparison import MEAN, RATES_HZ, compare, verdict
-    from fulmar_bringup.benchmark.estimator.comparison import as_json as rows_of
-    from fulmar_bringup.benchmark.estimator.drive import drives as drive_about
     from fulmar_core.estimation.settings import load_estimator
+    from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, compare, verdict
+    from tests.benchmarks.estimator.comparison import as_json as rows_of
+    from tests.benchmarks.estimator.drive import drives as drive_about
 
     the_robot = load_robot(robot)
     believed = dataclasses.replace(load_estimator(settings), latency_s=latency_ms / 1e3)
@@ -72,8 +72,8 @@ def estimator(
         "required": lines,
     }
     if picture is not None:
-        from fulmar_bringup.benchmark.estimator.picture import draw
         from fulmar_bringup.report.style import as_png
+        from tests.benchmarks.estimator.picture import draw
 
         picture.parent.mkdir(parents=True, exist_ok=True)
         picture.write_bytes(as_png(draw(driven[0], found, believed, the_robot.limits, latency_ms / 1e3)))

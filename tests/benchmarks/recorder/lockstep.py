@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from fulmar_bringup.bag_reader import read_run
-from fulmar_bringup.benchmark.recorder.bag_stamps import stamps_by_topic
 from fulmar_bringup.conductor import conduct
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.planning import plan_run
@@ -22,6 +21,7 @@ from fulmar_core.topics import (
     SIMULATION_START_NS,
     TRUTH,
 )
+from tests.benchmarks.recorder.bag_stamps import stamps_by_topic
 
 WIRES = (ODOMETRY, TRUTH, COMMAND, ACTUATORS_STATE, OBSERVATION, ACTION)
 WANTED_RATE = 20.0  # simulated seconds a second

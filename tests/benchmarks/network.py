@@ -1,17 +1,46 @@
-"""`fulmar benchmark network`: goals reached although the controller is behind a bad cable."""
+"""`fulmar benchmark network`: goals reached although the controller is behind a cable that loses and delays."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
+from fulmar_bringup.faults.two_hosts import ACROSS, Quality, two_hosts
 from fulmar_bringup.progress import work_bar
+from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import ConfigError
 from fulmar_core.exit_codes import FAILED
+from tests.benchmarks.closed_loops import Command
+
+
+@dataclass(frozen=True)
+class NetworkCase:
+    """A robot, what it is asked to do, and the cable to its controller."""
+
+    name: str
+    robot: str
+    task: str
+    quality: Quality
+    copies: int = MOST_COPIES  # of each command
+
+    @contextlib.contextmanager
+    def prepared(self, seed: int) -> Iterator[Command]:
+        """Two hosts; the run is on one of them, its controller on the other."""
+        with two_hosts(seed=seed) as hosts:
+            hosts.cable.quality = self.quality
+            controller = ("--controller-in", hosts.other, "--copies", str(self.copies))
+            yield Command(("ip", "netns", "exec", hosts.robot), controller, ACROSS)
+
+    def about(self) -> dict[str, Any]:
+        """The cable."""
+        return {**asdict(self.quality), "copies": self.copies}
 
 
 def network(
@@ -47,11 +76,10 @@ def network(
 
     fulmar benchmark network --episodes 4 --seconds 20
     """
-    from fulmar_bringup.benchmark.closed_loops import Campaign, measure
-    from fulmar_bringup.benchmark.network import NetworkCase
     from fulmar_bringup.extras import require
     from fulmar_bringup.faults.two_hosts import Quality, why_not
     from fulmar_bringup.system import modules_of
+    from tests.benchmarks.closed_loops import Campaign, measure
 
     if why_not():
         raise ConfigError(f"{why_not()}.")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_bringup.benchmark.estimator.comparison import MEAN, RATES_HZ, WITH_IMU, Figures, told_by
-from fulmar_bringup.benchmark.estimator.drive import Drive
 from fulmar_bringup.report.style import ALARM, INK, house_style, legend, quiet_grid
 from fulmar_core.estimation.settings import EstimatorSettings
 from fulmar_core.robot import Limits
+from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, WITH_IMU, Figures, told_by
+from tests.benchmarks.estimator.drive import Drive
 
 SHOWN_S = (3.0, 13.0)
 COLOURS = {MEAN: ALARM, WITH_IMU: "#3b7ddd"}

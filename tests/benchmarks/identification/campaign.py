@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bringup.benchmark.identification.trial import Trial, run_trial
 from fulmar_bringup.pools import ended_with_us, one_thread_each
+from tests.benchmarks.identification.trial import Trial, run_trial
 
 ASKED = ("mass", "yaw_inertia", "thrust")  # of platforms
 MOST_ERROR_PERCENT = 3.0

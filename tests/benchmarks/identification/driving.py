@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bringup.benchmark.identification.machines import Leg, Machine
-from fulmar_bringup.benchmark.sample_bag import SampleBag
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.excite import Excite
@@ -21,6 +19,8 @@ from fulmar_core.planar import PlanarState, at_rest, planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import load_task
 from sim_nodes.mujoco_backend import MujocoBackend
+from tests.benchmarks.identification.machines import Leg, Machine
+from tests.benchmarks.sample_bag import SampleBag
 
 TASK = "go_to_position"
 SETTLED_S = 4.0  # of no more change: dozens of time constants

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
-from fulmar_bringup.benchmark.recorder.recorders import recorders
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup, command_line
@@ -37,6 +36,7 @@ from fulmar_ros.deadline import Spread
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import settle_memory, spinning
 from sim_nodes.sim_node import make_backend
+from tests.benchmarks.recorder.recorders import recorders
 
 ODOMETRY_HZ, COMMAND_HZ = 200.0, 50.0
 ALLOWED = 1.05  # 99th percentile with a recorder, as a multiple of the one without

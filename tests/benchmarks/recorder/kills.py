@@ -9,14 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.benchmark.recorder.bag_stamps import opens, stamps_by_topic
-from fulmar_bringup.benchmark.recorder.recorders import recorders
-from fulmar_bringup.benchmark.recorder.traffic import EVERY, Traffic, traffic
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
+from tests.benchmarks.recorder.bag_stamps import opens, stamps_by_topic
+from tests.benchmarks.recorder.recorders import recorders
+from tests.benchmarks.recorder.traffic import EVERY, Traffic, traffic
 
 AT_ONCE = 5  # recorders that hear the same traffic and die one after another
 LONGEST_S = 10.0  # a recorder lives up to this long [s]

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.benchmark.recorder.bag_stamps import stamps_by_topic
-from fulmar_bringup.benchmark.recorder.recorders import recorders
-from fulmar_bringup.benchmark.recorder.traffic import EVERY, traffic
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
+from tests.benchmarks.recorder.bag_stamps import stamps_by_topic
+from tests.benchmarks.recorder.recorders import recorders
+from tests.benchmarks.recorder.traffic import EVERY, traffic
 
 LAST_S = 0.5  # for the last messages to arrive
 

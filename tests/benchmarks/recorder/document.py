@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.benchmark.recorder.cost import cost_of_recording
-from fulmar_bringup.benchmark.recorder.kills import killed
-from fulmar_bringup.benchmark.recorder.lockstep import lost_in_lock_step
-from fulmar_bringup.benchmark.recorder.loss import lost_in_real_time
 from fulmar_bringup.node_table import RunPlan
 from fulmar_ros.provenance import fulmar_version, git_revision
+from tests.benchmarks.recorder.cost import cost_of_recording
+from tests.benchmarks.recorder.kills import killed
+from tests.benchmarks.recorder.lockstep import lost_in_lock_step
+from tests.benchmarks.recorder.loss import lost_in_real_time
 
 ROBOT = "floating_platform"
 PARTS = ("cost", "loss", "lockstep", "kills")

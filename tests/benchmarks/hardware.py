@@ -1,7 +1,10 @@
-"""`fulmar benchmark hardware`: closed loops through the protocols of real devices."""
+"""`fulmar benchmark hardware`: closed loops through emulated devices, driver and protocol, in real time."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +14,56 @@ from rich.table import Table
 from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
+from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
+from hardware_drivers.settings import MavlinkBoat, load_hardware
+from tests.benchmarks.closed_loops import Command
+
+
+@dataclass(frozen=True)
+class HardwareCase:
+    """A device and what it is asked to do."""
+
+    name: str  # of a file in configs/hardware
+    task: str
+
+    @property
+    def robot(self) -> str:
+        """Whose device it is."""
+        return load_hardware(self.name).robot
+
+    def prepared(self, _seed: int) -> contextlib.AbstractContextManager[Command]:
+        """An emulator stands in for the device."""
+        arm = ("--arm",) if isinstance(load_hardware(self.name).driver, MavlinkBoat) else ()
+        device = ("--backend", "hardware", "--hardware", self.name, "--emulate", *arm)
+        return contextlib.nullcontext(Command((), device, {}))
+
+    def about(self) -> dict[str, Any]:
+        """The device and what drives it."""
+        return {"hardware": self.name, "driver": load_hardware(self.name).driver.kind}
+
+
+CASES = (
+    HardwareCase("zero_g_lab", "go_to_pose"),
+    HardwareCase("turtlebot2", "go_to_position"),
+    HardwareCase("kingfisher", "go_to_position"),
+    HardwareCase("kingfisher_ardupilot", "go_to_position"),
+)
+
+
+def cases_of(names: Iterable[str] | None) -> list[HardwareCase]:
+    """The cases of some hardware files, or all.
+
+    Raises:
+        UnknownNameError: A file has none.
+    """
+    if names is None:
+        return list(CASES)
+    known = {case.name: case for case in CASES}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("emulated device", name, known)
+    return [known[name] for name in names]
 
 
 def hardware(
@@ -49,10 +101,9 @@ def hardware(
 
     fulmar benchmark hardware --hardware turtlebot2 --episodes 8 --seconds 25
     """
-    from fulmar_bringup.benchmark.closed_loops import Campaign, measure
-    from fulmar_bringup.benchmark.hardware import cases_of
     from fulmar_bringup.extras import require
     from fulmar_bringup.system import modules_of
+    from tests.benchmarks.closed_loops import Campaign, measure
 
     cases = cases_of([name.strip() for name in only.split(",")] if only else None)
     for case in cases:

@@ -51,9 +51,9 @@ def identify(
 
     fulmar benchmark identify --robots kingfisher,turtlebot2 --platforms 5
     """
-    from fulmar_bringup.benchmark.identification.campaign import document_of, run_identification
-    from fulmar_bringup.benchmark.identification.trial import Trial
     from fulmar_bringup.extras import require
+    from tests.benchmarks.identification.campaign import document_of, run_identification
+    from tests.benchmarks.identification.trial import Trial
 
     require("mujoco")
     names = ROBOTS if robots == "all" else tuple(dict.fromkeys(name.strip() for name in robots.split(",")))
