@@ -122,6 +122,16 @@ def test_a_side_and_its_sign_follow_from_way_and_turn(ahead, turn, side, sign):
     assert match_sides([one, weak]).dead == (1,)
 
 
+def test_a_base_that_still_settles_is_no_answer_of_a_dead_channel():
+    """As a Kobuki with a dead left channel did it on a busy machine."""
+    sigma = np.array([1e-4, 1e-4, 1e-4])
+    settles, drives = (
+        Response(np.array(change), sigma) for change in ((1.1e-3, 0.0, 8.7e-3), (0.028, 0.0, 0.24))
+    )
+    match = match_sides([settles, drives])
+    assert (match.drives, match.dead) == ((None, 1), (0,))
+
+
 @pytest.mark.parametrize("motion", ["rolling", "coasting"])
 def test_a_step_of_wheels_and_of_a_boat_is_found_in_the_body_frame(motion):
     """Late by 0.1 s, at a heading of 90°; the boat drifts before, and its odometry knows velocities."""

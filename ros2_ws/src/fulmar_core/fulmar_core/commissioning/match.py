@@ -19,6 +19,8 @@ LEAST_SHARE = 0.07
 WEAK_SHARE = 0.35
 # Of a unit force and a unit torque; neighbouring directions of eight nozzles are 1.4 apart
 WORST_MISMATCH = 0.75
+# Of the turn that the other side gives: sides are alike, and a base that still settles turns by a few hundredths of it
+LEAST_OF_OTHER = 0.1
 SAME = 1e-3  # nozzles whose forces and torques differ by less cannot be told apart
 ROUNDS = 3  # of matching and scaling the torque, since yaw inertias are known badly
 
@@ -111,9 +113,10 @@ def match_sides(found: Sequence[Response]) -> Match:
     """
     drives: list[int | None] = []
     signs = []
+    most = max(abs(one.change[2]) for one in found)
     for one in found:
         ahead, _, turn = one.change
-        moves = one.clearly[0] > CLEARLY and one.clearly[2] > CLEARLY
+        moves = min(one.clearly[0], one.clearly[2]) > CLEARLY and abs(turn) > LEAST_OF_OTHER * most
         drives.append((0 if ahead * turn < 0.0 else 1) if moves else None)
         signs.append(-1.0 if moves and ahead < 0.0 else 1.0)
     dead = tuple(channel for channel, side in enumerate(drives) if side is None)
