@@ -40,6 +40,7 @@ def benchmark_jobs(
         raise ConfigError(
             f"'{robot}' and '{task}' learn with {algorithm.kind}; this compares two kinds of ppo."
         )
+    stock = replace(algorithm, fast=False, precision="float32")
     settings = replace(settings, evaluate_every_s=check_every_s, stop_at_success=None)
     return [
         Job(
@@ -47,7 +48,7 @@ def benchmark_jobs(
             robot,
             task,
             seed,
-            replace(settings, algorithm=replace(algorithm, fast=kind == "fast")),
+            replace(settings, algorithm=algorithm if kind == "fast" else stock),
             out / f"{kind}_{seed}",
             time_limit_s=seconds,
         )

@@ -15,7 +15,6 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
-from training.coordinates import coordinate_terms
 from training.network import Decision, DeployedNetwork, NetworkPlan
 from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
@@ -56,10 +55,9 @@ def deployed_network(
     worlds = normaliser.unwrapped
     choice = worlds.choice if isinstance(worlds, BatchVecEnv) else None
     mirror = worlds.mirror if isinstance(worlds, BatchVecEnv) else None
-    places = worlds.places if isinstance(worlds, BatchVecEnv) else ()
     trained = _trained(learner, wrench=choice is not None)
     plan = NetworkPlan(
-        inputs=len(statistics.mean) - coordinate_terms(len(places)),
+        inputs=len(statistics.mean),
         hidden=tuple(layer.out_features for layer in trained.linear[:-1]),
         outputs=int(trained.linear[-1].out_features),  # of orders it is a number of NumPy
         activation="relu" if any(isinstance(layer, nn.ReLU) for layer in trained.layers) else "tanh",
@@ -71,7 +69,6 @@ def deployed_network(
         disturbances=isinstance(worlds, BatchVecEnv) and worlds.told,
         knows_dead=choice is not None and worlds.told,
         side=mirror.side if mirror else None,
-        places=places,
         specialist=specialist.network.plan if specialist else None,
         losses=len(specialist.losses) if specialist else 0,
     )

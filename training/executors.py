@@ -30,10 +30,10 @@ class Executor(Protocol):
 
 
 class LocalExecutor:
-    """A process for each job, some at once: as many as there are cores for, each job with its own threads."""
+    """A process of one thread for each job, as many at once as there are cores."""
 
     def __init__(self, at_once: int | None = None) -> None:
-        """Run this many jobs of one thread at once; one for each core by default."""
+        """Run this many jobs at once; one for each core by default."""
         self._at_once = at_once or len(os.sched_getaffinity(0))
 
     def run(self, jobs: Sequence[Job], watch: Watch) -> list[Outcome]:
@@ -43,7 +43,7 @@ class LocalExecutor:
         waiting = list(range(len(jobs)))
         try:
             while waiting or running:
-                while waiting and self._has_room(jobs[waiting[0]], [jobs[number] for number in running]):
+                while waiting and len(running) < self._at_once:
                     number = waiting.pop(0)
                     running[number] = _start(jobs[number])
                 time.sleep(POLL_S)
@@ -56,11 +56,6 @@ class LocalExecutor:
                 process.wait()
             raise
         return [outcomes[number] for number in range(len(jobs))]
-
-    def _has_room(self, job: Job, running: Sequence[Job]) -> bool:
-        """Whether a job may begin: alone always, beside others if all their threads have a core."""
-        threads = sum(one.settings.threads for one in (*running, job))
-        return not running or threads <= self._at_once
 
     @staticmethod
     def _collect(
@@ -82,8 +77,7 @@ class LocalExecutor:
 
 def _start(job: Job) -> subprocess.Popen[bytes]:
     job.out.mkdir(parents=True, exist_ok=True)
-    threads = str(job.settings.threads)
-    limits = {f"{library}_NUM_THREADS": threads for library in ("OMP", "MKL", "OPENBLAS")}
+    limits = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "MKL", "OPENBLAS")}
     with (job.out / LOG_FILE).open("ab") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "training.worker"],

@@ -25,7 +25,6 @@ from torch.nn.utils import clip_grad_norm_
 
 from training.action_law import ActionLaw, action_law
 from training.fast_mlp import FastMlp
-from training.muon import MuonAndAdam, hidden_matrices
 from training.settings import Precision
 
 _COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
@@ -34,16 +33,15 @@ _COLUMNS = ("observations", "actions", "log_probs", "advantages", "returns")
 class FastPPO(PPO):
     """PPO for an `MlpPolicy` of separate tanh networks over MultiBinary, MultiDiscrete or Box actions, on a CPU."""
 
-    def __init__(self, *args: Any, muon: bool = False, precision: Precision = "float32", **more: Any) -> None:
+    def __init__(self, *args: Any, precision: Precision = "float32", **more: Any) -> None:
         """Build it; see `PPO` for everything but what concerns hidden layers.
 
         Args:
             args: Of `PPO`.
-            muon: Whether they learn by Muon (`training.muon`).
             precision: Number type that they are computed in.
             more: Of `PPO`.
         """
-        self.muon, self.precision = muon, precision
+        self.precision = precision
         super().__init__(*args, **more)
 
     def _setup_model(self) -> None:
@@ -53,18 +51,7 @@ class FastPPO(PPO):
             **self.policy_kwargs,
         }
         super()._setup_model()
-        if self.muon:
-            self._use_muon()
         self._networks()  # refuses other policies
-
-    def _use_muon(self) -> None:
-        policy = self.policy
-        policy.optimizer = MuonAndAdam(
-            policy.parameters(),
-            hidden=hidden_matrices([*policy.mlp_extractor.policy_net, *policy.mlp_extractor.value_net]),
-            lr=self.lr_schedule(1.0),
-            **policy.optimizer_kwargs,
-        )
 
     def _excluded_save_params(self) -> list[str]:
         return [*super()._excluded_save_params(), "_actor", "_critic", "_law"]

@@ -21,7 +21,6 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.symmetry import Mirror
 from fulmar_core.tasks import Task
-from training.coordinates import coordinate_terms, with_coordinates
 from training.orders import KINDS, shares_asked
 
 Decision = Literal["threshold", "clamp", "squash", "choose", "order"]
@@ -43,7 +42,6 @@ class NetworkPlan:
     disturbances: bool = False  # its last inputs are `disturbance_terms`
     knows_dead: bool = False  # its last inputs are 1 for each valve, or 0 where it is dead
     side: int | None = None  # where this input is negative, it sees and answers the mirror image
-    places: tuple[int, ...] = ()  # where targets begin in what it takes, if it is shown their coordinates too
     specialist: NetworkPlan | None = None  # of the network that takes over where too many valves are dead
     losses: int = 0  # sets of dead valves of which one is enough for that
 
@@ -76,9 +74,8 @@ class DeployedNetwork(nn.Module):
         """Build an untrained network."""
         super().__init__()
         self.plan = plan
-        features = plan.inputs + coordinate_terms(len(plan.places))
-        self.register_buffer("mean", torch.zeros(features))
-        self.register_buffer("scale", torch.ones(features))
+        self.register_buffer("mean", torch.zeros(plan.inputs))
+        self.register_buffer("scale", torch.ones(plan.inputs))
         self.register_buffer("command_scale", torch.tensor(plan.command_scale, dtype=torch.float32))
         count, valves = plan.combinations, len(plan.command_scale)
         if count:
@@ -93,9 +90,9 @@ class DeployedNetwork(nn.Module):
             self.register_buffer("losses", torch.ones(plan.losses, valves))
         self.specialist = DeployedNetwork(plan.specialist) if plan.specialist else None
         units = plan.memory // 2
-        self.from_input = nn.Linear(features, 4 * units) if units else None
+        self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
         self.from_memory = nn.Linear(units, 4 * units) if units else None
-        sizes = [units or features, *plan.hidden, plan.outputs]
+        sizes = [units or plan.inputs, *plan.hidden, plan.outputs]
         layers: list[nn.Module] = []
         for inputs, outputs in itertools.pairwise(sizes):
             layers += [nn.Linear(inputs, outputs), nn.Tanh() if plan.activation == "tanh" else nn.ReLU()]
@@ -117,8 +114,7 @@ class DeployedNetwork(nn.Module):
             memory if it has any.
         """
         seen = self._mirrored(observation, observation, "seen")
-        shown = with_coordinates(seen, self.plan.places) if self.plan.places else seen
-        features = torch.clamp((shown - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
+        features = torch.clamp((seen - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
         if memory is None:
             raw = self._mirrored(self._ordered(self.layers(features), seen), observation, "done")
             raw = self._handed_over(self._appraised(raw, observation), observation)

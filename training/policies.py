@@ -146,9 +146,7 @@ def expected_s(jobs: Sequence[Job], at_once: int) -> float:
         at_once: Cores that they share.
     """
     each = [_took_s(job) for job in jobs]
-    cores = [min(job.settings.threads, at_once) for job in jobs]
-    shared = sum(time_s * taken for time_s, taken in zip(each, cores, strict=True)) / at_once
-    return max([shared, *each])
+    return max([sum(each) / at_once, *each])
 
 
 def _took_s(job: Job) -> float:

@@ -78,7 +78,7 @@ def build_ppo(
         kind = RecurrentPPO
         policy["lstm_hidden_size"] = settings.memory
     elif settings.fast:
-        kind, more = FastPPO, {"muon": settings.optimizer == "muon", "precision": settings.precision}
+        kind, more = FastPPO, {"precision": settings.precision}
         if settings.lessons:
             kind, more = Apprentice, more | {"lessons": settings.lessons}
     return kind(

@@ -20,7 +20,7 @@ POLL_S = 0.5
 
 
 class RayExecutor:
-    """A task for each job, with a core for each of its threads; run folders come back to this machine."""
+    """A task of one core for each job; run folders come back to this machine."""
 
     def __init__(self, address: str | None = None) -> None:
         """Join a cluster, or begin one on this machine.
@@ -34,11 +34,7 @@ class RayExecutor:
     def run(self, jobs: Sequence[Job], watch: Watch) -> list[Outcome]:
         """See `Executor.run`."""
         board = _Board.remote()
-        most = _cores_of_the_largest_machine()
-        tasks = {
-            _work.options(num_cpus=min(job.settings.threads, most)).remote(number, job, board): number
-            for number, job in enumerate(jobs)
-        }
+        tasks = {_work.remote(number, job, board): number for number, job in enumerate(jobs)}
         outcomes: dict[int, Outcome] = {}
         try:
             while tasks:
@@ -54,12 +50,6 @@ class RayExecutor:
             for task in tasks:  # a person has seen enough
                 ray.cancel(task)
         return [outcomes[number] for number in range(len(jobs))]
-
-
-def _cores_of_the_largest_machine() -> int:
-    """As many as a task can have: one that asks for more would wait for ever."""
-    cores = [int(node["Resources"].get("CPU", 0)) for node in ray.nodes() if node["Alive"]]
-    return max(cores, default=1)
 
 
 def _outcome(job: Job, task: Any) -> Outcome:

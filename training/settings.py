@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -60,7 +60,6 @@ class Ppo(OnPolicy):
     kind: Literal["ppo"] = "ppo"
     fast: bool = True  # our faster computation of it instead of the one of Stable-Baselines3
     lessons: int = 0  # updates in which it first imitates the classical law of the robot's family
-    optimizer: Literal["adam", "muon"] = "adam"  # muon, for hidden layers, learns more from fewer samples
     # Of hidden layers while they learn: bfloat16 takes half the time where the processor multiplies it (avx512_bf16 or
     # amx_bf16 in /proc/cpuinfo), and more elsewhere. No processor chooses by itself: a seed asks for one policy.
     precision: Precision = "float32"
@@ -159,22 +158,6 @@ class Orders:
 
 
 @dataclass(frozen=True)
-class CourseReward:
-    """What counts on a way through waypoints while it learns, in place of the task's own weights of the same names.
-
-    Both lead the same way at last; getting nearer is told at once, and reaching is what is meant.
-    """
-
-    progress: float  # per metre that the robot comes nearer
-    reached: float  # per waypoint
-
-    def __post_init__(self) -> None:
-        """Refuse to punish what is asked for."""
-        if self.progress < 0.0 or self.reached <= 0.0:
-            raise ValueError("'progress' must be at least 0, 'reached' greater than 0.")
-
-
-@dataclass(frozen=True)
 class SpecialistPlan:
     """A second network, which takes over where dead valves leave no pose to hold (`training.specialist`)."""
 
@@ -213,7 +196,6 @@ class TrainingSettings:
     # run, so that the same seed keeps the same network on any machine.
     evaluate_every_s: float  # [s]
     checkpoint_every_s: float = 30.0  # wall-clock between checkpoints to resume from [s]
-    threads: int = 1  # of PyTorch, each on a core of its own; in deep networks a second one gains a fifth
     refinement: Refinement | None = None  # of ppo and recurrent_ppo
     stop_at_success: StopAtSuccess | None = None
     specialist: SpecialistPlan | None = None
@@ -225,9 +207,7 @@ class TrainingSettings:
     mirror: Symmetry | None = None
     gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
     compiled: bool = False  # whether steps of the worlds are compiled first
-    coordinates: bool = False  # whether it is shown targets of a path by coordinates and legs too
     orders: Orders | None = None  # shares of full command without it
-    course_reward: CourseReward | None = None  # the task's own without it
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
     def __post_init__(self) -> None:
@@ -235,8 +215,6 @@ class TrainingSettings:
         algorithm = self.algorithm
         if isinstance(algorithm, Ppo) and algorithm.lessons and not algorithm.fast:
             raise ValueError("'lessons' are for the fast PPO.")
-        if isinstance(algorithm, Ppo) and algorithm.optimizer != "adam" and not algorithm.fast:
-            raise ValueError(f"'optimizer: {algorithm.optimizer}' is for the fast PPO.")
         if isinstance(algorithm, Ppo) and algorithm.precision != "float32" and not algorithm.fast:
             raise ValueError(f"'precision: {algorithm.precision}' is for the fast PPO.")
         if self.specialist and (not self.told or isinstance(algorithm, RecurrentPpo)):
@@ -245,8 +223,6 @@ class TrainingSettings:
             )
         if self.mirror and isinstance(algorithm, RecurrentPpo):
             raise ValueError("'mirror' is for networks without memory: what they remember has a side, too.")
-        if self.coordinates and (isinstance(algorithm, RecurrentPpo) or self.told):
-            raise ValueError("'coordinates' are for networks without memory that are not 'told'.")
         if self.orders and (not isinstance(algorithm, Ppo) or algorithm.lessons or self.told or self.wrench):
             raise ValueError("'orders' are for ppo, without 'lessons', 'told' and 'wrench'.")
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
@@ -257,8 +233,8 @@ class TrainingSettings:
             raise ValueError(
                 f"'refinement' is for ppo and recurrent_ppo; {algorithm.kind} weighs entropy by itself."
             )
-        if min(self.worlds, self.threads) < 1 or self.time_limit_s <= 0.0:
-            raise ValueError("'worlds' and 'threads' must be at least 1, 'time_limit_s' greater than 0.")
+        if self.worlds < 1 or self.time_limit_s <= 0.0:
+            raise ValueError("'worlds' must be at least 1, 'time_limit_s' greater than 0.")
         positive(evaluate_every_s=self.evaluate_every_s, checkpoint_every_s=self.checkpoint_every_s)
 
     def learner_of(self, robot: Robot) -> Robot:
@@ -273,21 +249,6 @@ class TrainingSettings:
             return replace(robot, timing=replace(robot.timing, control_hz=self.control_hz))
         except ValueError as error:
             raise ConfigError(f"'{robot.name}' cannot be commanded at this rate: {error}") from error
-
-    def rewarded(self, task: Task) -> Task:
-        """The task as it is rewarded while it learns.
-
-        Raises:
-            ConfigError: The task has no waypoints.
-        """
-        if self.course_reward is None:
-            return task
-        own, new = task.reward_weights, asdict(self.course_reward)
-        if not new.keys() <= {field.name for field in fields(own)}:
-            raise ConfigError(
-                f"'course_reward': task '{task.name}' has no waypoints. Leave 'course_reward' out."
-            )
-        return replace(task, reward_weights=replace(own, **new))
 
     def effort(self, progress: float) -> float:
         """Factor on what using the actuators costs when this share of the run is over [-]."""

@@ -15,7 +15,6 @@ from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
-from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.observation import shares
 from fulmar_core.planar import in_float64
@@ -24,7 +23,6 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task
 from training.compiled import step_of
-from training.coordinates import coordinate_terms, places_of, with_coordinates
 from training.orders import KINDS, check_orders, shares_asked
 from training.spaces import action_space, observation_space, shares_space
 from training.stranded import asked_for
@@ -58,7 +56,6 @@ class BatchVecEnv(VecEnv):
         wrench: bool = False,
         gas: float = 1.0,
         mirror: Symmetry | None = None,
-        coordinates: bool = False,
         orders_held: int = 0,
         compiled: bool = False,
     ) -> None:
@@ -78,13 +75,11 @@ class BatchVecEnv(VecEnv):
             gas: What a valve costs in that choice, as a multiple.
             mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
                 (`fulmar_core.symmetry`).
-            coordinates: Observations end with what `training.coordinates` makes of the targets.
             orders_held: Actions are orders (`training.orders`) that stand for so many control steps; 0: they are not.
             compiled: Steps are compiled (`training.compiled`).
 
         Raises:
-            ConfigError: The robot cannot be mirrored so, or takes no orders, or the task has no path, or there is no
-                compiler.
+            ConfigError: The robot cannot be mirrored so, or takes no orders, or there is no compiler.
         """
         task = asked_for(task, scenario).fitted(robot)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
@@ -104,10 +99,7 @@ class BatchVecEnv(VecEnv):
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
         names = self.simulation.observer.names
-        self.places = places_of(names) if coordinates else ()
-        if coordinates and not self.places:
-            raise ConfigError(f"'coordinates': task '{task.name}' has no path. Leave 'coordinates' out.")
-        more = coordinate_terms(len(self.places)) + (len(disturbance_terms(robot)) if told else 0)
+        more = len(disturbance_terms(robot)) if told else 0
         actions = shares_space(WRENCH) if wrench else action_space(robot)
         if self.takes_orders:
             actions = gymnasium.spaces.MultiDiscrete([KINDS] * count)
@@ -177,12 +169,12 @@ class BatchVecEnv(VecEnv):
         return self._shown(observations, np.arange(self.num_envs))
 
     def _shown(self, observations: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """The mirror image of some goals, and coordinates, where these were asked for; of which image is remembered."""
+        """The mirror image of some goals, where it was asked for; of which, is remembered."""
         if self.mirror is not None:
             mirrored = observations[:, self.mirror.side] < 0.0
             self._mirrored[worlds] = mirrored
             observations = np.where(mirrored[:, None], observations @ self.mirror.seen, observations)
-        return with_coordinates(observations, self.places) if self.places else observations
+        return observations
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""

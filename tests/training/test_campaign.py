@@ -56,28 +56,26 @@ def test_a_campaign_runs_every_seed_reports_the_one_that_fails_and_names_the_bes
 class Pretended:
     """A process that has ended when it is looked at for the second time."""
 
-    def __init__(self, threads):
-        self.threads, self.looks = threads, 0
+    looks = 0
 
     def poll(self):
         self.looks += 1
         return 0 if self.looks > 1 else None
 
 
-def test_a_run_takes_a_core_for_each_thread_and_one_that_has_more_runs_alone(job, monkeypatch):
+def test_no_more_runs_than_cores_go_on_at_once(job, monkeypatch):
     begun, busy = [], []
 
-    def start(job):
-        begun.append(Pretended(job.settings.threads))
-        busy.append(sum(process.threads for process in begun if process.looks < 2))
+    def start(_job):
+        begun.append(Pretended())
+        busy.append(sum(process.looks < 2 for process in begun))
         return begun[-1]
 
     monkeypatch.setattr("training.executors._start", start)
     monkeypatch.setattr("training.executors._outcome", lambda job, code: Outcome(job, {}))
     monkeypatch.setattr("training.executors.POLL_S", 0.0)
-    jobs = [replace(job, settings=replace(job.settings, threads=threads)) for threads in (1, 2, 1, 1, 3)]
-    assert len(LocalExecutor(2).run(jobs, lambda *_: None)) == len(jobs)
-    assert busy == [1, 2, 1, 2, 3]
+    assert len(LocalExecutor(2).run([job] * 5, lambda *_: None)) == 5
+    assert busy == [1, 2, 1, 2, 1]
 
 
 @pytest.mark.slow
@@ -166,15 +164,7 @@ def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path, mon
         assert sum(node["Alive"] for node in ray.nodes()) == 2
         watched = []
         jobs = [with_seed(job, seed) for seed in (1, 2, JUDGE_SEED)]
-        jobs[1] = replace(jobs[1], settings=replace(job.settings, threads=3))  # which no machine here has
-        asked, options = [], ray_executor._work.options
-        monkeypatch.setattr(
-            ray_executor._work,
-            "options",
-            lambda num_cpus: asked.append(num_cpus) or options(num_cpus=num_cpus),
-        )
         told = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
-        assert asked == [1, 2, 1]  # a core for each thread, as far as the larger of both has them
         assert told["failed"] == 1
         assert "are kept for judging" in told["seeds"][2]["error"]
         assert told["best_seed"] in (1, 2)

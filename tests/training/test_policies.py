@@ -82,9 +82,6 @@ def test_how_long_a_policy_takes_is_known_from_its_bundle_and_guessed_without_on
     took = read_passport(small_job.bundle).training["wall_s"]
     assert expected_s([small_job], 2) == took
     assert expected_s([small_job] * 6, 2) == pytest.approx(3.0 * took)
-    two_threads = replace(small_job, settings=replace(small_job.settings, threads=2))
-    assert expected_s([two_threads] * 6, 2) == pytest.approx(6.0 * took)
-    assert expected_s([two_threads] * 6, 1) == pytest.approx(6.0 * took)  # there is only one core to take
 
 
 def test_two_lines_for_one_bundle_are_refused():

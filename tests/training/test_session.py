@@ -26,11 +26,9 @@ TURTLEBOT, TASK = load_robot("turtlebot2"), load_task("go_to_pose")
 
 
 def small(name):
-    """Settings of an algorithm, or of ppo with Muon, cut to what takes a moment."""
-    settings = load_training_settings(TURTLEBOT, TASK, "differential_drive" if name == "muon" else name)
+    """Settings of an algorithm, cut to what takes a moment."""
+    settings = load_training_settings(TURTLEBOT, TASK, name)
     algorithm = settings.algorithm
-    if name == "muon":
-        algorithm = replace(algorithm, optimizer="muon")
     if hasattr(algorithm, "epochs"):
         algorithm = replace(algorithm, steps=8, minibatch=64, epochs=2, hidden=(8,))
     else:
@@ -74,7 +72,7 @@ def quick_judge(monkeypatch):
     return rates
 
 
-@pytest.mark.parametrize("name", ["differential_drive", "muon", "recurrent_ppo", "sac", "td3"])
+@pytest.mark.parametrize("name", ["differential_drive", "recurrent_ppo", "sac", "td3"])
 def test_a_resumed_run_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_path, quick_judge, name):
     settings = small(name)
     whole, parts = tmp_path / "whole", tmp_path / "parts"

@@ -11,7 +11,6 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.settings import (
-    CourseReward,
     Refinement,
     StopAtSuccess,
     load_training_settings,
@@ -45,7 +44,6 @@ def test_a_file_of_the_pair_s_own_name_replaces_the_family_s(monkeypatch, tmp_pa
 def test_what_is_written_is_what_is_read(tmp_path, name):
     settings = load_training_settings(TURTLEBOT, TASK, name)
     settings = replace(settings, stop_at_success=StopAtSuccess(0.995))
-    settings = replace(settings, course_reward=CourseReward(3.0, 30.0))
     write_training_settings(settings, tmp_path / "settings.yaml")
     assert load_training_settings(TURTLEBOT, TASK, str(tmp_path / "settings.yaml")) == settings
 
@@ -115,7 +113,6 @@ def test_a_learner_that_weighs_entropy_by_itself_takes_no_refinement():
     ("change", "words"),
     [
         ({"worlds": 100}, "3200 must be a multiple of 'minibatch'"),
-        ({"threads": 0}, "'worlds' and 'threads' must be at least 1"),
         ({"time_limit_s": 0.0}, "'time_limit_s' greater than 0"),
         ({"evaluate_every_s": 0.0}, "'evaluate_every_s' must be greater than 0"),
         ({"checkpoint_every_s": -1.0}, "'checkpoint_every_s' must be greater than 0"),
@@ -153,24 +150,3 @@ def test_hyper_parameters_that_no_learner_can_do_with_are_refused(name, change, 
 def test_a_stop_that_would_come_always_or_never_is_refused(values):
     with pytest.raises(ValueError, match="must lie in"):
         StopAtSuccess(*values)
-
-
-def test_a_course_may_be_rewarded_otherwise_while_a_robot_learns_it():
-    course = load_task("go_through_positions")
-    settings = replace(load_training_settings(TURTLEBOT, course), course_reward=CourseReward(3.0, 30.0))
-    rewarded = settings.rewarded(course)
-    assert rewarded.reward_weights == replace(course.reward_weights, progress=3.0, reached=30.0)
-    assert replace(rewarded, reward_weights=course.reward_weights) == course
-    assert replace(settings, course_reward=None).rewarded(course) is course
-
-
-def test_a_course_s_reward_is_refused_where_there_is_no_course():
-    settings = replace(load_training_settings(TURTLEBOT, TASK), course_reward=CourseReward(3.0, 30.0))
-    with pytest.raises(ConfigError, match="'course_reward': task 'go_to_pose' has no waypoints"):
-        settings.rewarded(TASK)
-
-
-@pytest.mark.parametrize(("progress", "reached"), [(-1.0, 30.0), (3.0, 0.0)])
-def test_a_reward_for_going_away_or_for_nothing_is_refused(progress, reached):
-    with pytest.raises(ValueError, match="'progress' must be at least 0, 'reached' greater than 0"):
-        CourseReward(progress, reached)
