@@ -24,6 +24,7 @@ from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
+from fulmar_ros.node_robot import name_of
 from fulmar_ros.paced_capture import MakeCapture, capture_maker
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_health import PlantHealth
@@ -82,7 +83,7 @@ class PlantNode(LifecycleNode):
         self._air: AirBearingWires | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
-        self.health = PlantHealth(self.robot.name)
+        self.health = PlantHealth(name_of(self, self.robot))
         self.health.awaited = self.settings.wait_for_subscribers
         timeout_s = self.settings.timeout_s(self.robot)
         if timeout_s == 0.0:
@@ -104,7 +105,9 @@ class PlantNode(LifecycleNode):
             )
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
-                    raise FulmarError(f"plant of '{self.robot.name}' could not start: {self.health.reason}")
+                    raise FulmarError(
+                        f"plant of '{name_of(self, self.robot)}' could not start: {self.health.reason}"
+                    )
             self._twin_words = self.create_subscription(
                 DiagnosticArray,
                 DIAGNOSTICS.name,
