@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from fulmar_core.errors import ConfigError, shortened
+
 LONGEST = 64  # of a name [characters]; topics below it have 255 in all
 _NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST - 1}}}")
 
@@ -16,11 +18,23 @@ def check_robot_name(name: str) -> None:
         ValueError: With what is allowed.
     """
     if not _NAME.fullmatch(name):
-        quoted = name if len(name) <= LONGEST else f"{name[:LONGEST]}…"
         raise ValueError(
-            f"the name '{quoted}' of a robot must begin with a small letter and have only small letters, digits and "
-            f"underscores, {LONGEST} at most. Example: alpha_2"
+            f"the name '{shortened(name)}' of a robot must begin with a small letter and have only small letters, "
+            f"digits and underscores, {LONGEST} at most. Example: alpha_2"
         )
+
+
+def checked_name(name: str) -> str:
+    """The name itself, where ROS can take it.
+
+    Raises:
+        ConfigError: It cannot; with what is allowed.
+    """
+    try:
+        check_robot_name(name)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    return name
 
 
 def namespace_of(name: str) -> str:

@@ -19,8 +19,9 @@ from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DIAGNOSTICS
+from fulmar_core.topics import CLOCK, DIAGNOSTICS
 from fulmar_ros.air_bearing import AirBearingWires
+from fulmar_ros.clock_owner import other_clocks
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
@@ -132,6 +133,7 @@ class PlantNode(LifecycleNode):
             self.robot,
             self.guard,
             simulated=self._simulated,
+            clock=self._simulated and not self._clock_is_taken(),
             odometry=self.settings.publishes_odometry,
             mocap=self._motion_capture(),
             lockstep=self.settings.lockstep,
@@ -213,6 +215,16 @@ class PlantNode(LifecycleNode):
         with self.wires.lock:
             self.guard.reset()  # actuators begin at rest, not where the episode before left them
         self._lockstep.run(sample, steps, self._stop, on_step)
+
+    def _clock_is_taken(self) -> bool:
+        """Whether another node publishes the clock already; logs that ours is left out then."""
+        others = other_clocks(self, since_s=self._made_s, within_s=BRIEFLY_S)
+        if others:
+            self.get_logger().warning(
+                f"{others[0]} publishes {CLOCK.name} already: this plant leaves it out. Its own nodes do not need it; "
+                "nodes with use_sim_time follow the other one."
+            )
+        return bool(others)
 
     def _motion_capture(self) -> MakeCapture | None:
         """Source of poses: in the place of the odometry for an estimator, or beside it at a rate of its own."""

@@ -64,6 +64,7 @@ class PlantWires:
         guard: ActuatorGuard,
         *,
         simulated: bool,
+        clock: bool = False,
         odometry: bool = True,
         mocap: MakeCapture | None = None,
         lockstep: bool = False,
@@ -75,7 +76,8 @@ class PlantWires:
             node: Owner of the endpoints.
             robot: The robot.
             guard: Takes the commands; only touched under `self.lock`.
-            simulated: Whether truth and clock are published.
+            simulated: Whether the truth is published.
+            clock: Whether the clock is published.
             odometry: Whether the plant says where it is; if not, somebody else does.
             mocap: Publish the poses of the motion capture that it makes.
             lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
@@ -106,7 +108,7 @@ class PlantWires:
         self._imu = node.create_publisher(Imu, IMU.name, qos(IMU))
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, qos(ACTUATORS_STATE))
         self._truth = node.create_publisher(Odometry, TRUTH.name, qos(TRUTH)) if simulated else None
-        self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if simulated else None
+        self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if clock else None
         self._frames = frames = own_frames(node, robot)
         self._write_odometry = OdometryWriter(
             robot.sensors.odometry, frame=frames.odom, child_frame=frames.base
