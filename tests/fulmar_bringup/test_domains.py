@@ -22,7 +22,10 @@ def test_two_runs_in_one_domain_are_refused_until_the_first_is_over(monkeypatch)
 def test_a_domain_with_a_run_in_it_is_not_reserved(monkeypatch):
     monkeypatch.setattr("fulmar_bringup.domains.DOMAINS", range(101, 102))
     monkeypatch.setenv("ROS_DOMAIN_ID", "101")
-    with claimed_domain("alpha"), pytest.raises(ConfigError, match="1 free ROS domains are needed, 0 were found"):
+    with (
+        claimed_domain("alpha"),
+        pytest.raises(ConfigError, match="1 free ROS domains are needed, 0 were found"),
+    ):
         reserved_domains(1).__enter__()
     with reserved_domains(1) as domains:
         assert domains == [101]
