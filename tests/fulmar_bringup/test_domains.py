@@ -19,6 +19,15 @@ def test_two_runs_in_one_domain_are_refused_until_the_first_is_over(monkeypatch)
             pass
 
 
+def test_runs_of_two_names_share_a_domain_and_one_name_is_refused_in_one_line(monkeypatch):
+    with reserved_domains(1) as (domain,):
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        with claimed_domain("alpha"), claimed_domain("beta") as shared:
+            assert shared == domain
+            with pytest.raises(ConfigError, match=r"another `fulmar run` of 'beta' .* another --name"):
+                claimed_domain("beta").__enter__()
+
+
 def test_a_domain_with_a_run_in_it_is_not_reserved(monkeypatch):
     monkeypatch.setattr("fulmar_bringup.domains.DOMAINS", range(101, 102))
     monkeypatch.setenv("ROS_DOMAIN_ID", "101")

@@ -137,6 +137,7 @@ def plan_run(
         BundleError: The policy is damaged or made for something else.
     """
     check_names(robot, task, controller, backend)
+    own_name = "" if name is None else checked_name(name)
     hardware = _checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)
     check_arming(hardware, arm=arm)
     _check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
@@ -181,7 +182,7 @@ def plan_run(
         controller=controller,
         backend=backend,
         control_hz=hz,
-        name="" if name is None else checked_name(name),
+        name=own_name,
         policy=str(policy.absolute()) if policy else "",
         scenario=scenario,
         seed=seed,
