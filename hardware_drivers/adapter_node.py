@@ -23,6 +23,7 @@ from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.air_bearing import SERVICE
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.foreign_topics import VALVE_MESSAGES, valve_values
+from fulmar_ros.node_robot import own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -81,8 +82,10 @@ class AdapterNode(Node):
             raise ConfigError(f"{settings.hardware}: driver '{driver.kind}' is no message of another stack.")
         self._order = driver.order if isinstance(driver, ValveTopic) else ()
         wire = command_wire(self._robot)
-        self._write = TwistWriter() if wire is VELOCITY_COMMAND else VectorWriter(self._robot.actuators.names)
-        kind = TwistStamped if wire is VELOCITY_COMMAND else JointState
+        frames = own_frames(self, self._robot)
+        by_velocity = wire is VELOCITY_COMMAND
+        self._write = TwistWriter(frames) if by_velocity else VectorWriter(self._robot.actuators.names)
+        kind = TwistStamped if by_velocity else JointState
         self._publisher = self.create_publisher(kind, wire.name, publisher_qos(wire))
         self._bearing: bool | None = None
         self._enable = self.create_client(SetBool, SERVICE) if self._order else None

@@ -12,6 +12,7 @@ from fulmar_core.backend import Backend
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_sender
+from fulmar_ros.node_robot import own_frames
 from fulmar_ros.plant_node import DONE, PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import RequestExit, run_node
@@ -123,7 +124,8 @@ class DriverNode(PlantNode):
     def _by_topic(self, robot: Robot, hardware: Hardware) -> DriverBackend | None:
         driver = hardware.driver
         if isinstance(driver, VelocityTopic):
-            send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped)
+            frame = own_frames(self, robot).base
+            send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped, frame=frame)
             track = robot.actuators.track  # type: ignore[union-attr]  # settings refuse any other
 
             def send_wheels(command: np.ndarray) -> None:

@@ -29,6 +29,7 @@ from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.foreign_topics import VALVE_MESSAGES
+from fulmar_ros.node_robot import own_frames
 from fulmar_ros.paced_capture import capture_maker
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_settings import PlantSettings
@@ -103,6 +104,7 @@ class EmulatorNode(Node):
             sides=self.settings.sides,
             dead=[wire for wire in self.settings.dead if wire != NONE],
         )
+        self._frames = own_frames(self, robot)
         self._odometry: Publisher | None = None
         if isinstance(self.device, TopicDevice):
             self._listen(self.device)
@@ -111,8 +113,8 @@ class EmulatorNode(Node):
         self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
         capture = capture_maker(robot, rate_hz=self.settings.mocap_hz, late_s=self.settings.mocap_late_s)
         self._room = capture(self._publish_pose)
-        self._write_truth = OdometryWriter(None, frame="map")
-        self._write_pose = PoseWriter()
+        self._write_truth = OdometryWriter(None, frame="map", child_frame=self._frames.base)
+        self._write_pose = PoseWriter(self._frames)
         self._write_state = VectorWriter(robot.actuators.names)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._guarded, name="emulator", daemon=True)
@@ -164,7 +166,11 @@ class EmulatorNode(Node):
         )
         if self.settings.device != "valve_topic":
             self._odometry = self.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
-            self._write_odometry = OdometryWriter(self._backend.robot.sensors.odometry)
+            self._write_odometry = OdometryWriter(
+                self._backend.robot.sensors.odometry,
+                frame=self._frames.odom,
+                child_frame=self._frames.base,
+            )
 
     def _publish(self, sample: Sample, stamp_ns: int) -> None:
         if sample.truth is not None:

@@ -15,7 +15,7 @@ import pytest
 
 ARGUMENTS = {
     "system", "robot", "task", "controller", "backend", "hardware", "policy", "goals", "adapter", "topic",
-    "emulate",
+    "emulate", "name",
 }  # fmt: skip
 
 

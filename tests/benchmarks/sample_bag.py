@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.robot import Robot
+from fulmar_core.robot_name import namespace_of
 from fulmar_core.rotation import rotate_inverse
 from fulmar_core.state import RigidBodyState
 from fulmar_core.topics import ACTUATORS_STATE, ODOMETRY, Wire
@@ -81,7 +82,7 @@ class SampleBag:
         self._write(ACTUATORS_STATE, message, time_s)
 
     def _topic(self, wire: Wire) -> str:
-        return f"/{self._robot.name}/{wire.name}"
+        return f"{namespace_of(self._robot.name)}/{wire.name}"
 
     def _write(self, wire: Wire, message: Any, time_s: float) -> None:
         data = bytes(self._store.serialize_cdr(message, wire.type))

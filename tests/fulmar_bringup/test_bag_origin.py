@@ -48,6 +48,16 @@ def test_a_run_carries_its_settings_as_a_system_file_that_loads(tmp_path, contro
     assert system.recorder == plan.recording
 
 
+def test_a_run_names_its_robot_beside_its_type(tmp_path):
+    assert json.loads(run_info(LQR))["name"] == "floating_platform"
+    named = replace(LQR, name="alpha")
+    info = json.loads(run_info(named))
+    assert (info["robot"], info["name"]) == ("floating_platform", "alpha")
+    file = tmp_path / "system.yaml"
+    file.write_bytes(RecorderSettings(attachments=attachments(named)).files()["system.yaml"])
+    assert load_config(System, file).name == "alpha"
+
+
 def test_a_run_of_a_policy_carries_its_passport():
     path = Path(json.loads(attachments(POLICY))["passport.json"])
     assert json.loads(path.read_text())["task"] == "go_to_pose"

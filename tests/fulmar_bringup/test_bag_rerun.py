@@ -204,7 +204,7 @@ def test_the_node_is_fed_the_odometry_that_was_chosen(monkeypatch):
     other = replace(mine, name="/other/odom", data=[data[::-1] for data in mine.data])
     bag = replace(bag, topics={**bag.topics, "/other/odom": other})
     monkeypatch.setattr(live_node.ProcessGroup, "start", lambda group, spec: None)
-    monkeypatch.setattr(live_node, "_exchange", lambda raw, course, group: (raw["odometry"], None))
+    monkeypatch.setattr(live_node, "_exchange", lambda raw, *_: (raw["odometry"], None))
     course = course_of(open_bag(POLICY))
     fed, _ = live_node.rerun_through_node(bag, course, "policy", "", "/other/odom")
     assert fed == other.data

@@ -59,6 +59,12 @@ def broken_configs(tmp_path, monkeypatch):
         (["commission", "kingfisher_ardupilot", "--yes"], "not armed: arm: true or --arm"),
         (["doctor", "--for", "hardwear"], "Did you mean 'hardware'?"),
         (["doctor", "zero_g_lab"], "say `fulmar doctor --for hardware zero_g_lab`"),
+        ([*RUN, "--name", "Alpha"], "the name 'Alpha' of a robot must begin with a small letter"),
+        ([*RUN, "--name", ""], "the name '' of a robot must begin with a small letter"),
+        (["up", "mock_lqr", "--name", "a/b"], "the name 'a/b' of a robot must"),
+        (["goals", "lab_pose", "--robot", "floating_platform", "--name", "a b"], "the name 'a b' of a robot must"),
+        (["teleop", "floating_platform", "--name", "2a"], "the name '2a' of a robot must"),
+        (["swap", "a-b", "somewhere"], "the name 'a-b' of a robot must"),
         ([*RUN, "--arm"], "--arm is for boats with an autopilot"),
         (
             ["run", "kingfisher", "--backend", "hardware", "--hardware", "kingfisher_ardupilot", "--emulate"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from importlib.util import find_spec
 
@@ -277,6 +278,41 @@ def test_a_system_file_names_nodes_of_its_own(tmp_path, monkeypatch):
         "/floating_platform",
     )
     assert (row.inputs, row.parameters) == (("odom",), {"rate_hz": 5.0})
+
+
+def test_every_row_of_a_named_robot_lies_in_its_namespace(tmp_path):
+    guards = Guards(estop=True, estimator="mocap_imu")
+    plan = replace(PLAN, name="alpha", goals="/x/lab_pose.yaml", guards=guards)
+    rows = system_rows(plan, record={}, wires_folder=tmp_path)
+    assert set(rows) >= {"plant", "controller", "recorder", "estop", "estimator", "goals"}
+    assert {row.namespace for row in rows.values()} == {"/alpha"}
+    assert rows["plant"].parameters["robot"] == "floating_platform"
+    assert (plan.robot_name, plan.frames.base) == ("alpha", "alpha/base_link")
+    assert (PLAN.robot_name, PLAN.namespace, PLAN.frames.base) == (
+        "floating_platform",
+        "/floating_platform",
+        "base_link",
+    )
+
+
+def test_a_launched_system_takes_a_name_from_its_file_and_from_its_argument(tmp_path, monkeypatch):
+    (tmp_path / "systems").mkdir()
+    text = "title: t\nrobot: floating_platform\ntask: go_to_pose\ncontroller: lqr\nbackend: mock\ncontrol_hz: 50.0\n"
+    more = "name: alpha\nnodes:\n  - {name: camera, module: mine.camera_node, inputs: [odom]}\n"
+    (tmp_path / "systems" / "seeing.yaml").write_text(text + more)
+    (tmp_path / "systems" / "wrong.yaml").write_text(text + "name: Alpha-1\n")
+    monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
+    assert {row.namespace for row in list_nodes(system="seeing")} == {"/alpha"}
+    rows = list_nodes(system="seeing", name="beta")
+    assert {row.namespace for row in rows} == {"/beta"}
+    info = json.loads(by_name(rows)["recorder"].parameters["run_info"])
+    assert (info["robot"], info["name"]) == ("floating_platform", "beta")
+    with pytest.raises(
+        ConfigError, match=r"wrong.yaml:1: .* 'Alpha-1' of a robot must begin with a small letter"
+    ):
+        list_nodes(system="wrong")
+    with pytest.raises(ConfigError, match="'4b' of a robot must"):
+        list_nodes(system="seeing", name="4b")
 
 
 @pytest.mark.parametrize(

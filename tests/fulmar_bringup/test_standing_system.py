@@ -30,6 +30,13 @@ def test_a_system_has_no_end_and_begins_at_the_origin(plan):
     assert plan(start=(1.0, 2.0, 90.0)).start == (1.0, 2.0, 90.0)
 
 
+def test_a_system_keeps_the_name_of_its_robot(plan):
+    assert plan().robot_name == "floating_platform"
+    assert plan(changes={"robot_name": "alpha"}).namespace == "/alpha"
+    with pytest.raises(ConfigError, match="the name '' of a robot"):
+        plan(changes={"robot_name": ""})
+
+
 def test_on_hardware_goals_come_later_and_an_e_stop_runs(plan):
     planned = plan(changes={"robot": "turtlebot2", "task": "go_to_position", "controller": "classical",
                             "backend": "hardware"})  # fmt: skip

@@ -9,6 +9,7 @@ from nav_msgs.msg import Odometry
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_core.goal import goal_at
+from fulmar_core.robot_name import frames_of
 from fulmar_ros.goal_messages import goal_message, obstacles_message
 from fulmar_ros.message_reader import (
     MOST_OBSTACLES,
@@ -98,6 +99,32 @@ def test_a_goal_without_sense_is_refused_with_a_reason(topic, spoil, reason):
     goal, problem = goal_of(spoilt(topic, spoil))
     assert goal is None
     assert reason in problem
+
+
+ALPHA = frames_of("alpha", "floating_platform")
+
+
+@pytest.mark.parametrize("topic", ["goal_point", "goal_pose", "goal_path", "goal_velocity"])
+def test_a_named_robot_takes_goals_with_its_prefix_and_without_and_no_others(topic):
+    goal = goal_at((1.0, 2.0, 0.3))
+    named, plain = goal_message(goal, topic, 7, ALPHA), goal_message(goal, topic, 7)
+    assert named.header.frame_id == f"alpha/{plain.header.frame_id}"
+    for message in (named, plain):
+        assert goal_of(message, ALPHA)[1] == ""
+    assert "goal frame is 'alpha/" in goal_of(named)[1]
+    assert "goal frame is 'alpha/" in goal_of(named, frames_of("beta", "floating_platform"))[1]
+
+
+def test_a_named_robot_takes_obstacles_and_odometry_with_its_prefix_and_without():
+    discs = np.array([[1.0, 2.0, 0.3]])
+    for message in (obstacles_message(discs, 7, ALPHA), obstacles_message(discs, 7)):
+        assert obstacles_of(message, ALPHA)[1] == ""
+    assert "'alpha/odom', must be 'odom'" in obstacles_of(obstacles_message(discs, 7, ALPHA))[1]
+    for prefix in ("", "alpha/"):
+        odometry = Odometry(child_frame_id=f"{prefix}base_link")
+        odometry.header.frame_id = f"{prefix}odom"
+        found = measurement_of(odometry, ALPHA)
+        assert (found.frame, found.child_frame) == ("odom", "base_link")
 
 
 def test_an_array_of_poses_is_the_same_goal_as_the_path_of_these_poses():

@@ -10,6 +10,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from fulmar_core.robot import load_robot
+from fulmar_core.robot_name import frames_of
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.convert import OdometryWriter, TwistWriter, VectorWriter
 from fulmar_ros.message_reader import measurement_of
@@ -78,6 +79,17 @@ def test_odometry_is_read_from_its_bytes_as_rclpy_reads_it(filling):
 def test_odometry_in_other_frames_keeps_them(frames):
     data = OdometryWriter(None, frame=frames[0], child_frame=frames[1]).raw(state(4), 9)
     assert same(OdometryReader().read(data), measurement_of(deserialize_message(data, Odometry)))
+
+
+def test_a_named_robot_reads_odometry_with_its_prefix_from_the_bytes_and_without_it_too():
+    frames = frames_of("alpha", "floating_platform")
+    reader = OdometryReader(frames)
+    own = OdometryWriter(None, frame=frames.odom, child_frame=frames.base).raw(state(4), 9)
+    plain = OdometryWriter(None).raw(state(4), 9)
+    assert reader._image.read(own) is not None
+    assert same(reader.read(own), OdometryReader().read(plain))
+    assert same(reader.read(plain), OdometryReader().read(plain))
+    assert OdometryReader().read(own).frame == "alpha/odom"
 
 
 @pytest.mark.parametrize("names", [NAMES, NAMES[::-1], NAMES[:3], ("x",) * 8])

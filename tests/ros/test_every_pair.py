@@ -15,6 +15,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.supervisor import Supervisor
 from fulmar_core.backend import Sample
 from fulmar_core.controllers.controller import Controller, Inputs
@@ -98,7 +99,9 @@ def nodes(
         pytest.fail(repr(error))
 
     operator = Node("operator", namespace=f"/{robot.name}")
-    overseer = Supervisor(operator, robot.name, task)
+    overseer = Supervisor(
+        operator, RunPlan(robot.name, task.name, "external", "mock", robot.timing.control_hz)
+    )
     plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments("autostart:=false"))
     assert plant.trigger_configure() == TransitionCallbackReturn.SUCCESS
     controller = ControllerNode(

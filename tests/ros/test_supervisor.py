@@ -14,10 +14,10 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from std_msgs.msg import Bool, String
 
+from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import goal_at
-from fulmar_core.tasks import load_task
 from fulmar_core.topics import ESTOP, ESTOP_RELEASED, GOAL_POSE
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.operator_subscription import subscribe_operator
@@ -28,6 +28,7 @@ from tests.ros.controllers import make_lqr
 from tests.ros.neighbour import NAMESPACE, until
 
 pytestmark = pytest.mark.real_time
+PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mock", 50.0)
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_a_plant_that_refuses_to_start_fails_the_run_with_its_own_reason(
         response.success = request.transition.id != refused
         return response
 
-    with supervisor("floating_platform", load_task("go_to_pose")) as overseer:
+    with supervisor(PLAN) as overseer:
         plant = rclpy.create_node("plant", namespace="/floating_platform")
         plant.create_service(ChangeState, "plant/change_state", answer)
         with spinning(plant, overseer.fail), pytest.raises(RunFailed) as caught:
@@ -78,7 +79,7 @@ def operated(
     """A supervisor of an LQR node that needs an e-stop, the e-stop, and a node for more."""
     monkeypatch.setattr(sys, "argv", ["controller_node"])
     arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "estop:=true"]
-    with supervisor("floating_platform", load_task("go_to_pose")) as overseer:
+    with supervisor(PLAN) as overseer:
         controller = ControllerNode(make_lqr, lambda _code: None, cli_args=arguments)
         other = rclpy.create_node("other", namespace=NAMESPACE)
         button = Button(other)

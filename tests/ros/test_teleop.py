@@ -116,6 +116,26 @@ def test_a_plant_that_dies_while_it_is_asked_does_not_keep_the_hand_for_ever(
         node.stop()
 
 
+def test_without_a_plant_of_the_name_it_lists_the_robots_that_are_heard(
+    plant: PlantNode, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(teleop_node, "PATIENCE_S", 0.5)
+    arguments = ["--ros-args", "-r", "__ns:=/alpha", "-p", "keyboard:=false"]
+    said: list[str] = []
+
+    def told() -> bool:
+        said.append(capfd.readouterr().err)
+        return (
+            "no plant subscribes /alpha/teleop/command. Robots that are heard: floating_platform."
+            in "".join(said)
+        )
+
+    node = TeleopNode(lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(told)
+        node.stop()
+
+
 def test_it_is_not_given_back_while_the_hand_moves_something(pad: Pad) -> None:
     until(lambda: pad.drives(held=True))
     client = pad.neighbour.node.create_client(Trigger, GIVE_BACK)

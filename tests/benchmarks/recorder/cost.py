@@ -90,12 +90,11 @@ def cost_of_recording(
 @contextlib.contextmanager
 def _running(plan: RunPlan) -> Iterator[PlantNode]:
     """A plant in this process and its controller, at work until the context ends."""
-    task = load_task(plan.task)
     group = ProcessGroup()
     try:
         rows = system_rows(plan)
         group.start(rows["controller"])
-        with supervisor(plan.robot, task) as overseer:
+        with supervisor(plan) as overseer:
             plant = PlantNode(make_backend, lambda _code: None, cli_args=command_line(rows["plant"])[3:])
             if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise RunFailed("the plant could not be configured")

@@ -12,7 +12,6 @@ from typing import Any
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.recording import Recording
-from fulmar_core.robot import load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from tests.benchmarks.recorder.bag_stamps import opens, stamps_by_topic
 from tests.benchmarks.recorder.recorders import recorders
@@ -47,7 +46,7 @@ def killed(plan: RunPlan, *, kills: int, out: Path, progress: Callable[[], None]
         }
         with (
             own_domain(),
-            traffic(load_robot(plan.robot)) as source,
+            traffic(plan) as source,
             recorders(plans) as alive,
         ):
             source.wait_for(count)
@@ -61,7 +60,7 @@ def killed(plan: RunPlan, *, kills: int, out: Path, progress: Callable[[], None]
             source.stop()
             for recorder, moment_s in zip(alive, died_s, strict=True):
                 opened += opens(recorder.bag)
-                gap, lost_s = _lost(recorder.bag, plan.robot, source, moment_s)
+                gap, lost_s = _lost(recorder.bag, plan.namespace, source, moment_s)
                 torn += gap
                 missing_s.append(lost_s)
                 progress()
@@ -78,10 +77,10 @@ def killed(plan: RunPlan, *, kills: int, out: Path, progress: Callable[[], None]
     }
 
 
-def _lost(bag: Path, robot: str, source: Traffic, died_s: float) -> tuple[bool, float]:
+def _lost(bag: Path, namespace: str, source: Traffic, died_s: float) -> tuple[bool, float]:
     """Whether anything but the end is missing, and how much of the end [s]."""
     stamps = stamps_by_topic(bag)
-    odometry, commands = stamps[f"/{robot}/{ODOMETRY.name}"], stamps[f"/{robot}/{COMMAND.name}"]
+    odometry, commands = stamps[f"{namespace}/{ODOMETRY.name}"], stamps[f"{namespace}/{COMMAND.name}"]
     gap = odometry != list(range(len(odometry))) or commands != list(range(0, EVERY * len(commands), EVERY))
     sent = [moment for moment in source.sent_s if moment <= died_s]
     unkept = sent[len(odometry) :]

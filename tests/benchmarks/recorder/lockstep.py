@@ -67,7 +67,7 @@ def lost_in_lock_step(robot: str, *, control_hz: float, simulated_s: float, out:
     period_ns, steps = round(1e9 / control_hz), round(simulated_s * control_hz)
     expected = {SIMULATION_START_NS + step * period_ns for step in range(steps)}
     stamps = stamps_by_topic(request.record)
-    lost = {wire.name: len(expected - set(stamps[f"/{robot}/{wire.name}"])) for wire in WIRES}
+    lost = {wire.name: len(expected - set(stamps[f"{request.plan.namespace}/{wire.name}"])) for wire in WIRES}
     rate = simulated_s / float(log_s[-1] - log_s[0])
     return {
         "simulated_s": simulated_s,

@@ -9,7 +9,6 @@ from typing import Any
 
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.node_table import RunPlan
-from fulmar_core.robot import load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from tests.benchmarks.recorder.bag_stamps import stamps_by_topic
 from tests.benchmarks.recorder.recorders import recorders
@@ -39,7 +38,7 @@ def lost_in_real_time(
     bag = out / "real_time"
     with (
         own_domain(),
-        traffic(load_robot(plan.robot)) as source,
+        traffic(plan) as source,
         recorders({bag: plan}) as (recorder,),
     ):
         source.wait_for(1)
@@ -57,8 +56,8 @@ def lost_in_real_time(
     odometry = set(range(len(source.sent_s)))
     commands = set(range(0, len(source.sent_s), EVERY))
     lost = {
-        ODOMETRY.name: len(odometry - set(stamps[f"/{plan.robot}/{ODOMETRY.name}"])),
-        COMMAND.name: len(commands - set(stamps[f"/{plan.robot}/{COMMAND.name}"])),
+        ODOMETRY.name: len(odometry - set(stamps[f"{plan.namespace}/{ODOMETRY.name}"])),
+        COMMAND.name: len(commands - set(stamps[f"{plan.namespace}/{COMMAND.name}"])),
     }
     return {
         "seconds": took_s,

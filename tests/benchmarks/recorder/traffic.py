@@ -13,9 +13,10 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
+from fulmar_bringup.node_table import RunPlan
 from fulmar_core.errors import RunFailed
 from fulmar_core.priority import PLANT_PRIORITY, take_priority
-from fulmar_core.robot import Robot
+from fulmar_core.robot import Robot, load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.deadline import Deadlines
@@ -75,13 +76,13 @@ class Traffic:
 
 
 @contextlib.contextmanager
-def traffic(robot: Robot) -> Iterator[Traffic]:
+def traffic(plan: RunPlan) -> Iterator[Traffic]:
     """Traffic that has not begun, in the ROS domain of the environment; it ends with the context."""
     set_up_middleware()
     context = rclpy.Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("traffic", namespace=f"/{robot.name}", context=context)
-    made = Traffic(node, robot)
+    node = rclpy.create_node("traffic", namespace=plan.namespace, context=context)
+    made = Traffic(node, load_robot(plan.robot))
     try:
         yield made
     finally:

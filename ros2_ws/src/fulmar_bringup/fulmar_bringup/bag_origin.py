@@ -36,6 +36,7 @@ def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
     return json.dumps(
         {
             **{key: value for key, value in asdict(plan).items() if key != "supervised"},
+            "name": plan.robot_name,
             **(more or {}),
             "calibration": str(calibration_path() or ""),
             "fulmar_version": fulmar_version(),
@@ -68,9 +69,10 @@ def attachments(plan: RunPlan) -> str:
 def effective_system(plan: RunPlan) -> System:
     """The settings of a run as a file of `configs/systems` would say them, whatever they came from."""
     return System(
-        f"{plan.robot}, {plan.task}, {plan.controller} on {plan.backend}, as it was run",
+        f"{plan.robot_name}, {plan.task}, {plan.controller} on {plan.backend}, as it was run",
         *(plan.robot, plan.task, plan.controller, plan.backend),
         control_hz=plan.control_hz,
+        name=plan.robot_name,
         guards=plan.guards,
         recorder=plan.recording,
     )

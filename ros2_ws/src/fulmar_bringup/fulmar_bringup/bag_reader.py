@@ -118,7 +118,7 @@ class _Reader:
             obstacles=self._obstacles(),
             block=_places(self._messages(BLOCK)),
             controller=next((text for text in reversed(texts) if text), {}),
-            health=_health(self._messages(STATUS) + self._messages(DIAGNOSTICS)),
+            health=_health(self._messages(STATUS) + self._messages(DIAGNOSTICS), self._bag.name),
             warnings=tuple(self._warnings),
         )
 
@@ -161,14 +161,14 @@ class _Reader:
 
     def _goals(self, task: object) -> list[GivenGoal]:
         """What the controller was told; it hears the topic of its task alone."""
-        goals = []
+        goals, frames = [], self._bag.frames
         heard = _goal_wires_of(task, self._bag.path)
         for wire in (wire for topic in GOAL_WIRES for wire in goal_wires(topic)):
             if wire not in heard:
                 self._warn_of_others(wire, task)
                 continue
             for log_ns, message in self._messages(wire):
-                goal, problem = goal_of(message)
+                goal, problem = goal_of(message, frames)
                 if goal is None:
                     self._warnings.append(f"a message of {self._bag.topic_name(wire)} is no goal: {problem}.")
                     continue
@@ -188,7 +188,7 @@ class _Reader:
         found = self._messages(OBSTACLES)
         if not found:
             return nothing
-        discs, problem = obstacles_of(found[-1][1])
+        discs, problem = obstacles_of(found[-1][1], self._bag.frames)
         if discs is None:
             self._warnings.append(f"the obstacles cannot be used: {problem}.")
         return nothing if discs is None else discs
@@ -226,12 +226,15 @@ def _places(found: Decoded) -> Places:
     )
 
 
-def _health(found: Decoded) -> tuple[HealthSample, ...]:
+def _health(found: Decoded, name: str) -> tuple[HealthSample, ...]:
+    """What the nodes of a robot said; of all robots, which share one topic, where no name is known."""
+    own = f"{name}: " if name else ""
     samples = [
         HealthSample(
             log_ns / NS, s.name, int(s.level), s.message, {pair.key: pair.value for pair in s.values}
         )
         for log_ns, message in found
         for s in message.status
+        if s.name.startswith(own)
     ]
     return tuple(sorted(samples, key=lambda sample: sample.log_s))

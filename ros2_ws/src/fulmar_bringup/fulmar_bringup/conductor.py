@@ -35,7 +35,6 @@ from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from hardware_drivers.presence import check_presence
 from hardware_drivers.settings import load_hardware
@@ -119,7 +118,7 @@ def run_nodes(request: RunRequest, watch: Watch) -> tuple[str, int]:
     """
     if request.plan.hardware and not request.plan.emulated:
         check_presence(load_hardware(request.plan.hardware).driver)
-    with claimed_domain():
+    with claimed_domain(request.plan.robot_name):
         return _run(request, watch)
 
 
@@ -133,7 +132,7 @@ def _run(request: RunRequest, watch: Watch) -> tuple[str, int]:
         specs = list(system_rows(plan, record=_recording(request), wires_folder=wires_folder).values())
         for spec in specs:
             group.start(spec)
-        with supervisor(plan.robot, load_task(plan.task)) as overseer:
+        with supervisor(plan) as overseer:
             if overseer.sees_living_plant():
                 _withdraw(group, specs, request.record)
                 overseer.refuse_living_plant()

@@ -51,26 +51,30 @@ def reserved_domains(count: int) -> Iterator[list[int]]:
 
 
 @contextlib.contextmanager
-def claimed_domain() -> Iterator[int]:
-    """Claim the domain of the environment for one run until the context ends; two runs in one would mix.
+def claimed_domain(name: str) -> Iterator[int]:
+    """Claim a robot's name in the domain of the environment until the context ends; two runs of one name would mix.
 
     Not the lock of `reserved_domains`: a run may take place in a domain that its parent process reserved for it.
+
+    Args:
+        name: What the robot is called.
 
     Yields:
         The domain id.
 
     Raises:
-        ConfigError: Another run of this user goes on in it, or ROS_DOMAIN_ID is no domain.
+        ConfigError: Another run of this user has the name in it, or ROS_DOMAIN_ID is no domain.
     """
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if not text.isdecimal() or int(text) > LARGEST:
         raise ConfigError(f"ROS_DOMAIN_ID = '{text}' must be a whole number from 0 to {LARGEST}.")
-    domain = int(text)
-    with _run_lock_file(_lock_folder(), domain) as lock:
+    domain, folder = int(text), _lock_folder()
+    with _run_lock_file(folder, domain) as shared, (folder / f"{domain}.{name}.run").open("w") as lock:
+        fcntl.flock(shared, fcntl.LOCK_SH)  # waits for no more than a look of `reserved_domains`
         if not _locked(lock):
             raise ConfigError(
-                f"another `fulmar run` is using ROS domain {domain}, and two in one domain would mix. "
-                "Wait for it to end, or set ROS_DOMAIN_ID to another number."
+                f"another `fulmar run` of '{name}' is using ROS domain {domain}, and two of one name would mix. "
+                "Wait for it to end, give this robot another --name, or set ROS_DOMAIN_ID to another number."
             )
         give_back_abandoned_memory()
         yield domain

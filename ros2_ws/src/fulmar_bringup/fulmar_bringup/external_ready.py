@@ -40,7 +40,7 @@ def command_input(plan: RunPlan) -> CommandInput:
         kind = heard_class(driver)
         wire = replace(wire, type=f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}")
         topic, reliable = plan.adapter_topic or driver.topic, False
-    return CommandInput(topic if topic.startswith("/") else f"/{plan.robot}/{topic}", wire, reliable)
+    return CommandInput(topic if topic.startswith("/") else f"{plan.namespace}/{topic}", wire, reliable)
 
 
 def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
@@ -106,7 +106,7 @@ def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], Non
             topic = dict(plan.remappings).get(ODOMETRY.name, ODOMETRY.name)
             raise RunFailed(
                 f"the plant did not begin within {TIMEOUT_S:g} s ({overseer.plant.message}). In lock step your "
-                f"controller subscribes {topic} of '{plan.robot}' and answers each message by its stamp."
+                f"controller subscribes {topic} of '{plan.robot_name}' and answers each message by its stamp."
             )
 
     overseer.wait_until(

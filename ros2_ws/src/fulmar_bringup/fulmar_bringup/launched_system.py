@@ -25,6 +25,7 @@ def list_nodes(
     *,
     system: str | None = None,
     robot: str | None = None,
+    name: str | None = None,
     task: str | None = None,
     controller: str | None = None,
     backend: str | None = None,
@@ -40,6 +41,7 @@ def list_nodes(
     Args:
         system: Name of a file in `configs/systems`; `mujoco_policy` by default.
         robot: Another robot.
+        name: Another name of the robot; that of the system or its type by default.
         task: Another task.
         controller: Another controller.
         backend: Another backend.
@@ -59,6 +61,7 @@ def list_nodes(
     chosen = varied_system(
         system or "mujoco_policy",
         robot=robot,
+        robot_name=name,
         task=task,
         controller=controller,
         backend=backend,
@@ -71,6 +74,7 @@ def list_nodes(
         chosen.controller,
         chosen.backend,
         control_hz=chosen.control_hz,
+        name=chosen.name,
         policy=policy or "",
         guards=chosen.guards,
         recording=chosen.recorder,

@@ -12,6 +12,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
+from fulmar_core.robot_name import Frames, frames_of, namespace_of
 from fulmar_core.safety.area import NO_AREA
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
@@ -68,6 +69,7 @@ class RunPlan:
     controller: str
     backend: str
     control_hz: float  # [Hz]
+    name: str = ""  # what the robot is called; empty: as its type
     policy: str = ""  # folder of a bundle; empty: the shipped one
     scenario: str = "nominal"
     seed: int = 0
@@ -91,6 +93,21 @@ class RunPlan:
     )
     adapter_topic: str = ""  # topic that it takes them from; empty: the file's
     nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
+
+    @property
+    def robot_name(self) -> str:
+        """What the robot is called."""
+        return self.name or self.robot
+
+    @property
+    def namespace(self) -> str:
+        """Namespace of every node and topic of the robot."""
+        return namespace_of(self.robot_name)
+
+    @property
+    def frames(self) -> Frames:
+        """Names of the robot's frames."""
+        return frames_of(self.robot_name, self.robot)
 
 
 def controller_spec(plan: RunPlan) -> NodeSpec:
@@ -135,7 +152,7 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         "policy_server",
         "controller_node",
         "policy_server.controller_node",
-        f"/{plan.robot}",
+        plan.namespace,
         parameters,
         network=plan.controller_network,
         remappings=dict(plan.remappings),
@@ -159,7 +176,7 @@ def adapter_spec(plan: RunPlan) -> NodeSpec:
         "hardware_drivers",
         "adapter_node",
         "hardware_drivers.adapter_node",
-        f"/{plan.robot}",
+        plan.namespace,
         parameters,
         remappings=dict(plan.remappings),
         outputs=(command_wire(load_robot(plan.robot)).name,),
@@ -215,7 +232,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             "hardware_drivers",
             "driver_node",
             "hardware_drivers.driver_node",
-            f"/{plan.robot}",
+            plan.namespace,
             parameters,
             remappings=dict(plan.remappings),
             inputs=(command_wire(load_robot(plan.robot)).name,),
@@ -230,7 +247,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         "sim_nodes",
         "sim_node",
         "sim_nodes.sim_node",
-        f"/{plan.robot}",
+        plan.namespace,
         parameters,
         remappings=dict(plan.remappings),
         inputs=(command_wire(load_robot(plan.robot)).name,),
@@ -264,7 +281,7 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
         "sim_nodes",
         "emulator_node",
         "sim_nodes.emulator_node",
-        f"/{plan.robot}",
+        plan.namespace,
         parameters,
         remappings=dict(plan.remappings),
         outputs=(DEVICE_STATE.name, MOCAP.name),
@@ -288,7 +305,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         "fulmar_ros",
         "recorder_node",
         "fulmar_ros.recorder_node",
-        f"/{plan.robot}",
+        plan.namespace,
         {key: text for key, text in texts.items() if text} | unusual,
         remappings=dict(plan.remappings),
         observed=tuple(wire.name for wire in WIRES if wire.recorded),
@@ -296,13 +313,20 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
 
 
 def goals_spec(
-    robot: str, goals: str, *, as_path: bool = False, control_hz: float = 10.0, give_up_s: float = 0.0
+    robot: str,
+    goals: str,
+    *,
+    name: str = "",
+    as_path: bool = False,
+    control_hz: float = 10.0,
+    give_up_s: float = 0.0,
 ) -> NodeSpec:
     """The node that tells goals from a file; no system has it by itself.
 
     Args:
-        robot: Who is to do it.
+        robot: Type of the robot that is to do it.
         goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`.
+        name: What the robot is called; its type by default.
         as_path: Tell all positions or poses at once.
         control_hz: Velocities come so often along a path [Hz].
         give_up_s: Ends with exit code 1 where robot or controller are not there after so long; 0: waits [s].
@@ -320,7 +344,7 @@ def goals_spec(
         "fulmar_ros",
         "goal_node",
         "fulmar_ros.goal_node",
-        f"/{robot}",
+        namespace_of(name or robot),
         parameters,
         inputs=(ODOMETRY.name,),
         outputs=tuple(GOAL_WIRES),
@@ -332,6 +356,7 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
     spec = goals_spec(
         plan.robot,
         plan.goals,
+        name=plan.name,
         as_path=is_path_of_places(load_task(plan.task)),
         control_hz=min(plan.control_hz, 10.0),
     )
@@ -341,7 +366,7 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
 
 def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
     """The nodes that a plan's guards ask for."""
-    space, parameters = f"/{plan.robot}", {"robot": plan.robot}
+    space, parameters = plan.namespace, {"robot": plan.robot}
     nodes = []
     if plan.guards.estop:
         nodes.append(

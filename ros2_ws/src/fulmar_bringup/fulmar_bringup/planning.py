@@ -39,6 +39,7 @@ from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.robot_name import checked_name
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from hardware_drivers.own_driver import check_own_driver
@@ -65,6 +66,7 @@ class RunRequest:
 def plan_run(
     *,
     robot: str,
+    name: str | None = None,
     task: str,
     controller: str,
     backend: str,
@@ -96,7 +98,8 @@ def plan_run(
     """Complete a request and refuse what cannot work, before any process is started.
 
     Args:
-        robot: Name of the robot.
+        robot: Type of the robot.
+        name: What the robot is called; its type by default.
         task: Name of the task.
         controller: Name of the controller.
         backend: Name of the backend.
@@ -134,6 +137,7 @@ def plan_run(
         BundleError: The policy is damaged or made for something else.
     """
     check_names(robot, task, controller, backend)
+    own_name = "" if name is None else checked_name(name)
     hardware = _checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)
     check_arming(hardware, arm=arm)
     _check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
@@ -178,6 +182,7 @@ def plan_run(
         controller=controller,
         backend=backend,
         control_hz=hz,
+        name=own_name,
         policy=str(policy.absolute()) if policy else "",
         scenario=scenario,
         seed=seed,

@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from fulmar_bringup.stop_robots import ANSWER_S, MISS_S, Answer, spaces_with
+from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.estop import EstopButton
 from fulmar_core.topics import COMMAND, ESTOP_RELEASED, ESTOP_RESET, TELEOP, VELOCITY_COMMAND, Wire
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -95,4 +96,4 @@ def release_without_node(node: Node, space: str) -> Answer:
 
 
 def _only(spaces: set[str], robot: str | None) -> set[str]:
-    return spaces if robot is None else spaces & {f"/{robot}"}
+    return spaces if robot is None else spaces & {namespace_of(robot)}

@@ -19,9 +19,11 @@ from fulmar_bringup.reset_robots import release_without_node, robots_to_reset
 from fulmar_bringup.running_robots import running_robots, unfit_publishers
 from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, spaces_with, stop_robots
 from fulmar_core.errors import RunFailed
+from fulmar_core.robot_name import namespace_of
 from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP
 from fulmar_ros.command_writers import full_name
 from fulmar_ros.middleware import set_up_middleware
+from fulmar_ros.node_robot import heard_words
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 
@@ -43,7 +45,7 @@ class Operator:
         while True:
             found = spaces_with(self._node, service)
             if robot is not None:
-                found &= {f"/{robot}"}
+                found &= {namespace_of(robot)}
             if time.monotonic() > until or (found and robot is not None):
                 return sorted(found)
             if found:  # who is found first is rarely alone: the others get a moment
@@ -102,6 +104,10 @@ class Operator:
         }
         return came | {space: release_without_node(self._node, space) for space in sorted(without)}
 
+    def heard_words(self) -> str:
+        """A sentence that lists the robots that are heard now."""
+        return heard_words(self._node)
+
     def look_at_wires(self) -> tuple[set[str], list[str]]:
         """Namespaces of the robots that run here, and publishers on their wires from which nothing arrives."""
         spaces = running_robots(self._node)
@@ -114,7 +120,7 @@ class Operator:
         gets lost where discovery has not matched it with the controller yet.
 
         Args:
-            robot: Whose controller.
+            robot: Name of the robot whose controller it is.
             folder: The bundle, on the robot's own disk.
             find_s: How long to look for the controller [s].
             answer_s: How long the policy may take to take over [s].
@@ -131,13 +137,15 @@ class Operator:
             if message.status:
                 status.update({pair.key: pair.value for pair in message.status[0].values})
 
-        qos = subscriber_qos(STATUS, reliable=True)
-        self._node.create_subscription(DiagnosticArray, f"/{robot}/{STATUS.name}", read, qos)
-        publisher = self._node.create_publisher(String, f"/{robot}/{SWAP.name}", publisher_qos(SWAP))
+        qos, space = subscriber_qos(STATUS, reliable=True), namespace_of(robot)
+        self._node.create_subscription(DiagnosticArray, f"{space}/{STATUS.name}", read, qos)
+        publisher = self._node.create_publisher(String, f"{space}/{SWAP.name}", publisher_qos(SWAP))
         until = time.monotonic() + find_s
-        while not (status and self._takes_swaps(robot)):
+        while not (status and self._takes_swaps(space)):
             if time.monotonic() > until:
-                raise RunFailed(f"no controller of '{robot}' is heard in this ROS domain.")
+                raise RunFailed(
+                    f"no controller of '{robot}' is heard in this ROS domain. {self.heard_words()}"
+                )
             time.sleep(LOOK_S)
         before, until, asked_s = status.get("swap_requests"), time.monotonic() + answer_s, 0.0
         while True:
@@ -152,10 +160,10 @@ class Operator:
                 asked_s = now_s
             time.sleep(ASK_S)
 
-    def _takes_swaps(self, robot: str) -> bool:
+    def _takes_swaps(self, space: str) -> bool:
         """Whether a node that publishes the status of a controller subscribes to requests, too."""
-        asked = self._node.get_subscriptions_info_by_topic(f"/{robot}/{SWAP.name}")
-        answering = self._node.get_publishers_info_by_topic(f"/{robot}/{STATUS.name}")
+        asked = self._node.get_subscriptions_info_by_topic(f"{space}/{SWAP.name}")
+        answering = self._node.get_publishers_info_by_topic(f"{space}/{STATUS.name}")
         return bool({full_name(info) for info in asked} & {full_name(info) for info in answering})
 
 

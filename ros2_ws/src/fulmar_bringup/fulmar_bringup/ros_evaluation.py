@@ -37,7 +37,6 @@ from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
 from fulmar_core.orphans import end_with
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import SWITCH_INTERVAL_S, settle_memory, spinning
 from sim_nodes.sim_node import make_backend
@@ -191,7 +190,7 @@ def _roll_out_share(plan: RunPlan, numbers: range, domain: int, index: int) -> T
     try:
         rows = system_rows(replace(plan, supervised=True))
         group.start(rows["controller"])
-        with supervisor(plan.robot, load_task(plan.task)) as overseer:
+        with supervisor(plan) as overseer:
             arguments = command_line(rows["plant"])[3:]
             plant = PlantNode(make_backend, lambda _code: None, cli_args=arguments)
             if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:

@@ -45,6 +45,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
     wall_hz = _number(controller, "control_rate_hz") or _wall_rate_hz(record)
     return {
         **{key: record.info.get(key) for key in ASKED},
+        "name": record.info.get("name") or record.info.get("robot"),
         "steps": len(latencies_ms(record)) or _unanswering(record),
         "duration_s": judgement.duration_s if judgement else 0.0,
         "success": judgement is not None and judgement.success,

@@ -8,16 +8,16 @@ from rclpy.node import Node
 
 from fulmar_core.topics import JOY, WIRES, Wire
 from fulmar_core.wire_check import wire_problems
+from fulmar_ros.node_robot import heard_spaces
 from fulmar_ros.wire_watch import offers_of
 
 FIND_S = 1.5  # until the nodes of the domain have found this one
-ROBOT_NODES = {"plant", "controller"}
 
 
 def running_robots(node: Node, *, find_s: float = FIND_S) -> set[str]:
     """Namespaces with a plant or a controller, after some time to find them."""
     time.sleep(find_s)
-    return {space for name, space in node.get_node_names_and_namespaces() if name in ROBOT_NODES}
+    return heard_spaces(node)
 
 
 def unfit_publishers(node: Node, spaces: set[str]) -> list[str]:

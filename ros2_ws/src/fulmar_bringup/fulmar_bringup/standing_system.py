@@ -71,6 +71,7 @@ def plan_system(
     """
     request = plan_run(
         robot=system.robot,
+        name=system.name or None,
         task=system.task,
         controller=system.controller,
         backend=system.backend,
@@ -130,7 +131,7 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
         plant_report = overseer.plant
         try:
             _get_ready(request, plan, overseer, group)
-            emit("started", **_who(plan), bag=str(request.record))
+            emit("started", **_who(plan), name=plan.robot_name, bag=str(request.record))
             _follow(plan, overseer, group, SystemEvents(emit), show)
         except RunFailed as error:
             time.sleep(LAST_WORDS_S)

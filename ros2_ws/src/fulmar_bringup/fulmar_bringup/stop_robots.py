@@ -12,6 +12,7 @@ from rclpy.task import Future
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from fulmar_core.robot_name import namespace_of
 from fulmar_core.topics import ESTOP, ESTOP_TRIGGER
 from fulmar_ros.qos import publisher_qos
 
@@ -107,4 +108,4 @@ def _spaces(node: Node, robot: str | None) -> set[str]:
     """Namespaces with a plant or an e-stop node, as far as they are seen now."""
     plants = {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
     found = spaces_with(node, ESTOP_TRIGGER) | plants
-    return found if robot is None else found & {f"/{robot}"}
+    return found if robot is None else found & {namespace_of(robot)}

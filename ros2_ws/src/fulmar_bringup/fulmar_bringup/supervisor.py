@@ -20,10 +20,11 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
+from fulmar_bringup.node_table import RunPlan
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.safety.estop import HOLDS, SILENT
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import load_task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
@@ -55,9 +56,10 @@ class Report:
 class Supervisor:
     """Operator of one robot."""
 
-    def __init__(self, node: Node, robot: str, task: Task) -> None:
-        """Listen to plant and controller."""
-        self._node, self._robot, self._task = node, robot, task
+    def __init__(self, node: Node, plan: RunPlan) -> None:
+        """Listen to plant and controller of the plan's robot."""
+        task = load_task(plan.task)
+        self._node, self._plan, self._task = node, plan, task
         self._made_s = time.monotonic()
         self.plant, self.controller, self.recorder = Report(), Report(), Report()
         self._changed = threading.Condition()
@@ -88,7 +90,7 @@ class Supervisor:
 
         Returns as soon as one is seen, and otherwise when this node has had `DISCOVERY_S` to discover others.
         """
-        return sees_living_plant(self._node, f"/{self._robot}", since_s=self._made_s)
+        return sees_living_plant(self._node, self._plan.namespace, since_s=self._made_s)
 
     def refuse_living_plant(self) -> None:
         """Refuse to go on where a plant of this robot is at work already, unless it is dead.
@@ -96,12 +98,12 @@ class Supervisor:
         Raises:
             ConfigError: With its name, process and host.
         """
-        refuse_living_plant(self._node, f"/{self._robot}", since_s=self._made_s, spins=True)
+        refuse_living_plant(self._node, self._plan.namespace, since_s=self._made_s, spins=True)
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
             parts = {"plant": self.plant, "controller": self.controller, "recorder": self.recorder}
-            part = parts.get(status.name.removeprefix(f"{self._robot}: "))
+            part = parts.get(status.name.removeprefix(f"{self._plan.robot_name}: "))
             if part is None:
                 continue
             with self._changed:
@@ -167,7 +169,7 @@ class Supervisor:
         self._sent = []
         for part, stamp in parts:
             self.controller.values.pop("goal_refused", None)  # of what was told before
-            self._sent.append(goal_message(part, self._task.goal_topic, stamp))
+            self._sent.append(goal_message(part, self._task.goal_topic, stamp, self._plan.frames))
             self._goal.publish(self._sent[-1])
             if not self._before_silence(partial(self._has, stamp), stamps_ns, alive):
                 return False
@@ -200,7 +202,7 @@ class Supervisor:
 
     def _publish_obstacles(self, goal: Goal, time_ns: int) -> None:
         if self._obstacles is not None:
-            self._sent_obstacles = [obstacles_message(goal.obstacles, time_ns)]
+            self._sent_obstacles = [obstacles_message(goal.obstacles, time_ns, self._plan.frames)]
             self._obstacles.publish(self._sent_obstacles[0])
 
     def publish_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
@@ -220,7 +222,8 @@ class Supervisor:
         )
         self._publish_obstacles(goal, time_ns)
         self._sent = [
-            goal_message(part, self._task.goal_topic, stamp) for part, stamp in self._timed(goal, time_ns)
+            goal_message(part, self._task.goal_topic, stamp, self._plan.frames)
+            for part, stamp in self._timed(goal, time_ns)
         ]
         for message in self._sent:
             self._goal.publish(message)
@@ -291,13 +294,13 @@ class Supervisor:
 
 
 @contextlib.contextmanager
-def supervisor(robot: str, task: Task) -> Iterator[Supervisor]:
-    """A supervisor that listens in a thread of its own until the context ends."""
+def supervisor(plan: RunPlan) -> Iterator[Supervisor]:
+    """A supervisor of a plan's robot that listens in a thread of its own until the context ends."""
     set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("supervisor", namespace=f"/{robot}")
+    node = rclpy.create_node("supervisor", namespace=plan.namespace)
     try:
-        overseer = Supervisor(node, robot, task)
+        overseer = Supervisor(node, plan)
         with spinning(node, overseer.fail):
             yield overseer
     finally:

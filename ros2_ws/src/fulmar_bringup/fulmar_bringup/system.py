@@ -11,6 +11,7 @@ from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
+from fulmar_core.robot_name import check_robot_name, checked_name
 from fulmar_core.safety.area import NO_AREA, check_area
 from fulmar_core.tasks import load_task
 from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
@@ -74,14 +75,17 @@ class System:
     controller: str
     backend: str
     control_hz: float  # [Hz]
+    name: str = ""  # what the robot is called; empty: as its type
     guards: Guards = NONE
     recorder: Recording = Recording()
     nodes: tuple[OwnNode, ...] = ()  # beside plant, controller, recorder and guards
 
     def __post_init__(self) -> None:
-        """Refuse a rate that nothing could run at."""
+        """Refuse a rate that nothing could run at, and a name that ROS cannot take."""
         if self.control_hz <= 0.0:
             raise ValueError(f"control_hz = {self.control_hz:g} must be greater than 0.")
+        if self.name:
+            check_robot_name(self.name)
 
 
 def load_system(name: str) -> System:
@@ -99,6 +103,7 @@ def varied_system(
     name: str,
     *,
     robot: str | None = None,
+    robot_name: str | None = None,
     task: str | None = None,
     controller: str | None = None,
     backend: str | None = None,
@@ -109,6 +114,7 @@ def varied_system(
     Args:
         name: Name of a file in `configs/systems`.
         robot: Another robot.
+        robot_name: Another name of the robot.
         task: Another task.
         controller: Another controller.
         backend: Another backend.
@@ -118,6 +124,8 @@ def varied_system(
         ConfigError: Unknown name, or a mistake in a file.
     """
     base = load_system(name)
+    if robot_name is not None:
+        base = replace(base, name=checked_name(robot_name))
     chosen = (robot or base.robot, task or base.task, controller or base.controller, backend or base.backend)
     if chosen == (base.robot, base.task, base.controller, base.backend):
         return base

@@ -25,6 +25,7 @@ from fulmar_bringup.node_table import (
 from fulmar_bringup.system import System
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.robot import load_robot
+from fulmar_core.robot_name import namespace_of
 from fulmar_core.topics import CLOCK, WIRES, command_wire
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
@@ -73,7 +74,7 @@ def own_nodes(system: System) -> tuple[NodeSpec, ...]:
             node.module.partition(".")[0],
             node.module.rpartition(".")[2],
             node.module,
-            f"/{system.robot}",
+            namespace_of(system.name or system.robot),
             dict(node.parameters),
             inputs=node.inputs,
             outputs=node.outputs,

@@ -16,6 +16,7 @@ from fulmar_bringup.node_table import NodeSpec
 ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",
     "robot": "a file of configs/robots, without .yaml",
+    "name": "what the robot is called: its namespace; its type by default",
     "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
     "controller": "policy, a classical one such as lqr, mymodule:MyController, or external: a node of yours",
     "backend": "mujoco, mock or hardware",

@@ -35,6 +35,7 @@ from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up, load_other
 from fulmar_ros.message_reader import block_of, goal_of, obstacles_of, stamp_ns
+from fulmar_ros.node_robot import own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -80,7 +81,8 @@ class ControllerNode(LifecycleNode):
             warn=self.get_logger().warning,
         )
         self._names = self.robot.actuators.names
-        self._read_odometry, self._read_applied = OdometryReader(), VectorReader(self._names)
+        self._frames = own_frames(self, self.robot)
+        self._read_odometry, self._read_applied = OdometryReader(self._frames), VectorReader(self._names)
         self._late: Measurement | None = (
             None  # waits in lock step for the block or the goal of the same stamp
         )
@@ -212,7 +214,7 @@ class ControllerNode(LifecycleNode):
         self.wires.publish_metadata(self._guarded.succession.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
-        goal, problem = goal_of(message)
+        goal, problem = goal_of(message, self._frames)
         if goal is not None:
             problem = self._guarded.take_goal(goal, stamp_ns(message.header.stamp), time.monotonic_ns())
         if problem:
@@ -221,7 +223,7 @@ class ControllerNode(LifecycleNode):
         self._go_on()
 
     def _on_obstacles(self, message: MarkerArray) -> None:
-        discs, problem = obstacles_of(message)
+        discs, problem = obstacles_of(message, self._frames)
         if discs is None:
             self.get_logger().warning(f"obstacles refused: {problem}")
             return
@@ -230,7 +232,7 @@ class ControllerNode(LifecycleNode):
         self._tell_status()
 
     def _on_block(self, message: PoseStamped) -> None:
-        place, problem = block_of(message)
+        place, problem = block_of(message, self._frames)
         if place is None:
             self.get_logger().warning(f"place of the block refused: {problem}")
             return

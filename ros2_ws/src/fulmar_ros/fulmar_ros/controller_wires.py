@@ -40,6 +40,7 @@ from fulmar_core.topics import (
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
+from fulmar_ros.node_robot import name_of, own_frames
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -103,8 +104,8 @@ class ControllerWires:
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
         diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self.health = Health(f"{robot.name}: controller", [status, diagnostics])
-        self._actuators = robot.actuators
+        self.health = Health(f"{name_of(node, robot)}: controller", [status, diagnostics])
+        self._actuators, self._frames = robot.actuators, own_frames(node, robot)
         self._streams = [
             self._command,
             self._observation,
@@ -150,7 +151,7 @@ class ControllerWires:
             )
 
     def _command_writer(self) -> TwistWriter | VectorWriter:
-        return TwistWriter() if self._by_velocity else VectorWriter(self._actuators.names)
+        return TwistWriter(self._frames) if self._by_velocity else VectorWriter(self._actuators.names)
 
     def subscribers(self) -> int:
         """Matched subscriptions of the command."""

@@ -16,6 +16,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
 from fulmar_core.robot import Robot
+from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
@@ -32,14 +33,14 @@ def stamp_of(time_ns: int) -> Time:
 
 
 class OdometryWriter:
-    """States as `odom` → `base_link` odometry.
+    """States as odometry, `odom` → `base_link` where no other frames are given.
 
     Attributes:
         image: Layout of its messages in bytes.
     """
 
     def __init__(
-        self, spec: OdometrySpec | None, *, frame: str = "odom", child_frame: str = "base_link"
+        self, spec: OdometrySpec | None, *, frame: str = PLAIN.odom, child_frame: str = PLAIN.base
     ) -> None:
         """Fill in what never changes.
 
@@ -93,10 +94,10 @@ def _pose_and_twist(state: RigidBodyState) -> tuple[Sequence[float], Sequence[fl
 class PoseWriter:
     """States as poses of a motion capture."""
 
-    def __init__(self) -> None:
+    def __init__(self, frames: Frames = PLAIN) -> None:
         """Fill in what never changes."""
         self._message = PoseStamped()
-        self._message.header.frame_id = "odom"
+        self._message.header.frame_id = frames.odom
 
     def write(self, state: RigidBodyState, time_ns: int) -> PoseStamped:
         """Fill the message; it is overwritten by the next call."""
@@ -115,10 +116,10 @@ def _diagonal(stds: Sequence[float]) -> np.ndarray:
 class ImuWriter:
     """Inertial readings per REP-145, without an orientation; a specific force of NaN is one that nobody measures."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, frames: Frames = PLAIN) -> None:
         """Fill in what never changes."""
         self._message = Imu()
-        self._message.header.frame_id = "imu_link"
+        self._message.header.frame_id = frames.imu
         self._message.orientation_covariance[0] = UNKNOWN
         spec = robot.sensors.imu
         self._message.linear_acceleration_covariance = np.eye(3).ravel() * spec.accelerometer.std**2
@@ -175,13 +176,13 @@ class TwistWriter:
         image: Layout of its messages in bytes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, frames: Frames = PLAIN) -> None:
         """Fill in what never changes."""
         self._message = TwistStamped()
-        self._message.header.frame_id = "base_link"
+        self._message.header.frame_id = frames.base
         v, w = self._message.twist.linear, self._message.twist.angular
         v.x, v.y, v.z, w.x, w.y, w.z = numbers = marks(6)
-        self.image = WireImage(self._message, numbers, texts=("base_link",))
+        self.image = WireImage(self._message, numbers, texts=(frames.base,))
         v.x = v.y = v.z = w.x = w.y = w.z = 0.0
 
     def raw(self, values: np.ndarray, time_ns: int) -> bytes:

@@ -26,6 +26,7 @@ from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.health import Health
 from fulmar_ros.message_reader import stamp_ns
+from fulmar_ros.node_robot import name_of, own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -64,7 +65,8 @@ class EstimatorNode(Node):
         self._estimator = Estimator(believed, robot.limits)
         self._bridge_s = believed.bridge_s
         self._lock = threading.Lock()
-        self._writer = OdometryWriter(None)
+        self._frames = frames = own_frames(self, robot)
+        self._writer = OdometryWriter(None, frame=frames.odom, child_frame=frames.base)
         self._published_ns = -1
         self._published, self._refused = 0, 0
         self._problem, self._refusal = self._estimator.problem, ""
@@ -74,7 +76,7 @@ class EstimatorNode(Node):
         self._said_s = 0.0
         self._publisher = self.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
         diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{robot.name}: estimator", [diagnostics])
+        self._health = Health(f"{name_of(self, robot)}: estimator", [diagnostics])
         self.create_subscription(PoseStamped, MOCAP.name, self._on_pose, subscriber_qos(MOCAP, depth=5))
         # The readings drive the velocity: each counts.
         self.create_subscription(Imu, IMU.name, self._on_imu, subscriber_qos(IMU, reliable=True, depth=50))
@@ -82,7 +84,7 @@ class EstimatorNode(Node):
 
     def _on_pose(self, message: PoseStamped) -> None:
         p, q = message.pose.position, message.pose.orientation
-        frame = message.header.frame_id
+        frame = self._frames.plain(message.header.frame_id)
         with self._lock:
             if frame not in FRAMES:
                 self._refuse(f"pose is in '{shortened(frame)}', must be in one of {', '.join(FRAMES)}")

@@ -31,6 +31,7 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.health import Health
+from fulmar_ros.node_robot import name_of
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -72,7 +73,7 @@ class EstopNode(Node):
         self._released = self.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
         subscribe_operator(self, Bool, ESTOP, self._on_estop, with_info=True)
         diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{robot.name}: estop", [diagnostics])
+        self._health = Health(f"{name_of(self, robot)}: estop", [diagnostics])
         wire = command_wire(robot)
         if wire is VELOCITY_COMMAND:
             self.create_subscription(TwistStamped, wire.name, self._on_velocity, subscriber_qos(wire))

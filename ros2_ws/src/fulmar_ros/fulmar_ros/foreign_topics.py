@@ -23,8 +23,8 @@ VALVE_MESSAGES: dict[str, type] = {
 Send = Callable[[np.ndarray], None]
 
 
-def velocity_sender(node: Node, topic: str, *, stamped: bool) -> Send:
-    """Publishes speed and turn rate as Twist, or as TwistStamped in `base_link`, stamped when it is sent."""
+def velocity_sender(node: Node, topic: str, *, stamped: bool, frame: str) -> Send:
+    """Publishes speed and turn rate as Twist, or as TwistStamped in a frame, stamped when it is sent."""
     publisher = node.create_publisher(TwistStamped if stamped else Twist, topic, RELIABLE)
 
     def send(command: np.ndarray) -> None:
@@ -34,7 +34,7 @@ def velocity_sender(node: Node, topic: str, *, stamped: bool) -> Send:
             publisher.publish(twist)
             return
         message = TwistStamped(twist=twist)
-        message.header.frame_id = "base_link"
+        message.header.frame_id = frame
         message.header.stamp = node.get_clock().now().to_msg()
         publisher.publish(message)
 

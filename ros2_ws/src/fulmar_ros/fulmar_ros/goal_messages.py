@@ -10,9 +10,9 @@ from nav_msgs.msg import Path
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_core.goal import Goal
+from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.rotation import from_yaw
 from fulmar_ros.convert import stamp_of
-from fulmar_ros.message_reader import BODY_FRAME, FRAME
 
 GoalMessage: TypeAlias = PointStamped | PoseStamped | Path | PoseArray | TwistStamped
 TYPES: dict[str, type] = {
@@ -24,57 +24,59 @@ TYPES: dict[str, type] = {
 }
 
 
-def goal_message(goal: Goal, topic: str, time_ns: int) -> GoalMessage:
+def goal_message(goal: Goal, topic: str, time_ns: int, frames: Frames = PLAIN) -> GoalMessage:
     """A goal as the message of its topic.
 
     Args:
         goal: Without a batch axis; `goal_path` takes all its targets, any other topic the current one.
         topic: One of `TYPES`.
         time_ns: When it was given; controllers report it back [ns].
+        frames: Of the robot.
 
     Returns:
         The message, in frame `odom`; velocities in `base_link`.
     """
     if topic == "goal_path":
         path = Path()
-        path.header.frame_id, path.header.stamp = FRAME, stamp_of(time_ns)
-        path.poses = [_pose(target, time_ns) for target in np.asarray(goal.targets)]
+        path.header.frame_id, path.header.stamp = frames.odom, stamp_of(time_ns)
+        path.poses = [_pose(target, time_ns, frames) for target in np.asarray(goal.targets)]
         return path
     target = np.asarray(goal.current)
     if topic == "goal_velocity":
         twist = TwistStamped()
-        twist.header.frame_id, twist.header.stamp = BODY_FRAME, stamp_of(time_ns)
+        twist.header.frame_id, twist.header.stamp = frames.base, stamp_of(time_ns)
         twist.twist.linear.x, twist.twist.linear.y = float(target[0]), float(target[1])
         twist.twist.angular.z = float(target[2])
         return twist
     if topic == "goal_point":
         point = PointStamped()
-        point.header.frame_id, point.header.stamp = FRAME, stamp_of(time_ns)
+        point.header.frame_id, point.header.stamp = frames.odom, stamp_of(time_ns)
         point.point.x, point.point.y = float(target[0]), float(target[1])
         return point
-    return _pose(target, time_ns)
+    return _pose(target, time_ns, frames)
 
 
-def _pose(target: np.ndarray, time_ns: int) -> PoseStamped:
+def _pose(target: np.ndarray, time_ns: int, frames: Frames) -> PoseStamped:
     pose = PoseStamped()
-    pose.header.frame_id, pose.header.stamp = FRAME, stamp_of(time_ns)
+    pose.header.frame_id, pose.header.stamp = frames.odom, stamp_of(time_ns)
     pose.pose.position.x, pose.pose.position.y = float(target[0]), float(target[1])
     q = pose.pose.orientation
     q.x, q.y, q.z, q.w = from_yaw(np.asarray(target[2])).tolist()
     return pose
 
 
-def obstacles_message(obstacles: np.ndarray, time_ns: int) -> MarkerArray:
+def obstacles_message(obstacles: np.ndarray, time_ns: int, frames: Frames = PLAIN) -> MarkerArray:
     """Discs as cylinders that viewers draw too.
 
     Args:
         obstacles: Shape (m, 3 or more): x [m], y [m], radius [m]; those of radius 0 are left out.
         time_ns: When they were given; controllers report it back [ns].
+        frames: Of the robot.
     """
     there = [disc[:3] for disc in np.asarray(obstacles) if disc[2] > 0.0]
     # The first marker clears what a viewer drew before, and carries the stamp where there is no obstacle.
     first = Marker(action=Marker.DELETEALL)
-    first.header.frame_id, first.header.stamp = FRAME, stamp_of(time_ns)
+    first.header.frame_id, first.header.stamp = frames.odom, stamp_of(time_ns)
     markers = [first]
     for number, (x, y, radius) in enumerate(there):
         marker = Marker(ns="obstacles", id=number, type=Marker.CYLINDER, action=Marker.ADD)

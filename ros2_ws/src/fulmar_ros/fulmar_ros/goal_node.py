@@ -29,6 +29,7 @@ from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.health import Health
 from fulmar_ros.late_subscribers import LateSubscribers
 from fulmar_ros.message_reader import measurement_of
+from fulmar_ros.node_robot import heard_words, name_of, own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -86,6 +87,7 @@ class GoalNode(Node):
         super().__init__("goals", cli_args=cli_args)
         self._settings = read_parameters(self, GoalSettings)
         robot = load_robot(self._settings.robot)
+        name, self._frames = name_of(self, robot), own_frames(self, robot)
         self._single = goals is not None
         goals = goals or load_goals(self._settings.goals)
         self._title = goals.title
@@ -110,16 +112,16 @@ class GoalNode(Node):
         if not self._settings.lockstep:  # there a goal comes with each odometry
             LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
         diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{robot.name}: goals", [diagnostics])
+        self._health = Health(f"{name}: goals", [diagnostics])
         self.create_subscription(
             Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
         )
         self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
         if not self._single:
-            self.get_logger().info(f"{goals.title}: goals for {robot.name} on {self._publisher.topic_name}")
+            self.get_logger().info(f"{goals.title}: goals for {name} on {self._publisher.topic_name}")
 
     def _on_odometry(self, message: Odometry) -> None:
-        measurement = measurement_of(message)
+        measurement = measurement_of(message, self._frames)
         with self._lock:
             problem = self._gate.problem(measurement)
             if self._over or problem:
@@ -160,7 +162,7 @@ class GoalNode(Node):
         return self._sequence.done or self._time_ns - self._told_at_ns >= self._period_ns
 
     def _tell(self, goal: Goal, stamp_ns: int) -> None:
-        self._message = goal_message(goal, self._sequence.topic, stamp_ns)
+        self._message = goal_message(goal, self._sequence.topic, stamp_ns, self._frames)
         self._publisher.publish(self._message)
         if self._single and self._told is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
@@ -216,7 +218,7 @@ class GoalNode(Node):
             self._over = True
         self.get_logger().error(
             f"{missing} (after {self._settings.give_up_s:g} s). Start the robot and its controller, or wait for them: "
-            "fulmar goals --wait"
+            f"fulmar goals --wait. {heard_words(self)}"
         )
         self._request_exit(FAILED)
 

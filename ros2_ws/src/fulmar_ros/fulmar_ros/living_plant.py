@@ -52,8 +52,8 @@ def refuse_living_plant(
         domain = os.environ.get("ROS_DOMAIN_ID", "") or "0"
         raise ConfigError(
             f"a plant of the name {namespace.rstrip('/')}/{PLANT} lives in ROS domain {domain} already: {where}. "
-            "Two would drive one robot, or be driven by one controller. Stop that one, or set ROS_DOMAIN_ID to "
-            "another number."
+            "Two would drive one robot, or be driven by one controller. Stop that one, give this robot another name, "
+            "or set ROS_DOMAIN_ID to another number."
         )
 
 

@@ -13,12 +13,13 @@ import numpy as np
 
 from fulmar_core.errors import shortened
 from fulmar_core.goal import Goal, goal_at
+from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.rotation import yaw_of
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.state import RigidBodyState
 
 NS = 1_000_000_000
-FRAME, BODY_FRAME = "odom", "base_link"
+FRAME, BODY_FRAME = PLAIN.odom, PLAIN.base
 MOST_WAYPOINTS = 10_000  # more than that is a mistake, and would hold up the control loop
 MOST_OBSTACLES = 30  # ways around more would take longer to find than a control step lasts
 ADD = 0  # action of a marker that is there
@@ -37,8 +38,8 @@ def turned(quat_xyzw: Sequence[float], vector: Sequence[float]) -> tuple[float, 
     return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
 
 
-def measurement_of(message: Any) -> Measurement:
-    """Read an odometry message; nothing is checked here."""
+def measurement_of(message: Any, frames: Frames = PLAIN) -> Measurement:
+    """Read an odometry message; nothing is checked here, but the prefix of its robot's own frames is left out."""
     p, q = message.pose.pose.position, message.pose.pose.orientation
     v, w = message.twist.twist.linear, message.twist.twist.angular
     quat = (q.x, q.y, q.z, q.w)
@@ -48,21 +49,24 @@ def measurement_of(message: Any) -> Measurement:
         np.array(turned(quat, (v.x, v.y, v.z))),
         np.array([w.x, w.y, w.z]),
     )
-    frame, child_frame = shortened(message.header.frame_id), shortened(message.child_frame_id)
+    frame, child_frame = (
+        shortened(frames.plain(name)) for name in (message.header.frame_id, message.child_frame_id)
+    )
     return Measurement(stamp_ns(message.header.stamp), frame, child_frame, state)
 
 
-def goal_of(message: Any) -> tuple[Goal | None, str]:
+def goal_of(message: Any, frames: Frames = PLAIN) -> tuple[Goal | None, str]:
     """Read a goal.
 
     Args:
         message: From any goal topic.
+        frames: Of the robot; a message may leave their prefix out.
 
     Returns:
         The goal without a batch axis and an empty text, or None and what is wrong with the message.
     """
     frame = BODY_FRAME if hasattr(message, "twist") else FRAME
-    if message.header.frame_id != frame:
+    if frames.plain(message.header.frame_id) != frame:
         return None, f"goal frame is '{shortened(message.header.frame_id)}', must be '{frame}'"
     if hasattr(message, "twist"):
         targets = [(message.twist.linear.x, message.twist.linear.y, message.twist.angular.z)]
@@ -94,8 +98,8 @@ def _target(pose: Any) -> tuple[tuple[float, float, float] | None, str]:
     return (p.x, p.y, float(yaw_of(quat / norm))), ""
 
 
-def obstacles_of(message: Any) -> tuple[np.ndarray | None, str]:
-    """Read obstacles.
+def obstacles_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
+    """Read obstacles; arguments as of `goal_of`.
 
     Returns:
         Discs, shape (m, 3), and an empty text, or None and what is wrong with the message.
@@ -107,7 +111,7 @@ def obstacles_of(message: Any) -> tuple[np.ndarray | None, str]:
         return None, f"{count} obstacles, at most {MOST_OBSTACLES}"
     discs = []
     for marker in message.markers:
-        if marker.header.frame_id != FRAME:
+        if frames.plain(marker.header.frame_id) != FRAME:
             return None, f"obstacle frame is '{shortened(marker.header.frame_id)}', must be '{FRAME}'"
         if marker.action == ADD:
             discs.append((marker.pose.position.x, marker.pose.position.y, 0.5 * marker.scale.x))
@@ -117,9 +121,9 @@ def obstacles_of(message: Any) -> tuple[np.ndarray | None, str]:
     return found, ""
 
 
-def block_of(message: Any) -> tuple[np.ndarray | None, str]:
-    """Where a message says that the block is, shape (2,) [m], or None and why it says nothing."""
+def block_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
+    """Where a message says that the block is, shape (2,) [m], or None and why it says nothing; as `goal_of`."""
     place = message.pose.position
-    if message.header.frame_id != "odom" or not np.isfinite((place.x, place.y)).all():
+    if frames.plain(message.header.frame_id) != FRAME or not np.isfinite((place.x, place.y)).all():
         return None, "it must be finite and in 'odom'"
     return np.array([place.x, place.y]), ""

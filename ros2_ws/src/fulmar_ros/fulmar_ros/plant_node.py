@@ -19,11 +19,13 @@ from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DIAGNOSTICS
+from fulmar_core.topics import CLOCK, DIAGNOSTICS
 from fulmar_ros.air_bearing import AirBearingWires
+from fulmar_ros.clock_owner import other_clocks
 from fulmar_ros.first_episode import first_episode
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
 from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
+from fulmar_ros.node_robot import name_of
 from fulmar_ros.paced_capture import MakeCapture, capture_maker
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_health import PlantHealth
@@ -82,7 +84,7 @@ class PlantNode(LifecycleNode):
         self._air: AirBearingWires | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
-        self.health = PlantHealth(self.robot.name)
+        self.health = PlantHealth(name_of(self, self.robot))
         self.health.awaited = self.settings.wait_for_subscribers
         timeout_s = self.settings.timeout_s(self.robot)
         if timeout_s == 0.0:
@@ -104,7 +106,9 @@ class PlantNode(LifecycleNode):
             )
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
-                    raise FulmarError(f"plant of '{self.robot.name}' could not start: {self.health.reason}")
+                    raise FulmarError(
+                        f"plant of '{name_of(self, self.robot)}' could not start: {self.health.reason}"
+                    )
             self._twin_words = self.create_subscription(
                 DiagnosticArray,
                 DIAGNOSTICS.name,
@@ -129,6 +133,7 @@ class PlantNode(LifecycleNode):
             self.robot,
             self.guard,
             simulated=self._simulated,
+            clock=self._simulated and not self._clock_is_taken(),
             odometry=self.settings.publishes_odometry,
             mocap=self._motion_capture(),
             lockstep=self.settings.lockstep,
@@ -210,6 +215,16 @@ class PlantNode(LifecycleNode):
         with self.wires.lock:
             self.guard.reset()  # actuators begin at rest, not where the episode before left them
         self._lockstep.run(sample, steps, self._stop, on_step)
+
+    def _clock_is_taken(self) -> bool:
+        """Whether another node publishes the clock already; logs that ours is left out then."""
+        others = other_clocks(self, since_s=self._made_s, within_s=BRIEFLY_S)
+        if others:
+            self.get_logger().warning(
+                f"{others[0]} publishes {CLOCK.name} already: this plant leaves it out. Its own nodes do not need it; "
+                "nodes with use_sim_time follow the other one."
+            )
+        return bool(others)
 
     def _motion_capture(self) -> MakeCapture | None:
         """Source of poses: in the place of the odometry for an estimator, or beside it at a rate of its own."""

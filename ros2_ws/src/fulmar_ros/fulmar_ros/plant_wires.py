@@ -41,6 +41,7 @@ from fulmar_core.topics import (
 from fulmar_ros.command_writers import writers_of
 from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
 from fulmar_ros.deadline import Spread
+from fulmar_ros.node_robot import own_frames
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.paced_capture import MakeCapture
 from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
@@ -63,6 +64,7 @@ class PlantWires:
         guard: ActuatorGuard,
         *,
         simulated: bool,
+        clock: bool = False,
         odometry: bool = True,
         mocap: MakeCapture | None = None,
         lockstep: bool = False,
@@ -74,7 +76,8 @@ class PlantWires:
             node: Owner of the endpoints.
             robot: The robot.
             guard: Takes the commands; only touched under `self.lock`.
-            simulated: Whether truth and clock are published.
+            simulated: Whether the truth is published.
+            clock: Whether the clock is published.
             odometry: Whether the plant says where it is; if not, somebody else does.
             mocap: Publish the poses of the motion capture that it makes.
             lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
@@ -105,11 +108,14 @@ class PlantWires:
         self._imu = node.create_publisher(Imu, IMU.name, qos(IMU))
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, qos(ACTUATORS_STATE))
         self._truth = node.create_publisher(Odometry, TRUTH.name, qos(TRUTH)) if simulated else None
-        self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if simulated else None
-        self._write_odometry = OdometryWriter(robot.sensors.odometry)
-        self._write_pose = PoseWriter()
-        self._write_truth = OdometryWriter(None, frame="map")
-        self._write_imu = ImuWriter(robot)
+        self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if clock else None
+        self._frames = frames = own_frames(node, robot)
+        self._write_odometry = OdometryWriter(
+            robot.sensors.odometry, frame=frames.odom, child_frame=frames.base
+        )
+        self._write_pose = PoseWriter(frames)
+        self._write_truth = OdometryWriter(None, frame="map", child_frame=frames.base)
+        self._write_imu = ImuWriter(robot, frames)
         self._write_state = VectorWriter(robot.actuators.names)
         self._node = node
         self._block: Publisher | None = None
@@ -119,7 +125,7 @@ class PlantWires:
         commands = subscriber_qos(wire, reliable=lockstep)
         names = robot.actuators.names
         by_velocity = wire is VELOCITY_COMMAND
-        self._reader = TwistReader(names) if by_velocity else VectorReader(names)
+        self._reader = TwistReader(names, frames) if by_velocity else VectorReader(names)
         self._commands = node.create_subscription(
             TwistStamped if by_velocity else JointState, wire.name, self._on_command, commands, raw=True
         )
@@ -197,7 +203,7 @@ class PlantWires:
         if self._block is None:
             self._block = self._node.create_publisher(PoseStamped, BLOCK.name, self._qos(BLOCK))
         message = PoseStamped()
-        message.header.frame_id, message.header.stamp = "odom", stamp_of(time_ns)
+        message.header.frame_id, message.header.stamp = self._frames.odom, stamp_of(time_ns)
         message.pose.position.x, message.pose.position.y = float(place[0]), float(place[1])
         message.pose.orientation.w = 1.0
         self._publish(self._block, message)

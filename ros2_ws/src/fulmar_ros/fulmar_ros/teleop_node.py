@@ -31,12 +31,14 @@ from fulmar_core.robot import load_robot
 from fulmar_core.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping
 from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
 from fulmar_ros.convert import VectorWriter
+from fulmar_ros.node_robot import heard_words
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 RATE_HZ = 20.0
 SAFE_REPEATS = 5
+PATIENCE_S = 3.0  # for a plant that receives the commands, before a person is told
 ANSWER_S = 2.0  # a plant that does not answer a request by then is asked again
 FLUSH = Duration(seconds=0.3)
 HELP = "w/s ahead, back · a/d turn · q/e left, right · hold a key: it is the dead-man switch · g give back · x end"
@@ -103,11 +105,22 @@ class TeleopNode(Node):
         self._service = self.create_client(Trigger, GIVE_BACK)
         self.create_subscription(Joy, JOY.name, self._on_joy, subscriber_qos(JOY))
         self.create_timer(1.0 / RATE_HZ, self._send, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._patience = self.create_timer(
+            PATIENCE_S, self._look_for_plant, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
         self._thread: threading.Thread | None = None
         if settings.keyboard:
             self.get_logger().info(HELP)
             self._thread = threading.Thread(target=self._read_keys, name="keys", daemon=True)
             self._thread.start()
+
+    def _look_for_plant(self) -> None:
+        """Say once that nobody receives the commands, where that is so."""
+        self._patience.cancel()
+        if not self._publisher.get_subscription_count():
+            self.get_logger().warning(
+                f"no plant subscribes {self._publisher.topic_name}. {heard_words(self)}"
+            )
 
     def _on_joy(self, message: Joy) -> None:
         with self._lock:
@@ -154,7 +167,7 @@ class TeleopNode(Node):
             self._service.remove_pending_request(self._request)
             self._request = None
         if not self._service.service_is_ready():
-            self._say("nobody takes the robot back: is its plant running?")
+            self._say(f"nobody takes the robot back: is its plant running? {heard_words(self)}")
             return
         self._asked_at = time.monotonic()
         self._request = self._service.call_async(Trigger.Request())

@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.convert import OdometryWriter, TwistWriter, VectorWriter
@@ -19,18 +20,19 @@ from fulmar_ros.message_reader import BODY_FRAME, FRAME, measurement_of, stamp_n
 
 
 class OdometryReader:
-    """Reads odometry from `odom` to `base_link`."""
+    """Reads odometry from `odom` to `base_link`, with the prefix of its robot's frames or without."""
 
-    def __init__(self) -> None:
-        """Learn the layout."""
-        self._image = OdometryWriter(None).image
+    def __init__(self, frames: Frames = PLAIN) -> None:
+        """Learn the layout of a robot's own odometry."""
+        self._frames = frames
+        self._image = OdometryWriter(None, frame=frames.odom, child_frame=frames.base).image
 
     def read(self, data: bytes) -> Measurement | None:
         """Read a message, without a check of its content; None for bytes that are no odometry."""
         found = self._image.read(data)
         if found is None:
             message = deserialized(data, Odometry)
-            return None if message is None else measurement_of(message)
+            return None if message is None else measurement_of(message, self._frames)
         stamp, (pose, twist) = found
         quat = pose[3:]
         state = RigidBodyState(
@@ -70,9 +72,9 @@ class VectorReader:
 class TwistReader:
     """Reads speed and turn rate of a TwistStamped."""
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], frames: Frames = PLAIN) -> None:
         """Learn the layout; `names` are those of the actuators."""
-        self._names, self._image = names, TwistWriter().image
+        self._names, self._image = names, TwistWriter(frames).image
 
     def read(self, data: bytes) -> NamedVector | None:
         """Read a message, in whatever frame; None for bytes that are none."""

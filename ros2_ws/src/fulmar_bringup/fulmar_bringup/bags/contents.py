@@ -17,6 +17,7 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from fulmar_bringup.bags.folder import files_of, missing_files, storage_of, told_beside
 from fulmar_bringup.bags.layout import unreadable
 from fulmar_core.errors import BagError, UnknownNameError
+from fulmar_core.robot_name import PLAIN, Frames, namespace_of
 from fulmar_core.topics import ODOMETRY, TRUTH, WIRES, Wire
 from fulmar_ros.bag_records import PACKED, ZSTD_MAGIC, file_bytes, read_records, unpack
 from fulmar_ros.bag_ring import FAULTS
@@ -85,6 +86,27 @@ class Bag:
         """Name of the robot, empty where the bag does not say."""
         return str((self.info or {}).get("robot") or "")
 
+    @property
+    def name(self) -> str:
+        """What the robot is called, which bags of earlier versions do not say: its type; empty as `robot`."""
+        return str((self.info or {}).get("name") or self.robot)
+
+    @property
+    def prefix(self) -> str:
+        """How the names of the robot's own topics begin; empty where the bag does not say."""
+        return f"{namespace_of(self.name)}/" if self.name else ""
+
+    @property
+    def frames(self) -> Frames:
+        """Frames that messages may be in, with their prefix or without; by the only odometry where nobody says."""
+        spaces = {space for topic in self.topics.values() if (space := _space_of(topic))}
+        name = self.name or (spaces.pop() if len(spaces) == 1 else "")
+        return Frames(f"{name}/") if name else PLAIN
+
+    def relative(self, topic: str) -> str:
+        """Name of a topic without what all topics of the robot begin with."""
+        return topic.removeprefix(self.prefix)
+
     def of(self, wire: Wire) -> Topic:
         """The messages of a wire, none where the bag has none of them.
 
@@ -98,8 +120,8 @@ class Bag:
         """Absolute name of a wire's topic; the wire's own name where it cannot be told."""
         if wire.name.startswith("/"):
             return wire.name
-        if self.robot:
-            return f"/{self.robot}/{wire.name}"
+        if self.prefix:
+            return f"{self.prefix}{wire.name}"
         names = {
             topic.name
             for topic in self.topics.values()
@@ -127,8 +149,8 @@ class Bag:
             if chosen not in known:
                 raise UnknownNameError(f"odometry topic in {self.path}:", chosen, known)
             return known[chosen]
-        own = {name: topic for name, topic in known.items() if name.startswith(f"/{self.robot}/")}
-        for some in (own, known) if self.robot else (known,):
+        own = {name: topic for name, topic in known.items() if name.startswith(self.prefix)}
+        for some in (own, known):
             measured = {name: topic for name, topic in some.items() if is_of_wire(name, ODOMETRY)}
             truths = {name: topic for name, topic in some.items() if is_of_wire(name, TRUTH)}
             only = measured or truths or some
@@ -140,6 +162,11 @@ class Bag:
         raise BagError(
             f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC."
         )
+
+
+def _space_of(topic: Topic) -> str:
+    """Name of the robot that a topic of odometry is of; empty for any other topic."""
+    return topic.name.removesuffix(ODOMETRY.name).strip("/") if is_of_wire(topic.name, ODOMETRY) else ""
 
 
 def is_of_wire(topic: str, wire: Wire) -> bool:

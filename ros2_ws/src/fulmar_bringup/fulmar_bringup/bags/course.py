@@ -26,6 +26,7 @@ from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.robot_name import Frames
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.topics import (
     ACTION,
@@ -146,7 +147,7 @@ def course_of(
     observations = joint_vectors(bag.of(OBSERVATION), "position")
     if observations.left_out:
         warnings.append(f"{observations.left_out} messages of {OBSERVATION.name} cannot be read.")
-    seen = _odometry_of(bag, odometry, needed=not len(observations))
+    seen = _in_plain_frames(_odometry_of(bag, odometry, needed=not len(observations)), bag.frames)
     # Who stamps commands by another clock, or not at all, answers by the time of recording.
     unmatched = bool(len(commands)) and not np.isin(commands.stamp_ns, seen.stamp_ns).any()
     by_time = unmatched and bool(len(seen)) and not len(observations)
@@ -211,6 +212,16 @@ def _odometry_of(bag: Bag, chosen: str | None, *, needed: bool) -> Odometries:
         if needed:
             raise
         return odometries(Topic("", "nav_msgs/msg/Odometry"))
+
+
+def _in_plain_frames(seen: Odometries, frames: Frames) -> Odometries:
+    """Odometry without the prefix of its robot's frames."""
+    names = {name: frames.plain(name) for name in {*seen.frame, *seen.child_frame}}
+    return replace(
+        seen,
+        frame=tuple(names[name] for name in seen.frame),
+        child_frame=tuple(names[name] for name in seen.child_frame),
+    )
 
 
 def _checked(
@@ -311,10 +322,10 @@ def _first_of(stamps: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 def _goals(
     bag: Bag, task: Task, asked: PoseTuple | None, begin_ns: int, warnings: list[str]
 ) -> tuple[Told, ...]:
-    found = []
+    found, frames = [], bag.frames
     for wire in goal_wires(task.goal_topic):
         for index, (log, message) in enumerate(messages(bag.of(wire))):
-            goal, problem = goal_of(message)
+            goal, problem = goal_of(message, frames)
             if goal is None:
                 warnings.append(f"a message of {wire.name} was left out: {problem}.")
                 continue
@@ -330,9 +341,9 @@ def _goal(pose: PoseTuple) -> Goal:
 
 
 def _obstacles(bag: Bag, warnings: list[str]) -> tuple[Told, ...]:
-    found = []
+    found, frames = [], bag.frames
     for index, (log, message) in enumerate(messages(bag.of(OBSTACLES))):
-        discs, problem = obstacles_of(message)
+        discs, problem = obstacles_of(message, frames)
         if discs is None:
             warnings.append(f"a message of {OBSTACLES.name} was left out: {problem}.")
             continue

@@ -12,12 +12,14 @@ from fulmar_bringup.bags.contents import Bag, Topic
 from fulmar_bringup.bags.figures import provenance
 from fulmar_bringup.bags.flat import Row, columns, rows
 from fulmar_core.errors import UnknownNameError
+from fulmar_core.robot_name import Frames
 from fulmar_core.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS
 
 # They tell of the machine and of this very run, not of what the robot did.
 OF_THE_MACHINE = (CLOCK, DIAGNOSTICS, STATUS, METADATA)
 ORIGIN = (
     "robot",
+    "name",
     "task",
     "controller",
     "policy",
@@ -35,7 +37,7 @@ def differing(
     """Compare two bags.
 
     Messages of one topic belong together by their stamp, or by their number where they have none; topics by their name
-    without the robot's.
+    without the robot's. Nor does its name count in the names of frames.
 
     Args:
         first: One bag.
@@ -53,14 +55,15 @@ def differing(
     one, other = _by_name(first), _by_name(second)
     known = sorted({*one, *other})
     wanted = (
-        [_relative(name, first, second) for name in only]
+        [second.relative(first.relative(name)) for name in only]
         if only
         else [n for n in known if n not in _machine()]
     )
     for name in wanted:
         if name not in known:
             raise UnknownNameError("topic", name, known)
-    topics = [_of_topic(name, one.get(name), other.get(name), tolerance) for name in wanted]
+    frames = first.frames, second.frames
+    topics = [_of_topic(name, one.get(name), other.get(name), tolerance, frames) for name in wanted]
     compared = sum(min(topic["counts"]) for topic in topics)
     before, after = provenance(first), provenance(second)
     return {
@@ -77,18 +80,24 @@ def _machine() -> set[str]:
 
 
 def _by_name(bag: Bag) -> dict[str, Topic]:
-    return {_relative(name, bag): topic for name, topic in bag.topics.items() if len(topic)}
+    return {bag.relative(name): topic for name, topic in bag.topics.items() if len(topic)}
 
 
-def _relative(name: str, *bags: Bag) -> str:
-    for bag in bags:
-        prefix = f"/{bag.robot}/"
-        if bag.robot and name.startswith(prefix):
-            return name[len(prefix) :]
-    return name
+def _rows(topic: Topic, frames: Frames) -> tuple[list[int], list[Row]]:
+    """Stamps and fields of messages, with frames without the prefix of their robot."""
+    _, stamps, found = rows(topic)
+    for row in found:
+        row.update({path: frames.plain(text) for path, text in row.items() if _is_frame(path, text)})
+    return stamps, found
 
 
-def _of_topic(name: str, first: Topic | None, second: Topic | None, tolerance: float) -> dict[str, Any]:
+def _is_frame(path: str, value: Any) -> bool:
+    return path.endswith("frame_id") and isinstance(value, str)
+
+
+def _of_topic(
+    name: str, first: Topic | None, second: Topic | None, tolerance: float, frames: tuple[Frames, Frames]
+) -> dict[str, Any]:
     result: dict[str, Any] = {
         "topic": name,
         "counts": [len(first) if first else 0, len(second) if second else 0],
@@ -101,8 +110,8 @@ def _of_topic(name: str, first: Topic | None, second: Topic | None, tolerance: f
     if first is None or second is None or first.type != second.type:
         types = [topic.type if topic else None for topic in (first, second)]
         return {**result, "types": types, "same": False}
-    _, stamps_1, rows_1 = rows(first)
-    _, stamps_2, rows_2 = rows(second)
+    stamps_1, rows_1 = _rows(first, frames[0])
+    stamps_2, rows_2 = _rows(second, frames[1])
     if len(rows_1) < len(first) or len(rows_2) < len(second):
         return {**result, **_bytes_of(first, second)}
     pairs, alone_1, alone_2 = _pairs(stamps_1, stamps_2)

@@ -51,6 +51,7 @@ def provenance(bag: Bag) -> dict[str, Any]:
     return {
         "recorded_by_fulmar": bag.info is not None,
         **{key: info.get(key) for key in keys},
+        "name": bag.name or None,
         "fulmar_version": info.get("fulmar_version"),
         "git_revision": info.get("git_revision"),
         "policy": info.get("policy") or None,

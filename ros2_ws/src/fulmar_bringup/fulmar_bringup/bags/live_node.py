@@ -114,6 +114,7 @@ def rerun_through_node(
         task=course.task.name,
         controller=controller,
         backend="mock",
+        name=bag.name,
         control_hz=course.settings.control_rate(course.robot),
         policy=os.path.abspath(policy) if policy else "",
         lockstep=True,
@@ -126,7 +127,7 @@ def rerun_through_node(
         group = ProcessGroup(environment)
         try:
             group.start(system_rows(plan)["controller"])
-            return _exchange(_raw_messages(bag, course, odometry), course, group)
+            return _exchange(_raw_messages(bag, course, odometry), course, plan.namespace, group)
         finally:
             group.stop_all()
 
@@ -157,11 +158,13 @@ class _Heard:
         return lambda: self.status.get(name) == str(stamp_ns)
 
 
-def _exchange(raw: dict[str, list[bytes]], course: Course, group: ProcessGroup) -> tuple[Answers, str | None]:
+def _exchange(
+    raw: dict[str, list[bytes]], course: Course, namespace: str, group: ProcessGroup
+) -> tuple[Answers, str | None]:
     set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = rclpy.create_node("plant", namespace=f"/{course.robot.name}")
+        node = rclpy.create_node("plant", namespace=namespace)
         heard = _Heard()
         wires = _Wires(node, course, heard)
 

@@ -80,7 +80,7 @@ def schedule(bag: Bag, *, topics: Sequence[str] | None = None, start_s: float = 
         (max(time_ns, begin), name, index)
         for time_ns, _, name, index in every
         # What holds until something else comes is told also where it came before the start.
-        if time_ns >= begin or _relative(bag, name) in latched
+        if time_ns >= begin or bag.relative(name) in latched
     ]
     by_name = {topic.name: topic for topic in chosen}
     return Schedule(
@@ -98,16 +98,11 @@ def _chosen(bag: Bag, topics: Sequence[str] | None) -> list[Topic]:
         return [topic for name, topic in full.items() if name != CLOCK.name]
     found = []
     for name in topics:
-        absolute = name if name in full else f"/{bag.robot}/{name}"
+        absolute = name if name in full else f"{bag.prefix}{name}"
         if absolute not in full:
-            raise UnknownNameError("topic", name, [_relative(bag, each) for each in full])
+            raise UnknownNameError("topic", name, [bag.relative(each) for each in full])
         found.append(full[absolute])
     return found
-
-
-def _relative(bag: Bag, name: str) -> str:
-    prefix = f"/{bag.robot}/"
-    return name[len(prefix) :] if bag.robot and name.startswith(prefix) else name
 
 
 def _timeline(bag: Bag) -> Any:
@@ -206,7 +201,7 @@ def _publishers(node: Node, plan: Schedule, bag: Bag) -> tuple[dict[str, Any], t
         except (ImportError, AttributeError, ValueError):
             left_out.append(f"{name} ({topic.type})")
             continue
-        wire = wires.get(_relative(bag, name))
+        wire = wires.get(bag.relative(name))
         qos = publisher_qos(wire) if wire is not None and wire.type == topic.type else QoSProfile(depth=DEPTH)
         publishers[name] = node.create_publisher(message, name, qos)
     if not publishers:

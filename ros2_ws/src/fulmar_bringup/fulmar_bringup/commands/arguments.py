@@ -12,6 +12,12 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.safety.area import check_area
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")]
+NameOption = Annotated[
+    str | None,
+    typer.Option(
+        "--name", metavar="NAME", help="What the robot is called: its namespace; its type by default."
+    ),
+]
 TASK_HELP = "A name from `fulmar list tasks`, or your own class: mypackage.mymodule:MyTask."
 TaskArgument = Annotated[str, typer.Argument(metavar="TASK", help=TASK_HELP)]
 TaskOption = Annotated[str, typer.Option("--task", metavar="T", help=TASK_HELP)]

@@ -13,7 +13,18 @@ from fulmar_core.exit_codes import DONE, FAILED
 
 HEAD = ("topic", "type", "count", "rate [Hz]", "gaps", "longest [s]", "late", "dropped")
 NAMES = 2  # columns of words
-ORIGIN = ("robot", "task", "controller", "policy", "backend", "scenario", "seed", "control_hz", "command")
+ORIGIN = (
+    "robot",
+    "name",
+    "task",
+    "controller",
+    "policy",
+    "backend",
+    "scenario",
+    "seed",
+    "control_hz",
+    "command",
+)
 
 
 def info(bag: BagArgument, as_json: JsonOption = False) -> None:

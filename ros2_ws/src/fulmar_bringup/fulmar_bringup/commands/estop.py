@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 def estop(
     robot: Annotated[
-        str | None, typer.Argument(metavar="[ROBOT]", help="Only this robot; every one by default.")
+        str | None,
+        typer.Argument(metavar="[ROBOT]", help="Name of the only robot to stop; every one by default."),
     ] = None,
     reset: Annotated[
         bool, typer.Option("--reset", help="Release it; refused while commands are not zero.")
@@ -43,6 +44,7 @@ def estop(
             came = person.reset_all(robot)
         else:
             came = {one.space: one.answer or _unanswered(one) for one in person.stop_all(robot)}
+        heard = f" {person.heard_words()}" if robot and not came else ""
     answers = [
         {"robot": space.strip("/"), "done": done, "said": words} for space, (done, words) in came.items()
     ]
@@ -50,7 +52,7 @@ def estop(
         whom = f"'{robot}'" if robot else "any robot"
         raise RunFailed(
             f"no plant and no e-stop node of {whom} is found in this ROS domain. Check ROS_DOMAIN_ID and "
-            "ROS_AUTOMATIC_DISCOVERY_RANGE" + (", or cut the power." if not reset else ".")
+            "ROS_AUTOMATIC_DISCOVERY_RANGE" + (", or cut the power." if not reset else ".") + heard
         )
     if as_json:
         print_json({"robots": answers})

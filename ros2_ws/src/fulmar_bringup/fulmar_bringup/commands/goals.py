@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.commands.arguments import read_goal
+from fulmar_bringup.commands.arguments import NameOption, read_goal
 from fulmar_bringup.commands.list import list_names
 from fulmar_core.errors import ConfigError
+from fulmar_core.robot_name import checked_name
 
 GIVE_UP_S = 5.0  # without odometry or without a subscriber of the goals
 
@@ -22,8 +23,12 @@ def goals(
         ),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option(metavar="R", help="Who is to do it: a name from `fulmar list robots`.")
+        str | None,
+        typer.Option(
+            metavar="R", help="Type of the robot that is to do it: a name from `fulmar list robots`."
+        ),
     ] = None,
+    robot_name: NameOption = None,
     pose: Annotated[
         str | None,
         typer.Option(
@@ -88,7 +93,12 @@ def goals(
     goal_sequence(file, the_robot, as_path=as_path)  # whatever is wrong is said in one line
     check_pace(file, name or "", the_robot)
     spec = goals_spec(
-        robot, name or "", as_path=as_path, control_hz=control_hz, give_up_s=0.0 if wait else GIVE_UP_S
+        robot,
+        name or "",
+        name="" if robot_name is None else checked_name(robot_name),
+        as_path=as_path,
+        control_hz=control_hz,
+        give_up_s=0.0 if wait else GIVE_UP_S,
     )
     from fulmar_ros.goal_node import GoalNode
     from fulmar_ros.runtime import run_node

@@ -16,6 +16,7 @@ from fulmar_bringup.commands.arguments import (
     CalibrationOption,
     ControllerOption,
     JsonOption,
+    NameOption,
     PolicyOption,
     RobotArgument,
     ScenarioOption,
@@ -31,6 +32,7 @@ from fulmar_core.exit_codes import DONE
 
 def run(
     robot: RobotArgument,
+    name: NameOption = None,
     task: Annotated[
         str | None,
         typer.Option(
@@ -208,6 +210,8 @@ def run(
     fulmar run floating_platform --controller lqr --duration 3600 --recording ring
 
     fulmar run turtlebot2 --task go_to_position --controller external
+
+    fulmar run floating_platform --name alpha --controller lqr
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
@@ -232,6 +236,7 @@ def run(
         console.print(note, markup=False)
     request = plan_run(
         robot=robot,
+        name=name,
         task=task,
         controller=controller,
         backend=backend,
@@ -244,7 +249,7 @@ def run(
         control_hz=control_hz,
         scenario=scenario,
         seed=seed,
-        record=record or default_record(robot, controller),
+        record=record or default_record(name or robot, controller),
         command="fulmar " + " ".join(sys.argv[1:]),
         goals=goals,
         hardware=hardware,
@@ -297,9 +302,9 @@ def asked_limits(area: Area | None, max_run_time: float | None) -> dict[str, Any
     return {key: value for key, value in asked.items() if value is not None}
 
 
-def default_record(robot: str, controller: str) -> Path:
-    """A folder below `runs/` that says when and what."""
-    return Path("runs") / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{controller.rpartition(':')[2]}"
+def default_record(name: str, controller: str) -> Path:
+    """A folder below `runs/` that says when and what, by the name of the robot."""
+    return Path("runs") / f"{time.strftime('%Y%m%d_%H%M%S')}_{name}_{controller.rpartition(':')[2]}"
 
 
 TOLD = {

@@ -7,15 +7,19 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.commands.arguments import JsonOption, RobotArgument
+from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.paths import config_names
+from fulmar_core.robot_name import checked_name
 
 FIND_S, LOAD_S = 5.0, 20.0
 
 
 def swap(
-    robot: RobotArgument,
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="Name of the running robot: its type, or its --name.")
+    ],
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A policy bundle, on the robot's own disk.")],
     as_json: JsonOption = False,
 ) -> None:
@@ -31,6 +35,8 @@ def swap(
     """
     from fulmar_bringup.robot_operator import operator
 
+    if robot not in config_names("robots"):
+        checked_name(robot)
     with operator() as person:
         sent = str(folder.absolute())
         said = person.say_swap(robot, sent, find_s=FIND_S, answer_s=LOAD_S)

@@ -6,14 +6,16 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.commands.arguments import RobotArgument
+from fulmar_bringup.commands.arguments import NameOption, RobotArgument
 from fulmar_bringup.console import output
 from fulmar_core.errors import RunFailed
 from fulmar_core.exit_codes import FAILED
+from fulmar_core.robot_name import checked_name, namespace_of
 
 
 def teleop(
     robot: RobotArgument,
+    name: NameOption = None,
     keyboard: Annotated[
         bool,
         typer.Option("--keyboard/--no-keyboard", help="Read keys from this terminal, beside the topic joy."),
@@ -43,13 +45,15 @@ def teleop(
     from fulmar_core.topics import GIVE_BACK
 
     load_robot(robot)  # a wrong name is told in one line
+    name = robot if name is None else checked_name(name)
+    space = namespace_of(name)
     if give_back:
         from fulmar_bringup.robot_operator import FIND_S, operator
 
         with operator() as person:
-            if not person.robots_with(GIVE_BACK, robot, wait_s=FIND_S):
-                raise RunFailed(f"no plant of '{robot}' is heard in this ROS domain.")
-            done, words = person.ask(f"/{robot}/{GIVE_BACK}")
+            if not person.robots_with(GIVE_BACK, name, wait_s=FIND_S):
+                raise RunFailed(f"no plant of '{name}' is heard in this ROS domain. {person.heard_words()}")
+            done, words = person.ask(f"{space}/{GIVE_BACK}")
         output.print(words, markup=False)
         raise typer.Exit(0 if done else FAILED)
     parameters: dict[str, Parameter] = {
@@ -57,7 +61,7 @@ def teleop(
         "keyboard": keyboard,
         "share": share,
     }
-    spec = NodeSpec("teleop", "fulmar_ros", "teleop_node", "fulmar_ros.teleop_node", f"/{robot}", parameters)
+    spec = NodeSpec("teleop", "fulmar_ros", "teleop_node", "fulmar_ros.teleop_node", space, parameters)
     from fulmar_ros.runtime import run_node
     from fulmar_ros.teleop_node import TeleopNode
 

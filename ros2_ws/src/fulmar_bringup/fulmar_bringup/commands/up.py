@@ -13,6 +13,7 @@ import typer
 
 from fulmar_bringup.commands.arguments import (
     ArmOption,
+    NameOption,
     PolicyOption,
     ScenarioOption,
     SeedOption,
@@ -28,6 +29,7 @@ def up(
         str, typer.Argument(metavar="SYSTEM", help="A name from `fulmar list systems`.")
     ] = "mujoco_policy",
     robot: Annotated[str | None, typer.Option(metavar="R", help="Another robot than the system's.")] = None,
+    name: NameOption = None,
     task: Annotated[str | None, typer.Option(metavar="T", help="Another task, or your own class.")] = None,
     controller: Annotated[
         str | None, typer.Option(metavar="C", help="Another controller, or your own class; or external.")
@@ -98,13 +100,19 @@ def up(
     from fulmar_bringup.system import gains_note, modules_of, varied_system
 
     chosen = varied_system(
-        system, robot=robot, task=task, controller=controller, backend=backend, hardware=hardware
+        system,
+        robot=robot,
+        robot_name=name,
+        task=task,
+        controller=controller,
+        backend=backend,
+        hardware=hardware,
     )
     if estop:
         chosen = replace(chosen, guards=replace(chosen.guards, estop=True))
     request = plan_system(
         chosen,
-        record=record or default_record(chosen.robot, chosen.controller),
+        record=record or default_record(chosen.name or chosen.robot, chosen.controller),
         command="fulmar " + " ".join(sys.argv[1:]),
         policy=policy,
         hardware=hardware,

@@ -66,7 +66,8 @@ def commission(request: Request, say: Say) -> dict[str, Any]:
     path = str(hardware_path(request.hardware).absolute())
     hardware = load_hardware(path)
     began_s = time.monotonic()
-    with claimed_domain(), tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as name:
+    scratch = tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
+    with scratch as name, claimed_domain(hardware.robot):
         folder = Path(name)
         emulation = _emulation(hardware, folder, request) if request.emulate else None
         outcome = _session(request, path, hardware, emulation, say)
@@ -105,7 +106,7 @@ def _session(
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     errors: list[Exception] = []
     try:
-        node = rclpy.create_node("commission", namespace=f"/{robot.name}")
+        node = rclpy.create_node("commission", namespace=plan.namespace)
         with spinning(node, errors.append):
             session = Session(
                 node,

@@ -31,6 +31,7 @@ from fulmar_core.topics import (
 )
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.message_reader import stamp_ns
+from fulmar_ros.node_robot import name_of, own_frames
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 MOST_TRAVEL_M = 0.5
@@ -58,7 +59,7 @@ class Session:
             bearing: Whether the robot floats on an air bearing of its driver.
             ended: Says which process has ended, or nothing.
         """
-        self._robot, self._ended = robot, ended
+        self._robot, self._name, self._ended = robot, name_of(node, robot), ended
         self._lock = threading.Lock()
         self._poses: list[tuple[float, ...]] = []  # time, x, y, heading and, of odometry, their rates
         self._delay_s = math.inf  # least of all that came: from a stamp to its reception [s]
@@ -70,8 +71,10 @@ class Session:
         self._start: tuple[float, ...] | None = None
         self.needs_poses = True
         wire = command_wire(robot)
-        self._write = TwistWriter() if wire is VELOCITY_COMMAND else VectorWriter(robot.actuators.names)
-        kind = TwistStamped if wire is VELOCITY_COMMAND else JointState
+        by_velocity = wire is VELOCITY_COMMAND
+        frames = own_frames(node, robot)
+        self._write = TwistWriter(frames) if by_velocity else VectorWriter(robot.actuators.names)
+        kind = TwistStamped if by_velocity else JointState
         self._command = node.create_publisher(kind, wire.name, publisher_qos(wire))
         poses = MOCAP if from_outside else ODOMETRY
         node.create_subscription(
@@ -234,7 +237,7 @@ class Session:
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name == f"{self._robot.name}: plant":
+            if status.name == f"{self._name}: plant":
                 mode = next((pair.value for pair in status.values if pair.key == "mode"), "")
                 self._plant = (str(status.level), mode, status.message)
 

@@ -55,7 +55,7 @@ def commands_from_another_node(live: LiveSystem) -> Outcome:
     """A second node publishes good commands while the controller goes on: the plant obeys neither, and names both."""
     wire, robot = command_wire(live.robot), live.robot
     message = _message(live, list(robot.actuators.names), [1.0] * len(robot.actuators.names))
-    node = rclpy.create_node("stranger", namespace=f"/{live.plan.robot}")
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
     over = threading.Event()
     try:
         since_s = live.until_it_moves()
@@ -74,7 +74,7 @@ def commands_from_another_node(live: LiveSystem) -> Outcome:
             thread.join()
     finally:
         node.destroy_node()
-    names = f"/{live.plan.robot}/controller, /{live.plan.robot}/stranger"
+    names = ", ".join(f"{live.plan.namespace}/{node}" for node in ("controller", "stranger"))
     return replace(outcome, passed=outcome.passed and names in outcome.reaction)
 
 

@@ -19,7 +19,7 @@ MATCH_S = 10.0
 
 def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
     """One message; the e-stop node, which goes on publishing, must not end it."""
-    node = rclpy.create_node("stranger", namespace=f"/{live.plan.robot}")
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
     try:
         publisher = node.create_publisher(Bool, ESTOP.name, DEFAULT_QOS)
         # A volatile publisher matches one of the two subscriptions of each node.

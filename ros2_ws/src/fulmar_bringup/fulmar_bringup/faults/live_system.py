@@ -27,7 +27,6 @@ from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import Robot, Rolling, load_robot
 from fulmar_core.safety.watchdog import default_timeout
-from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     DEVICE_STATE,
@@ -155,8 +154,8 @@ def live_system(
     errors: list[Exception] = []
     with contextlib.ExitStack() as stack:
         wires = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="fulmar_")))
-        overseer = stack.enter_context(supervisor(plan.robot, load_task(plan.task)))
-        bystander = rclpy.create_node("bystander", namespace=f"/{plan.robot}")
+        overseer = stack.enter_context(supervisor(plan))
+        bystander = rclpy.create_node("bystander", namespace=plan.namespace)
         stack.enter_context(spinning(bystander, errors.append))
         live = LiveSystem(request, group, overseer, bystander, about, hosts)
         try:
@@ -204,6 +203,6 @@ def _teleop_spec(plan: RunPlan) -> NodeSpec:
         "fulmar_ros",
         "teleop_node",
         "fulmar_ros.teleop_node",
-        f"/{plan.robot}",
+        plan.namespace,
         {"robot": plan.robot, "keyboard": False},
     )

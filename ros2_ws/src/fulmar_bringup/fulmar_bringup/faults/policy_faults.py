@@ -116,7 +116,7 @@ def _resealed(live: LiveSystem, **changes: object) -> Path:
 
 
 def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
-    node = rclpy.create_node("stranger", namespace=f"/{live.plan.robot}")
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
     try:
         publisher = node.create_publisher(String, SWAP.name, publisher_qos(SWAP))
         wait_for(lambda: publisher.get_subscription_count() > 0, ANSWER_S)

@@ -137,6 +137,8 @@ def _figure(picture: Picture) -> str:
 def _origin(run: View) -> str:
     info = run.record.info
     lines = [f"<code>{escape(str(info['command']))}</code>"] if info.get("command") else []
+    if info.get("name") not in (None, "", info.get("robot")):
+        lines.append(escape(f"{info['name']}, a {info.get('robot')}"))
     lines.append(
         f"bag <code>{escape(str(run.record.path))}</code>, seed {escape(str(info.get('seed', '–')))}"
     )

@@ -21,7 +21,6 @@ from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import RunFailed
 from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
 from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from policy_server.shipped import policies_directory
 
@@ -124,7 +123,7 @@ def watched_system(request: RunRequest, environment: Mapping[str, str]) -> Itera
             record = {"directory": str(request.record), "info": run_info(plan)}
             for row in system_rows(plan, record=record).values():
                 group.start(row)
-            with supervisor(plan.robot, load_task(plan.task)) as overseer:
+            with supervisor(plan) as overseer:
                 _begin(request, plan, overseer, group)
                 yield WatchedSystem(group, overseer)
                 group.stop("controller")
