@@ -24,12 +24,14 @@ from fulmar_core.topics import (
     ESTOP,
     GOAL_WIRES,
     IMU,
+    JOY,
     METADATA,
     MOCAP,
     OBSERVATION,
     OBSTACLES,
     ODOMETRY,
     STATUS,
+    TELEOP,
     TRUTH,
     WIRES,
     Wire,
@@ -362,6 +364,28 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
     )
     more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}
     return replace(spec, parameters=spec.parameters | more, remappings=dict(plan.remappings))
+
+
+def teleop_spec(robot: str, *, name: str = "", keyboard: bool = True, share: float = 0.5) -> NodeSpec:
+    """The node that a person drives with; it starts beside a system that runs, and no system has it by itself.
+
+    Args:
+        robot: Type of the robot.
+        name: What the robot is called; its type by default.
+        keyboard: Whether keys drive, or only joysticks.
+        share: Of full command.
+    """
+    parameters: dict[str, Parameter] = {"robot": robot, "keyboard": keyboard, "share": share}
+    return NodeSpec(
+        "teleop",
+        "fulmar_ros",
+        "teleop_node",
+        "fulmar_ros.teleop_node",
+        namespace_of(name or robot),
+        parameters,
+        outputs=(TELEOP.name,),
+        observed=(JOY.name,),
+    )
 
 
 def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:

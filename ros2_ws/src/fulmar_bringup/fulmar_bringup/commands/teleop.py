@@ -39,7 +39,7 @@ def teleop(
 
     fulmar teleop kingfisher --no-keyboard --share 1
     """
-    from fulmar_bringup.node_table import NodeSpec, Parameter
+    from fulmar_bringup.node_table import teleop_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.robot import load_robot
     from fulmar_core.topics import GIVE_BACK
@@ -56,12 +56,7 @@ def teleop(
             done, words = person.ask(f"{space}/{GIVE_BACK}")
         output.print(words, markup=False)
         raise typer.Exit(0 if done else FAILED)
-    parameters: dict[str, Parameter] = {
-        "robot": robot,
-        "keyboard": keyboard,
-        "share": share,
-    }
-    spec = NodeSpec("teleop", "fulmar_ros", "teleop_node", "fulmar_ros.teleop_node", space, parameters)
+    spec = teleop_spec(robot, name=name, keyboard=keyboard, share=share)
     from fulmar_ros.runtime import run_node
     from fulmar_ros.teleop_node import TeleopNode
 

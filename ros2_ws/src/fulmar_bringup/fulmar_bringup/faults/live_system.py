@@ -17,7 +17,7 @@ from fulmar_bringup.faults.spoiler import Spoiler, source_of
 from fulmar_bringup.faults.surroundings import USUAL, Surroundings
 from fulmar_bringup.faults.two_hosts import TwoHosts
 from fulmar_bringup.faults.witness import Witness, wait_for
-from fulmar_bringup.node_table import NodeSpec, RunPlan
+from fulmar_bringup.node_table import NodeSpec, RunPlan, teleop_spec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
@@ -172,7 +172,10 @@ def live_system(
 def _specs(request: RunRequest, about: Surroundings, robot: Robot, wires: Path) -> list[NodeSpec]:
     plan = request.plan
     rows = system_rows(plan, record={"directory": str(request.record)}, wires_folder=wires)
-    specs = [*rows.values(), *([_teleop_spec(plan)] if about.by_hand else [])]
+    specs = [
+        *rows.values(),
+        *([teleop_spec(plan.robot, name=plan.name, keyboard=False)] if about.by_hand else []),
+    ]
     commands = command_wire(robot)
     spoilt = [about.spoilt or commands, *([commands] if about.answers_pass else [])]
     sources = {_publisher_of(wire, plan): {wire.name: source_of(wire)} for wire in spoilt}
@@ -195,14 +198,3 @@ def _publisher_of(wire: Wire, plan: RunPlan) -> str:
     if wire == ODOMETRY:  # it may have come from another process
         return "estimator" if plan.guards.estimator else "plant"
     return "plant" if wire == MOCAP else "controller"
-
-
-def _teleop_spec(plan: RunPlan) -> NodeSpec:
-    return NodeSpec(
-        "teleop",
-        "fulmar_ros",
-        "teleop_node",
-        "fulmar_ros.teleop_node",
-        plan.namespace,
-        {"robot": plan.robot, "keyboard": False},
-    )
