@@ -13,7 +13,7 @@ def test_two_runs_in_one_domain_are_refused_until_the_first_is_over(monkeypatch)
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
         with claimed_domain("alpha") as claimed:
             assert claimed == domain
-            with pytest.raises(ConfigError, match=f"using ROS domain {domain}, .* set ROS_DOMAIN_ID"):
+            with pytest.raises(ConfigError, match=f"using ROS domain {domain} for .* set ROS_DOMAIN_ID"):
                 claimed_domain("alpha").__enter__()
         with claimed_domain("alpha"):
             pass
@@ -24,7 +24,7 @@ def test_runs_of_two_names_share_a_domain_and_one_name_is_refused_in_one_line(mo
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
         with claimed_domain("alpha"), claimed_domain("beta") as shared:
             assert shared == domain
-            with pytest.raises(ConfigError, match=r"another `fulmar run` of 'beta' .* another --name"):
+            with pytest.raises(ConfigError, match=r"another `fulmar run` is using .* for 'beta', .* another --name"):
                 claimed_domain("beta").__enter__()
 
 

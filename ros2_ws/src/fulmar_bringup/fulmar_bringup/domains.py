@@ -73,7 +73,7 @@ def claimed_domain(name: str) -> Iterator[int]:
         fcntl.flock(shared, fcntl.LOCK_SH)  # waits for no more than a look of `reserved_domains`
         if not _locked(lock):
             raise ConfigError(
-                f"another `fulmar run` of '{name}' is using ROS domain {domain}, and two of one name would mix. "
+                f"another `fulmar run` is using ROS domain {domain} for '{name}', and two of one name would mix. "
                 "Wait for it to end, give this robot another --name, or set ROS_DOMAIN_ID to another number."
             )
         give_back_abandoned_memory()
