@@ -250,7 +250,7 @@ def _episodes(
         ) -> None:
             assert sample.truth is not None
             truths.append(planar_of(sample.truth))
-            goals.append(judge.see(truths[-1], sample.block))
+            goals.append(judge.see(truths[-1], sample.things))
             commands.append(np.array(command))
 
         with _goal_told(plan, episode, plant, overseer, group, alive):

@@ -46,7 +46,7 @@ class FollowPath(TrackVelocities):
         places = self.path.points[index.astype(int)]
         state = at_rest(places[:, 0], places[:, 1], yaw)
         targets = np.zeros((len(yaw), 1, 3))
-        goal = Goal(targets, index, no_obstacles(draws.worlds), np.zeros((len(yaw), 2)))
+        goal = Goal(targets, index, no_obstacles(draws.worlds))
         return state, self.advance(goal, state, np.zeros_like(yaw))
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
@@ -62,8 +62,8 @@ class FollowPath(TrackVelocities):
         speed = path.speed / np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
         u, v = to_body(np.asarray(state.yaw), way[..., 0] * speed, way[..., 1] * speed)
         target = np.stack((u, v, np.zeros_like(u)), axis=-1)[..., None, :]
-        targets = np.asarray(target, dtype=goal.targets.dtype)
-        return Goal(targets, passed.astype(goal.targets.dtype), goal.obstacles, goal.block)
+        dtype = goal.targets.dtype
+        return dataclasses.replace(goal, targets=np.asarray(target, dtype=dtype), done=passed.astype(dtype))
 
     def off_path(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Distance to the nearest point of the whole path, shapes (n,) [m]."""

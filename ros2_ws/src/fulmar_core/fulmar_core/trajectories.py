@@ -11,6 +11,7 @@ from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.planar import PlanarState, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.things import Poses
 
 
 @dataclass(frozen=True)
@@ -136,17 +137,16 @@ class Judge:
         self._task, self._dt, self._steps = task.judged, control_dt, 0
         self.goal = goal
 
-    def see(self, truth: PlanarState, block: np.ndarray | None = None) -> Goal:
+    def see(self, truth: PlanarState, things: Poses | None = None) -> Goal:
         """The goal after one more control step, by the true state at its end.
 
         Args:
             truth: True state.
-            block: Where the thing to push is by now, shape (..., 2), for tasks that have one [m].
+            things: Where the task's things are by now, of the same leading shape.
         """
         self._steps += 1
-        if block is not None and self._task.pushes:
-            self.goal = dataclasses.replace(self.goal, block=block)
-        self.goal = self._task.counted(self.goal, truth, np.asarray(self._steps * self._dt))
+        time_s = np.asarray(self._steps * self._dt)
+        self.goal = self._task.counted(self.goal.among(things or {}), truth, time_s)
         return self.goal
 
 

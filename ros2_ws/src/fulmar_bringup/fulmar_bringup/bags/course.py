@@ -31,14 +31,14 @@ from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
     AIR_BEARING,
-    BLOCK,
     OBSERVATION,
     OBSTACLES,
     VELOCITY_COMMAND,
+    Wire,
     command_wire,
     goal_wires,
 )
-from fulmar_ros.message_reader import goal_of, obstacles_of
+from fulmar_ros.message_reader import goal_of, obstacles_of, thing_of
 
 NS = 1_000_000_000
 
@@ -62,7 +62,7 @@ class Course:
     sample: np.ndarray  # (n,) index into the odometry, ABSENT where it is not in the bag
     goals: tuple[Told, ...]
     obstacles: tuple[Told, ...]
-    blocks: tuple[Told, ...]
+    things: dict[str, tuple[Told, ...]]  # poses of the things of the task, by name
     presses: tuple[Told, ...]  # of the e-stop, see `presses_of`
     bearing: tuple[Told, ...]  # the air bearing: true is on; empty where nothing is recorded of one
     applied: Vectors  # what the actuators did from each stamp on; empty where that is not recorded
@@ -181,10 +181,7 @@ def course_of(
         sample=_first_of(seen.stamp_ns, stamp_ns),
         goals=_goals(bag, the_task, goal, int(log_ns[0]), warnings),
         obstacles=_obstacles(bag, warnings),
-        blocks=tuple(
-            Told(log, stamp_of(m), np.array([m.pose.position.x, m.pose.position.y]), index)
-            for index, (log, m) in enumerate(messages(bag.of(BLOCK)))
-        ),
+        things={thing.name: _poses(bag, thing.wire, warnings) for thing in the_task.things},
         presses=presses_of(bag),
         bearing=tuple(
             Told(log, 0, bool(m.data), index) for index, (log, m) in enumerate(messages(bag.of(AIR_BEARING)))
@@ -338,6 +335,17 @@ def _obstacles(bag: Bag, warnings: list[str]) -> tuple[Told, ...]:
             continue
         stamp = stamp_of(message.markers[0]) if message.markers else 0
         found.append(Told(log, stamp, discs, index))
+    return tuple(found)
+
+
+def _poses(bag: Bag, wire: Wire, warnings: list[str]) -> tuple[Told, ...]:
+    found = []
+    for index, (log, message) in enumerate(messages(bag.of(wire))):
+        pose, problem = thing_of(message)
+        if pose is None:
+            warnings.append(f"a message of {wire.name} was left out: {problem}.")
+            continue
+        found.append(Told(log, stamp_of(message), pose, index))
     return tuple(found)
 
 

@@ -20,7 +20,6 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import (
     ACTION,
-    BLOCK,
     COMMAND,
     GOAL_WIRES,
     METADATA,
@@ -42,7 +41,6 @@ KEPT = (
     ACTION,
     METADATA,
     OBSTACLES,
-    BLOCK,
     *GOAL_WIRES.values(),
 )
 STEPPED = (ODOMETRY, COMMAND, VELOCITY_COMMAND)
