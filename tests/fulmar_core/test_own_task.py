@@ -84,7 +84,7 @@ def test_a_class_with_the_needed_members_is_a_task_whether_or_not_it_inherits(ow
     task = load_task(own(base=base))
     task.check(ROBOT)
     assert (task.name, task.kind, task.title) == ("own_0:Mine", "own_0:Mine", "Mine")
-    assert (task.required, task.sees_obstacles, task.pushes) == (None, False, None)
+    assert (task.required, task.sees_obstacles, task.things) == (None, False, ())
     run = roll_out_in_batch(Still(), ROBOT, task, NOMINAL, episodes=3, seed=1)
     start = draw_episodes(ROBOT, task, NOMINAL, seed=1, numbers=np.arange(3))
     away = np.hypot(start.start.x - start.goal.current[:, 0], start.start.y - start.goal.current[:, 1])

@@ -9,7 +9,6 @@ import pytest
 
 from fulmar_core.counter_rng import START
 from fulmar_core.disturbances.scenario import Actuation, Kick, Push, Scenario, Sensing, Wave, load_scenario
-from fulmar_core.goal import Goal
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.planar import COLUMNS, at_rest
@@ -49,7 +48,7 @@ def everything(simulation, index=...):
     return {
         **{f"true {name}": getattr(simulation.truth, name)[index].copy() for name in COLUMNS},
         **{f"measured {name}": getattr(simulation.measured, name)[index].copy() for name in COLUMNS},
-        **{name: getattr(simulation.goal, name)[index].copy() for name in Goal.__slots__},
+        **{name: getattr(simulation.goal, name)[index].copy() for name in ("targets", "done", "obstacles")},
         "command": simulation.command[index].copy(),
         "observation": simulation.observe()[index].copy(),
     }
