@@ -161,7 +161,7 @@ class _Reader:
     def _goals(self, task: object) -> list[GivenGoal]:
         """What the controller was told; it hears the topic of its task alone."""
         goals = []
-        known = _task_of(task, self._bag.path)
+        known = self._task_of(task)
         for wire in (wire for topic in GOAL_WIRES for wire in goal_wires(topic)):
             if known is not None and wire not in goal_wires(known.goal_topic):
                 self._warn_of_others(wire, task)
@@ -181,20 +181,25 @@ class _Reader:
                 f"{count} messages of {self._bag.topic_name(wire)} are left out: no goals of the task '{task}'."
             )
 
+    def _task_of(self, name: object) -> Task | None:
+        """The task of the run; None where it is not known here."""
+        try:
+            return load_recorded_task(str(name), self._bag.path)
+        except ConfigError:
+            return None
+
     def _things(self, task: object) -> dict[str, Places]:
         """Where the things of the task were; of a task that is not known here, none."""
-        known = _task_of(task, self._bag.path)
+        known = self._task_of(task)
         found = {thing.name: self._places(thing.wire) for thing in (known.things if known else ())}
         return {name: places for name, places in found.items() if len(places)}
 
     def _places(self, wire: Wire) -> Places:
-        read = [(stamp_of(message) / NS, thing_of(message)[0]) for _, message in self._messages(wire)]
-        usable = [(stamp_s, pose) for stamp_s, pose in read if pose is not None]
-        self._lost(wire, len(read) - len(usable), "tell no pose")
-        return Places(
-            np.array([stamp_s for stamp_s, _ in usable]),
-            np.array([pose for _, pose in usable]).reshape(-1, 3),
-        )
+        every = [(stamp_of(message) / NS, thing_of(message)[0]) for _, message in self._messages(wire)]
+        read = [(stamp_s, *pose) for stamp_s, pose in every if pose is not None]
+        self._lost(wire, len(every) - len(read), "tell no pose")
+        table = np.array(read).reshape(-1, 4)
+        return Places(table[:, 0], table[:, 1:])
 
     def _obstacles(self) -> np.ndarray:
         """Obstacles of the last message, shape (m, 3)."""
@@ -206,14 +211,6 @@ class _Reader:
         if discs is None:
             self._warnings.append(f"the obstacles cannot be used: {problem}.")
         return nothing if discs is None else discs
-
-
-def _task_of(name: object, bag: Path) -> Task | None:
-    """The task of a run; None where it is not known here."""
-    try:
-        return load_recorded_task(str(name), bag)
-    except ConfigError:
-        return None
 
 
 def _motion(found: Odometries) -> Motion:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -180,8 +182,8 @@ def course_of(
         odometry=seen,
         sample=_first_of(seen.stamp_ns, stamp_ns),
         goals=_goals(bag, the_task, goal, int(log_ns[0]), warnings),
-        obstacles=_obstacles(bag, warnings),
-        things={thing.name: _poses(bag, thing.wire, warnings) for thing in the_task.things},
+        obstacles=_told(bag, OBSTACLES, obstacles_of, warnings),
+        things={thing.name: _told(bag, thing.wire, thing_of, warnings) for thing in the_task.things},
         presses=presses_of(bag),
         bearing=tuple(
             Told(log, 0, bool(m.data), index) for index, (log, m) in enumerate(messages(bag.of(AIR_BEARING)))
@@ -308,14 +310,7 @@ def _first_of(stamps: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 def _goals(
     bag: Bag, task: Task, asked: PoseTuple | None, begin_ns: int, warnings: list[str]
 ) -> tuple[Told, ...]:
-    found = []
-    for wire in goal_wires(task.goal_topic):
-        for index, (log, message) in enumerate(messages(bag.of(wire))):
-            goal, problem = goal_of(message)
-            if goal is None:
-                warnings.append(f"a message of {wire.name} was left out: {problem}.")
-                continue
-            found.append(Told(log, stamp_of(message), goal, index))
+    found = [told for wire in goal_wires(task.goal_topic) for told in _told(bag, wire, goal_of, warnings)]
     found.sort(key=lambda each: each.log_ns)
     if asked is not None:
         found = [Told(begin_ns, 0, _goal(asked))]
@@ -326,26 +321,18 @@ def _goal(pose: PoseTuple) -> Goal:
     return goal_at((pose[0], pose[1], float(np.deg2rad(pose[2]))))
 
 
-def _obstacles(bag: Bag, warnings: list[str]) -> tuple[Told, ...]:
-    found = []
-    for index, (log, message) in enumerate(messages(bag.of(OBSTACLES))):
-        discs, problem = obstacles_of(message)
-        if discs is None:
-            warnings.append(f"a message of {OBSTACLES.name} was left out: {problem}.")
-            continue
-        stamp = stamp_of(message.markers[0]) if message.markers else 0
-        found.append(Told(log, stamp, discs, index))
-    return tuple(found)
-
-
-def _poses(bag: Bag, wire: Wire, warnings: list[str]) -> tuple[Told, ...]:
+def _told(
+    bag: Bag, wire: Wire, read: Callable[[Any], tuple[Any, str]], warnings: list[str]
+) -> tuple[Told, ...]:
+    """What the messages of a wire say, without those that `read` finds a problem with."""
     found = []
     for index, (log, message) in enumerate(messages(bag.of(wire))):
-        pose, problem = thing_of(message)
-        if pose is None:
+        what, problem = read(message)
+        if problem:
             warnings.append(f"a message of {wire.name} was left out: {problem}.")
             continue
-        found.append(Told(log, stamp_of(message), pose, index))
+        stamped = message.markers[:1] if wire is OBSTACLES else [message]
+        found.append(Told(log, stamp_of(stamped[0]) if stamped else 0, what, index))
     return tuple(found)
 
 

@@ -104,6 +104,10 @@ class PassingTask(Task):
         reach = self.tolerance.position - _SURE * robot.sensors.odometry.position.std
         return replace(self, reach=max(self.reach, reach))
 
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """See `Task.farthest_start`."""
+        return "start_distance", self.start_distance[1]
+
     @abstractmethod
     def places(self, draws: Draws) -> np.ndarray:
         """Draw where the targets are, shape (worlds, k, 2) [m]."""

@@ -87,6 +87,11 @@ class PushBlock(Task):
         """The block."""
         return (Thing(BLOCK, self.block),)
 
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """As of `Task`: the block's and the robot's distances add up."""
+        name = "training_block_distance" if training else "block_distance"
+        return f"{name}' + 'start_distance", getattr(self, name)[1] + self.start_distance[1]
+
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw where robot and block start, and where the block belongs; see `Task.draw`."""
         half, n = 0.5 * self.goal_area, draws.worlds

@@ -10,7 +10,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.terms import Errors, Tolerance, pose_errors
+from fulmar_core.tasks.terms import Errors, Start, Tolerance, pose_errors
 from fulmar_core.things import Thing
 
 
@@ -60,6 +60,11 @@ class Task(ABC):
     def subject(self) -> str:
         """Name of what has to get to the goal: a thing that is pushed, or the robot."""
         return next((thing.name for thing in self.things if thing.body is not None), "robot")
+
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """Key in its file and largest distance of a start from the first target; 0 where nothing limits it [m]."""
+        start = getattr(self, "start", None)
+        return start.farthest(training=training) if isinstance(start, Start) else ("", 0.0)
 
     @property
     def step_s(self) -> float | None:
