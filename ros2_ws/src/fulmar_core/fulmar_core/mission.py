@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,13 +17,6 @@ GOALS_REMEMBERED = 200  # stamps of goals; publishers repeat at most the last 10
 THING_LASTS_NS = 1_000_000_000  # where a thing was longer ago, it need not be any more
 
 GoalKey = tuple[int, int]  # stamp [ns] and hash of the targets
-
-
-class _Seen(NamedTuple):
-    """What is known of one thing."""
-
-    pose: np.ndarray | None = None
-    stamp_ns: int = 0
 
 
 class Mission:
@@ -49,7 +41,7 @@ class Mission:
         timed = self._task.goal_topic == "goal_velocity"
         self._schedule: Schedule[Goal] | None = Schedule() if timed else None
         self._obstacles: np.ndarray | None = None if self._task.sees_obstacles else np.zeros((0, 3))
-        self._things = {thing.name: _Seen() for thing in self._task.things}
+        self._things: dict[str, tuple[np.ndarray, int]] = {}  # where each was, and when, of those seen [ns]
         self._given: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # since the last drop
         self._void: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # refused, or dropped
         self.goal_stamp_ns = 0
@@ -60,8 +52,9 @@ class Mission:
     def lacking(self) -> str:
         """What the task needs and has not come; empty if everything is known."""
         parts = {"goal": self._given_goal, "obstacles": self._obstacles}
-        parts |= {f"place of the {name}": thing.pose for name, thing in self._things.items()}
-        return next((name for name, part in parts.items() if part is None), "")
+        unseen = [thing.name for thing in self._task.things if thing.name not in self._things]
+        lacking = [name for name, part in parts.items() if part is None]
+        return next(iter((*lacking, *(f"place of the {name}" for name in unseen))), "")
 
     @property
     def done(self) -> int:
@@ -122,9 +115,9 @@ class Mission:
             due = self._schedule.at(stamp_ns)
             if due is not self._given_goal:
                 self._take(due, anew=self._given_goal is None or due is None)
-        for name, thing in self._things.items():
-            if thing.pose is not None and stamp_ns - thing.stamp_ns > THING_LASTS_NS:
-                self._things[name] = _Seen()
+        for name, (_, seen_ns) in list(self._things.items()):
+            if stamp_ns - seen_ns > THING_LASTS_NS:
+                del self._things[name]
                 self._loop.begin(None)
 
     def see_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
@@ -134,13 +127,13 @@ class Mission:
 
     def see_thing(self, name: str, pose: np.ndarray, stamp_ns: int) -> None:
         """Take the pose of a thing, shape (3,) [m, m, rad]."""
-        self._things[name] = _Seen(pose, stamp_ns)
+        self._things[name] = pose, stamp_ns
         self._refresh()
 
     def lacks_something_of(self, stamp_ns: int) -> bool:
         """Whether a thing, or a streamed goal, of this stamp is still to come."""
-        unseen = any(thing.stamp_ns != stamp_ns for thing in self._things.values())
-        return unseen or (self._streamed and self.goal_stamp_ns != stamp_ns)
+        seen = sum(seen_ns == stamp_ns for _, seen_ns in self._things.values())
+        return seen < len(self._task.things) or (self._streamed and self.goal_stamp_ns != stamp_ns)
 
     def distance(self, state: PlanarState) -> float:
         """Distance from the current target [m]; 0 where the task has none, infinite before one is known.
@@ -175,12 +168,11 @@ class Mission:
     def _refresh(self) -> None:
         """Give the loop its goal among what stands about now, as far along as it has come."""
         goal, obstacles = self._given_goal, self._obstacles
-        seen = {name: thing.pose for name, thing in self._things.items() if thing.pose is not None}
-        if goal is None or obstacles is None or len(seen) < len(self._things):
+        if goal is None or obstacles is None or len(self._things) < len(self._task.things):
             return
         before = goal if self._loop.goal is None else self._loop.goal[0]
-        done, things = np.asarray(before.done), {**before.things, **seen}
-        batched = stack_goals([replace(goal, done=done, obstacles=obstacles, things=things)])
+        here = {**before.things, **{name: pose for name, (pose, _) in self._things.items()}}
+        batched = stack_goals([replace(goal, done=np.asarray(before.done), obstacles=obstacles, things=here)])
         self._loop.goal = self._task.surveyed(batched, self._loop.robot)
 
 

@@ -30,12 +30,7 @@ from fulmar_core.topics import GOAL_WIRES
 
 METHODS = ("draw", "observe", "reward", "errors")
 ATTRIBUTES = ("episode_s", "tolerance", "goal_topic", "observation_names")
-SHIPPED_ONLY = (
-    "step_s",
-    "judged",
-    "fitted",
-    "surveyed",
-)  # members that own tasks cannot have
+SHIPPED_ONLY = ("step_s", "judged", "fitted", "surveyed")  # members that own tasks cannot have
 ROLE = "task"  # in messages
 TRIED = 3  # episodes that `check` draws
 
@@ -271,9 +266,9 @@ class OwnTask(Task):
             raise self._wrong(
                 member, f"returned a Goal whose things are {_kind(found.things)}, not a mapping"
             )
-        lacking = [thing.name for thing in self.things if thing.name not in found.things]
-        if lacking:
-            raise self._wrong(member, f"returned a Goal without the pose of {lacking[0]} in its things")
+        for thing in self.things:
+            if thing.name not in found.things:
+                raise self._wrong(member, f"returned a Goal without the pose of {thing.name} in its things")
         for name, value, tail in (
             ("targets", found.targets, (None, 3)),
             ("done", found.done, ()),

@@ -10,7 +10,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.terms import Errors, Start, Tolerance, pose_errors
+from fulmar_core.tasks.terms import Errors, Tolerance, pose_errors
 from fulmar_core.things import Thing
 
 
@@ -63,8 +63,8 @@ class Task(ABC):
 
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
         """Key in its file and largest distance of a start from the first target; 0 where nothing limits it [m]."""
-        start = getattr(self, "start", None)
-        return start.farthest(training=training) if isinstance(start, Start) else ("", 0.0)
+        start, name = getattr(self, "start", None), "training_distance" if training else "distance"
+        return ("", 0.0) if start is None else (f"start.{name}", getattr(start, name)[1])
 
     @property
     def step_s(self) -> float | None:

@@ -40,14 +40,6 @@ class Start:
         if self.goal_area < 0.0:
             raise ValueError("'goal_area' must not be negative.")
 
-    def farthest(self, *, training: bool) -> tuple[str, float]:
-        """As of `Task.farthest_start`."""
-        return (
-            ("start.training_distance", self.training_distance[1])
-            if training
-            else ("start.distance", self.distance[1])
-        )
-
     def draw(self, draws: Draws, *, training: bool) -> tuple[PlanarState, Array]:
         """Draw starts at rest, and goal poses.
 
