@@ -237,6 +237,8 @@ class BatchSimulation(Moves):
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Go on from a snapshot of a simulation that was built alike."""
+        if snapshot["goal"].things.keys() != self.goal.things.keys():
+            raise ValueError("the snapshot has other things.")
         self.take(copy.deepcopy(snapshot))
         self._upcoming.forget()
 
