@@ -11,7 +11,10 @@ from fulmar_core.control_loop import ControlLoop
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
 from fulmar_core.errors import BundleError, ConfigError, TaskError
+from fulmar_core.goal import goal_at
 from fulmar_core.learning_step import observed_step
+from fulmar_core.mission import Mission
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
@@ -21,6 +24,7 @@ from sim_nodes.mock_backend import MockBackend
 from tests.own_files import own_folder
 
 ROBOT = load_robot("turtlebot2")
+S = 1_000_000_000
 NOMINAL, IDEAL = load_scenario("nominal"), load_scenario("ideal")
 HEAD = """
 import numpy as np
@@ -260,6 +264,35 @@ def test_things_of_its_own_are_observed_and_those_with_a_body_are_pushed_by_ever
     assert np.all(np.linalg.norm(simulation.things["box"] - before["box"], axis=1) > 0.1)
     np.testing.assert_allclose(sample.things["box"], simulation.things["box"][0], atol=1e-6)
     np.testing.assert_allclose(simulation.observe()[:, 1], before["gate"][:, 2], rtol=1e-6)
+
+
+KEEPS = """
+    def begun(self, goal, state):
+        return goal.among({"start": np.stack((state.x, state.y, state.yaw), axis=-1)})
+"""
+
+
+def test_a_goal_counts_when_every_thing_is_seen_and_what_the_task_keeps_goes_on_until_one_is_lost(own):
+    task = load_task(own(GATE + KEEPS, head=OF_THINGS))
+    loop = ControlLoop(ROBOT, task, Still())
+    mission, here = Mission(loop), at_rest(*np.ones((3, 1)))
+    mission.give(goal_at((2.0, 0.0, 0.0)), 1)
+    assert mission.lacking == "place of the gate"
+    mission.see_thing("gate", np.array([1.0, 2.0, 0.5]), 2 * S)
+    assert mission.lacking == "place of the box"
+    assert loop.goal is None
+    assert mission.lacks_something_of(2 * S)
+    mission.see_thing("box", np.zeros(3), 2 * S)
+    assert not mission.lacks_something_of(2 * S)
+    loop.inputs(here, 2 * S)
+    mission.see_thing("gate", np.array([1.5, 2.0, 0.5]), 3 * S)
+    kept = {name: pose.tolist() for name, pose in loop.goal.things.items()}
+    assert kept == {"start": [[1.0] * 3], "gate": [[1.5, 2.0, 0.5]], "box": [[0.0] * 3]}
+    mission.turn_to(3 * S + 1)
+    assert mission.lacking == "place of the box"
+    mission.see_thing("box", np.zeros(3), 4 * S)
+    loop.inputs(here[np.array([0])], 4 * S)  # it begins anew: what the task keeps is there
+    assert set(loop.goal.things) == {"start", "gate", "box"}
 
 
 @pytest.mark.parametrize(

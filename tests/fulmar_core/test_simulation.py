@@ -54,6 +54,15 @@ def everything(simulation, index=...):
     }
 
 
+def test_a_snapshot_with_other_things_is_refused():
+    snapshots = [
+        BatchSimulation(load_robot("turtlebot2"), load_task(name), load_scenario("ideal"), worlds=2, seed=1)
+        for name in ("push_block", "go_to_position")
+    ]
+    with pytest.raises(ValueError, match="the snapshot has other things"):
+        snapshots[0].restore(snapshots[1].snapshot())
+
+
 def assert_equal(one, other):
     for name, values in one.items():
         np.testing.assert_array_equal(values, other[name], err_msg=name)
