@@ -33,17 +33,8 @@ from fulmar_core.topics import (
 STEPS = 100  # control steps of each
 SEED = 11
 LARGEST = 200_000  # bytes of the MCAP file
-KEPT = (
-    ODOMETRY,
-    COMMAND,
-    VELOCITY_COMMAND,
-    OBSERVATION,
-    ACTION,
-    METADATA,
-    OBSTACLES,
-    *GOAL_WIRES.values(),
-)
 STEPPED = (ODOMETRY, COMMAND, VELOCITY_COMMAND)
+KEPT = (*STEPPED, OBSERVATION, ACTION, METADATA, OBSTACLES, *GOAL_WIRES.values())
 # What a machine and a moment leave in a record, and what therefore stays out of one that is kept.
 OF_THE_MACHINE = ("policy", "command", "git_revision", "fulmar_version", "goals", "path")
 # Another processor adds float32 sums of a network in another order, and rounds a sine otherwise in the last bit.
