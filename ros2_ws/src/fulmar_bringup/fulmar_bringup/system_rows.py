@@ -120,8 +120,10 @@ def _from_outside(plan: RunPlan) -> set[str]:
     found = set()
     if controller_entry(plan.controller).is_external:
         found.add(command_wire(load_robot(plan.robot)).name)
-    if plan.hardware:  # motion capture, or another node that knows where robot and things are
-        found |= {"odom", "mocap/pose", *(thing.wire.name for thing in load_task(plan.task).things)}
+    if plan.hardware:  # motion capture, or another node that knows where the robot is
+        found |= {"odom", "mocap/pose"}
+    if plan.hardware and not plan.emulated:  # an emulator sees no things
+        found |= {thing.wire.name for thing in load_task(plan.task).things}
     return found
 
 
