@@ -5,25 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.backend import Sample
-from fulmar_core.dynamics.pushing import Block, push
 from fulmar_core.episode import Episode
 from fulmar_core.motion import move
 from fulmar_core.planar import PlanarState, rigid_of
 from fulmar_core.robot import Robot
+from fulmar_core.things import Poses, Thing, push_things
 from sim_nodes.one_world import OneWorld
 
 
 class MockBackend:
     """One robot in the core's dynamics, measured without noise, without an inertial unit."""
 
-    def __init__(self, robot: Robot, *, block: Block | None = None) -> None:
+    def __init__(self, robot: Robot, *, things: tuple[Thing, ...] = ()) -> None:
         """Prepare for `reset`.
 
         Args:
             robot: The robot.
-            block: What there is to push.
+            things: What stands or moves about.
         """
-        self.robot, self._block = robot, block
+        self.robot, self._things = robot, things
         self._world = OneWorld(robot, noisy=False)
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
@@ -32,7 +32,9 @@ class MockBackend:
         self._state = PlanarState(
             *(np.array([getattr(start, name)], dtype=float) for name in PlanarState.__slots__)
         )
-        self._place = np.array(episode.goal.block, dtype=float)
+        self._poses: Poses = {
+            thing.name: np.array([episode.goal.things[thing.name]], dtype=float) for thing in self._things
+        }
         self._world.reset(episode, rigid_of(self._state[0]), seed=seed, number=number)
         return self._sample()
 
@@ -50,10 +52,7 @@ class MockBackend:
             latest_s=world.latest_s,
             off_centre=bool(world.world.com_x[0] or world.world.com_y[0]),
         )
-        if self._block is not None:
-            x, y = self._place[:1], self._place[1:]
-            x, y, self._state = push(before, self._state, x, y, self._block, self.robot)
-            self._place = np.concatenate((x, y))
+        self._poses, self._state = push_things(self._things, self._poses, before, self._state, self.robot)
         return self._sample()
 
     def stand(self, ticks: int = 1) -> Sample:
@@ -71,4 +70,4 @@ class MockBackend:
 
     def _sample(self) -> Sample:
         truth = rigid_of(self._state[0])
-        return Sample(truth, None, truth, None if self._block is None else self._place)
+        return Sample(truth, None, truth, {name: pose[0] for name, pose in self._poses.items()})

@@ -7,13 +7,13 @@ import numpy as np
 
 from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.dynamics.pushing import Block
 from fulmar_core.episode import Episode
 from fulmar_core.errors import SafetyError
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample, InertialUnit
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
+from fulmar_core.things import Thing
 from sim_nodes.mujoco_model import Scene
 from sim_nodes.mujoco_model.obstacles import radii_for
 from sim_nodes.one_world import OneWorld
@@ -24,24 +24,24 @@ SENSORS = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), 
 class MujocoBackend:
     """One robot in MuJoCo."""
 
-    def __init__(self, robot: Robot, *, sensor_noise: bool = True, block: Block | None = None) -> None:
+    def __init__(self, robot: Robot, *, sensor_noise: bool = True, things: tuple[Thing, ...] = ()) -> None:
         """Build the model.
 
         Args:
             robot: The robot.
             sensor_noise: Whether odometry and inertial unit have the noise of the robot's YAML.
-            block: What there is to push.
+            things: What stands or moves about.
         """
         self.robot = robot
-        self._noisy, self._block = sensor_noise, block
+        self._noisy, self._things = sensor_noise, things
         self._unit = InertialUnit(robot.sensors.imu)
         self._world = OneWorld(robot, noisy=sensor_noise)
-        self._enter(Scene(robot, block=block))
+        self._enter(Scene(robot, things=things))
 
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> MujocoBackend:
         """The simulator that a task and a scenario ask for."""
-        return cls(robot, sensor_noise=scenario.sensor_noise, block=task.pushes)
+        return cls(robot, sensor_noise=scenario.sensor_noise, things=task.things)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -57,7 +57,7 @@ class MujocoBackend:
         """Begin anew; see `Backend.reset`."""
         obstacles = np.asarray(episode.goal.obstacles, dtype=float)
         if not self._scene.has_room_for(obstacles):
-            self._enter(Scene(self.robot, radii_for(obstacles), self._block))
+            self._enter(Scene(self.robot, radii_for(obstacles), self._things))
         self._scene.begin(episode)
         self._unit.reset(seed, number)
         truth, imu = self._read()
@@ -129,4 +129,4 @@ class MujocoBackend:
         self._truth = truth
         if self._noisy:
             imu = self._unit.measure(imu, self.data.time)
-        return Sample(odometry, imu, truth, self._scene.block_place)
+        return Sample(odometry, imu, truth, self._scene.things)

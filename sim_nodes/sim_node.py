@@ -33,7 +33,7 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
     if settings.backend == "mock":
         from sim_nodes.mock_backend import MockBackend
 
-        return MockBackend(robot, block=task.pushes)
+        return MockBackend(robot, things=task.things)
     raise UnknownNameError("simulated backend", settings.backend, BACKENDS)
 
 

@@ -14,8 +14,8 @@ from fulmar_core.planar import COLUMNS, PlanarState
 Moving = dict[str, Any]  # as of `Moves.moving`, with dictionaries in it
 Parts = dict[str, Any]  # the same without; what was in a dictionary has a name of two words
 
-_RECORDS = {PlanarState: COLUMNS, Goal: Goal.__slots__, World: FIELDS}
-_LEAVES_OF = {kind: attrgetter(*names) for kind, names in _RECORDS.items()}
+_RECORDS = {PlanarState: COLUMNS, World: FIELDS}
+_LEAVES_OF = {Goal: Goal.arrays, **{kind: attrgetter(*names) for kind, names in _RECORDS.items()}}
 
 
 def parts_of(moving: Moving) -> Parts:
@@ -53,6 +53,8 @@ def leaves(part: Any) -> tuple[Any, ...]:
 
 def rebuilt(part: Any, new: Iterator[Any]) -> Any:
     """A part of the same kind with other leaves, as many as `leaves` finds, in its order."""
+    if isinstance(part, Goal):
+        return part.mapped(lambda _: next(new))
     if type(part) in _RECORDS:
         return type(part)(*(next(new) for _ in _RECORDS[type(part)]))
     if isinstance(part, (tuple, list)):

@@ -5,12 +5,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from fulmar_core.dynamics.pushing import Block
 from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError
-from fulmar_core.goal import Goal
 from fulmar_core.robot import Robot
-from sim_nodes.mujoco_model.block import NAME as BLOCK
+from fulmar_core.things import Thing
 from sim_nodes.mujoco_model.block import add_block, place_block
 from sim_nodes.mujoco_model.machine import Machine, machine_of
 from sim_nodes.mujoco_model.obstacles import add_obstacles, place_obstacles, there_is_room
@@ -20,23 +18,24 @@ PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 
 
 class Scene:
-    """A robot's model with room for some obstacles, and perhaps a block."""
+    """A robot's model with room for some obstacles and things."""
 
-    def __init__(self, robot: Robot, radii: tuple[float, ...] = (), block: Block | None = None) -> None:
+    def __init__(self, robot: Robot, radii: tuple[float, ...] = (), things: tuple[Thing, ...] = ()) -> None:
         """Compile.
 
         Args:
             robot: The robot.
             radii: Of the obstacles that there is room for [m].
-            block: The thing to push; None for none.
+            things: Those with a body have one in the model; the others stay where they are put.
 
         Raises:
             ConfigError: MuJoCo finds that there can be no such robot.
         """
-        self._radii, self._block = radii, block
+        self._radii, self._things = radii, things
+        self._poses: dict[str, np.ndarray] = {}
         self.machine: Machine = machine_of(robot)
         try:
-            self.model = _spec(robot, self.machine, radii, block).compile()
+            self.model = _spec(robot, self.machine, radii, things).compile()
         except ValueError as error:
             raise ConfigError(
                 f"robot '{robot.name}': MuJoCo cannot build it: {' '.join(str(error).split())}. "
@@ -50,22 +49,29 @@ class Scene:
         return there_is_room(self._radii, obstacles)
 
     def begin(self, episode: Episode) -> None:
-        """Put everything as an episode begins: bodies, the robot at its start, obstacles and block."""
+        """Put everything as an episode begins: bodies, the robot at its start, obstacles and things."""
         self.machine.take_world(self.model, episode.world)
         mujoco.mj_setConst(self.model, self.data)
         mujoco.mj_resetData(self.model, self.data)
         self.machine.place(self.model, self.data, episode.start)
-        self._place_things(episode.goal)
-
-    def _place_things(self, goal: Goal) -> None:
-        place_obstacles(self.model, self.data, np.asarray(goal.obstacles))
-        if self._block is not None:
-            place_block(self.model, self.data, float(goal.block[0]), float(goal.block[1]))
+        place_obstacles(self.model, self.data, np.asarray(episode.goal.obstacles))
+        for thing in self._things:
+            pose = np.array(episode.goal.things[thing.name], dtype=float)
+            self._poses[thing.name] = pose
+            if thing.body is not None:
+                place_block(self.model, self.data, thing.name, float(pose[0]), float(pose[1]))
 
     @property
-    def block_place(self) -> np.ndarray | None:
-        """Where the block is, shape (2,); None where there is none [m]."""
-        return None if self._block is None else np.array(self.data.body(BLOCK).xpos[:2])
+    def things(self) -> dict[str, np.ndarray]:
+        """Where the things are, each (3,) [m, m, rad]; what is pushed is round and keeps its heading."""
+        return {thing.name: self._pose_of(thing) for thing in self._things}
+
+    def _pose_of(self, thing: Thing) -> np.ndarray:
+        pose = self._poses[thing.name]
+        if thing.body is None:
+            return pose
+        x, y, _ = self.data.body(thing.name).xpos
+        return np.array([x, y, pose[2]])
 
 
 def build_model(robot: Robot) -> mujoco.MjModel:
@@ -80,7 +86,9 @@ def build_model(robot: Robot) -> mujoco.MjModel:
     return Scene(robot).model
 
 
-def _spec(robot: Robot, machine: Machine, radii: tuple[float, ...], block: Block | None) -> mujoco.MjSpec:
+def _spec(
+    robot: Robot, machine: Machine, radii: tuple[float, ...], things: tuple[Thing, ...]
+) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
     spec.option.timestep = robot.timing.physics_dt / machine.steps_per_tick
@@ -90,6 +98,7 @@ def _spec(robot: Robot, machine: Machine, radii: tuple[float, ...], block: Block
     add_surroundings(spec, PALE if robot.hydrodynamics is None else WATER)
     add_sensors(spec, machine.add(spec))
     add_obstacles(spec, radii)
-    if block is not None:
-        add_block(spec, block)
+    for thing in things:
+        if thing.body is not None:
+            add_block(spec, thing.name, thing.body)
     return spec

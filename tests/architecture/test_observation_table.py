@@ -77,7 +77,7 @@ def seen_from_one_side(task, side):
     state = PlanarState(*(np.array([value]) for value in (0.0, 0.0, 0.0, 0.2, 0.1 * side, 0.3 * side)))
     ahead = [[[3.0, 2.0 * side, 0.5 * side], [4.0, 3.0 * side, 0.6 * side], [5.0, 4.0 * side, 0.7 * side]]]
     discs = np.array([[[1.0, 3.0 * side, 0.2], [0.5, 4.0 * side, 0.2], [2.0, 5.0 * side, 0.2]]])
-    goal = Goal(np.array(ahead), np.zeros(1), discs, np.array([[1.0, 0.5 * side]]))
+    goal = Goal(np.array(ahead), np.zeros(1), discs, {"block": np.array([[1.0, 0.5 * side, 0.0]])})
     if isinstance(task, GoToPositionWithObstacles):
         goal = task.surveyed(goal, load_robot("turtlebot2"))
     return dict(

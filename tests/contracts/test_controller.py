@@ -86,8 +86,7 @@ def measured(robot, task, controller, simulation, *, steps=0):
     for number in range(steps):
         inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
         simulation.move(loop.take(inputs, robot.actuators.scale * rng.uniform(-1.0, 1.0, size)).command)
-        if simulation.block is not None:
-            loop.goal = replace(loop.goal, block=np.asarray(simulation.block, dtype=float))
+        loop.goal = goal_in_float64(loop.goal.among(simulation.things))
     return loop.inputs(simulation.measured, round(1e9 * steps * loop.dt))
 
 
@@ -152,7 +151,7 @@ def test_it_answers_a_robot_at_rest_where_it_shall_be(case):
         targets, place = 0.0 * target, 0.0 * target
     else:
         targets, place = target, target
-    goal = replace(goal, targets=targets[:, None], block=targets[:, :2])
+    goal = replace(goal, targets=targets[:, None], things=dict.fromkeys(goal.things, targets))
     simulation.put(at_rest(*place.T), goal, simulation.command)
     controller.reset()
     assert np.isfinite(controller.act(measured(robot, task, controller, simulation))).all()

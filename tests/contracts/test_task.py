@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import get_args
 
 import numpy as np
@@ -19,7 +19,7 @@ from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import ShippedTask, load_task
-from fulmar_core.tasks.push_block import PushBlock
+from fulmar_core.things import push_things
 from fulmar_core.topics import GOAL_WIRES
 from tests.pairs import each_pair
 
@@ -40,10 +40,12 @@ def on_the_way(task, robot):
     rng = np.random.default_rng(3)
     state = PlanarState(*(getattr(start, name) + rng.normal(size=COUNT) for name in COLUMNS))
     done = rng.integers(0, goal.targets.shape[1], COUNT).astype(float)
-    return start, state, Goal(goal.targets, done, goal.obstacles, goal.block)
+    return start, state, replace(goal, done=done)
 
 
 def cast(value, convert):
+    if isinstance(value, Goal):
+        return value.mapped(convert)
     return type(value)(*(convert(getattr(value, name)) for name in value.__slots__))
 
 
@@ -57,14 +59,16 @@ def test_what_is_drawn_is_finite_at_rest_and_within_the_geofence(task, robot, tr
     start, goal = draw(task, robot, training=training, count=300)
     for value in (
         *(getattr(start, name) for name in COLUMNS),
-        *(getattr(goal, name) for name in Goal.__slots__),
+        *goal.arrays(),
     ):
         assert value.dtype == np.float64
         assert np.isfinite(value).all()
     assert goal.targets.shape == (300, goal.targets.shape[1], 3)
     assert goal.obstacles.shape[0] == 300
     assert goal.obstacles.shape[2] >= 3
-    assert (goal.done.shape, goal.block.shape) == ((300,), (300, 2))
+    assert goal.done.shape == (300,)
+    assert {pose.shape for pose in goal.things.values()} <= {(300, 3)}
+    assert {thing.name for thing in task.things} <= set(goal.things)
     assert not any(getattr(start, name).any() for name in ("vx", "vy", "yaw_rate"))
     errors = task.errors(start, goal)
     if errors.position is not None:
@@ -90,7 +94,7 @@ def test_at_its_target_itself_everything_is_finite(task, robot):
     _, goal = draw(task, robot)
     x, y, yaw = np.moveaxis(goal.targets[:, 0], -1, 0)
     state = PlanarState(x, y, yaw, x * 0.0, x * 0.0, x * 0.0)
-    goal = Goal(goal.targets, goal.done, goal.obstacles, goal.targets[:, 0, :2])
+    goal = goal.among(dict.fromkeys(goal.things, goal.targets[:, 0]))
     assert all(np.isfinite(term).all() for term in task.observe(state, goal))
     assert np.isfinite(task.reward(state, state, goal, goal)).all()
 
@@ -105,14 +109,13 @@ def everything(task, robot, before, after, goal):
         for error in (errors.position, errors.heading, errors.velocity, errors.yaw_rate)
         if error is not None
     ]
-    values += [getattr(ended, name) for name in Goal.__slots__]
+    values += ended.arrays()
     values += [ended.current]
     for name in ("penalty", "collides"):
         extra = getattr(task, name, lambda *_: None)(after, goal, robot)
         values += [] if extra is None else [extra]
-    if isinstance(task, PushBlock):
-        moved, slowed = task.pushed(goal, before, after, robot)
-        values += [moved.block, slowed.vx, slowed.vy, task.reward(before, slowed, goal, moved)]
+    moved, slowed = push_things(task.things, goal.things, before, after, robot)
+    values += [*moved.values(), slowed.vx, slowed.vy, task.reward(before, slowed, goal, goal.among(moved))]
     return values
 
 
@@ -176,7 +179,11 @@ def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, r
         )
         centres = np.stack(place(goal.obstacles[..., 0], goal.obstacles[..., 1]), -1)
         discs = np.concatenate((centres, goal.obstacles[..., 2:]), -1)
-        elsewhere = Goal(targets, goal.done, discs, np.stack(place(goal.block[:, 0], goal.block[:, 1]), -1))
+        things = {
+            name: np.stack((*place(pose[:, 0], pose[:, 1]), pose[:, 2] + turn), -1)
+            for name, pose in goal.things.items()
+        }
+        elsewhere = Goal(targets, goal.done, discs, things)
     for here, there in zip(task.observe(state, goal), task.observe(moved, elsewhere), strict=True):
         np.testing.assert_allclose(there, here, rtol=0, atol=1e-9)
 

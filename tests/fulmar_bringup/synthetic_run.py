@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -104,11 +104,10 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
             bag.goal(task.goal_topic, simulation.goal[0], now_ns)
         bag.odometry("ground_truth/odom", simulation.truth, time_s, now_ns)
         bag.odometry("odom", simulation.measured, time_s, now_ns)
-        if task.name == "push_block":
-            bag.block(simulation.goal[0].block, time_s, now_ns)
+        for name, pose in simulation.things.items():
+            bag.thing(name, pose[0], time_s, now_ns)
         if tick % substeps == 0 and not plan.silence_s[0] <= time_s < plan.silence_s[1]:
-            if simulation.block is not None:
-                loop.goal = replace(loop.goal, block=simulation.block)
+            loop.goal = loop.goal.among(simulation.things)
             command = loop.step(simulation.measured, round(time_s * NS)).command[0]
             heard_s, steps = time_s, steps + 1
             late_ns = LATENCY_NS + int(jitter.gamma(2.0, 300_000))
@@ -252,8 +251,8 @@ class _Messages:
         message = self._new("visualization_msgs/msg/MarkerArray", markers=markers)
         self._write("obstacles", message, EPOCH_NS)
 
-    def block(self, place: np.ndarray, time_s: float, log_ns: int) -> None:
-        self._write("block/pose", self._planar(np.array([*place, 0.0]), time_s), log_ns)
+    def thing(self, name: str, pose: np.ndarray, time_s: float, log_ns: int) -> None:
+        self._write(f"{name}/pose", self._planar(pose, time_s), log_ns)
 
     def command(self, command: np.ndarray, time_s: float, log_ns: int) -> None:
         if self._command_wire is not VELOCITY_COMMAND:

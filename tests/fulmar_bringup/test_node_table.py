@@ -243,6 +243,21 @@ def test_an_input_that_nothing_publishes_is_refused_with_the_nearest_topic():
     assert "camera" in system_rows(replace(PLAN, nodes=(own_node(inputs=("odom", "estop", "image")),)))
 
 
+def test_on_hardware_whoever_sees_a_thing_publishes_it_and_of_an_emulated_device_nobody_does(tmp_path):
+    plan = replace(PLAN, robot="turtlebot2", task="push_block", backend="hardware", hardware="turtlebot2")
+    rows = system_rows(plan)
+    assert "block/pose" in rows["controller"].inputs
+    assert "block/pose" not in rows["plant"].outputs
+    with pytest.raises(ConfigError, match="receives 'block/pose', which nothing in the system publishes"):
+        system_rows(replace(plan, emulated=True), wires_folder=tmp_path)
+
+
+def test_a_recorder_is_told_the_things_of_the_task():
+    push = replace(PLAN, robot="turtlebot2", task="push_block")
+    assert recorder_spec(push).parameters["things"] == ["block"]
+    assert "things" not in recorder_spec(PLAN).parameters
+
+
 def test_a_second_clock_is_refused():
     with pytest.raises(ConfigError, match="plant and camera publish /clock"):
         system_rows(replace(PLAN, nodes=(own_node(outputs=("/clock",)),)))

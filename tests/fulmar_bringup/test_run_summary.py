@@ -11,7 +11,7 @@ import pytest
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.commands.run import verdict
 from fulmar_bringup.run_judgement import _goals, judge
-from fulmar_bringup.run_record import Motion
+from fulmar_bringup.run_record import Motion, Places
 from fulmar_bringup.run_summary import summarise
 from fulmar_core.errors import BagError
 from fulmar_core.rotation import yaw_of
@@ -260,11 +260,9 @@ def test_of_a_block_its_own_place_counts_and_not_the_robot_s(tmp_path):
     record = read_run(write_run(tmp_path / "bag", plan))
     stamps = record.truth.stamp_s
     x, y = record.goals[0].targets[0, :2]
-    block = dataclasses.replace(
-        record.block, stamp_s=stamps, xy=np.tile([x + 0.03, y + 0.04], (len(stamps), 1))
-    )
+    block = Places(stamps, np.tile([x + 0.03, y + 0.04, 0.0], (len(stamps), 1)))
     info = {**record.info, "task": "push_block"}
-    summary = summarise(dataclasses.replace(record, info=info, block=block))
+    summary = summarise(dataclasses.replace(record, info=info, things={"block": block}))
     assert summary["final_position_error_m"] == pytest.approx(0.05, abs=1e-6)
     assert summary["success"] is True
 

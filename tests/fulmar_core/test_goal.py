@@ -16,7 +16,7 @@ def batch(*done):
         np.array([PATH] * len(done)),
         np.array(done, dtype=float),
         no_obstacles(len(done)),
-        np.zeros((len(done), 2)),
+        {"gate": np.arange(3.0 * len(done)).reshape(-1, 3)},
     )
 
 
@@ -34,7 +34,6 @@ def test_a_single_goal_and_a_grid_of_goals_know_theirs_too():
         np.array([[PATH] * 2] * 2),
         np.array([[0.0, 1.0], [2.0, 3.0]]),
         np.zeros((2, 2, 0, 3)),
-        np.zeros((2, 2, 2)),
     )
     assert grid.current[..., 0].tolist() == [[1.0, 2.0], [3.0, 1.0]]
 
@@ -46,12 +45,14 @@ def test_the_only_target_is_the_current_one_for_ever():
 
 
 def test_goals_stack_are_picked_and_overwritten_world_by_world():
-    goals = stack_goals([goal_at(*PATH), goal_at(*PATH[::-1])])
+    gates = {"gate": np.ones(3)}
+    goals = stack_goals([goal_at(*PATH).among(gates), goal_at(*PATH[::-1]).among(gates)])
     assert goals.current[:, 0].tolist() == [1.0, 3.0]
     assert goals[1].current.tolist() == list(PATH[2])
     goals.write([0], batch(2))
     assert goals.current[:, 0].tolist() == [3.0, 3.0]
     assert goals.done.tolist() == [2.0, 0.0]
+    assert goals.things["gate"].tolist() == [[0.0, 1.0, 2.0], [1.0, 1.0, 1.0]]
 
 
 def test_the_offset_leads_from_the_body_to_the_target():
@@ -64,6 +65,6 @@ def test_the_offset_leads_from_the_body_to_the_target():
 def test_torch_finds_the_targets_that_numpy_does(done):
     torch = pytest.importorskip("torch")
     goal = batch(*done)
-    same = Goal(*(torch.as_tensor(getattr(goal, name)) for name in Goal.__slots__))
+    same = goal.mapped(torch.as_tensor)
     for further in (0, 1):
         np.testing.assert_array_equal(same.ahead(further).numpy(), goal.ahead(further))

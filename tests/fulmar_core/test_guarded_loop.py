@@ -251,9 +251,9 @@ def test_obstacles_and_block_are_waited_for_and_named():
     pusher = Bench(task="push_block")
     pusher.give()
     assert pusher.step()[0].reason == "no place of the block yet"
-    pusher.guard.take_block(np.array([1.0, 0.5]), pusher.now_ns)
+    pusher.guard.take_thing("block", np.array([1.0, 0.5, 0.0]), pusher.now_ns)
     assert pusher.step()[1] == list(GENTLE)
-    np.testing.assert_array_equal(pusher.guard.loop.goal.block, [[1.0, 0.5]])
+    np.testing.assert_array_equal(pusher.guard.loop.goal.things["block"], [[1.0, 0.5, 0.0]])
 
 
 def test_refusals_in_a_row_latch_a_fault_where_there_is_no_fallback():

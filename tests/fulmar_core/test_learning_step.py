@@ -28,7 +28,7 @@ def place(x):
 
 def goal_at(x=0.0, *, disc=None, block=(0.0, 0.0)):
     discs = np.zeros((1, 0, 3)) if disc is None else np.array([[disc]])
-    return Goal(np.array([[[x, 0.0, 0.0]]]), np.zeros(1), discs, np.array([block]))
+    return Goal(np.array([[[x, 0.0, 0.0]]]), np.zeros(1), discs, {"block": np.array([[*block, 0.0]])})
 
 
 def judged(task, here, *, before=None, goal=None, ended=None, previous=STILL, command=STILL, robot=BASE):
@@ -113,6 +113,8 @@ def test_torch_judges_as_numpy_does(name):
 
 
 def in_torch(value, torch):
-    if isinstance(value, PlanarState | Goal):
+    if isinstance(value, Goal):
+        return value.mapped(torch.as_tensor)
+    if isinstance(value, PlanarState):
         return type(value)(*(torch.as_tensor(getattr(value, name)) for name in value.__slots__))
     return torch.as_tensor(value)

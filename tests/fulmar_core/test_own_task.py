@@ -11,16 +11,21 @@ from fulmar_core.control_loop import ControlLoop
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
 from fulmar_core.errors import BundleError, ConfigError, TaskError
+from fulmar_core.goal import goal_at
 from fulmar_core.learning_step import observed_step
+from fulmar_core.mission import Mission
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.standby import ready
 from fulmar_core.tasks import load_recorded_task, load_task
+from sim_nodes.mock_backend import MockBackend
 from tests.own_files import own_folder
 
 ROBOT = load_robot("turtlebot2")
-NOMINAL = load_scenario("nominal")
+S = 1_000_000_000
+NOMINAL, IDEAL = load_scenario("nominal"), load_scenario("ideal")
 HEAD = """
 import numpy as np
 from dataclasses import replace
@@ -46,9 +51,9 @@ def own(tmp_path, monkeypatch):
     """Writes a class with the members of a task and some more, and gives its name."""
     with own_folder(tmp_path, monkeypatch):
 
-        def write(more: str = "", *, base: str = "(Task)", members: str = MEMBERS) -> str:
+        def write(more: str = "", *, base: str = "(Task)", members: str = MEMBERS, head: str = "") -> str:
             module = f"own_{len(list(tmp_path.glob('*.py')))}"
-            (tmp_path / f"{module}.py").write_text(f"{HEAD}class Mine{base}:\n{members}\n{more}\n")
+            (tmp_path / f"{module}.py").write_text(f"{HEAD}{head}class Mine{base}:\n{members}\n{more}\n")
             return f"{module}:Mine"
 
         yield write
@@ -84,7 +89,7 @@ def test_a_class_with_the_needed_members_is_a_task_whether_or_not_it_inherits(ow
     task = load_task(own(base=base))
     task.check(ROBOT)
     assert (task.name, task.kind, task.title) == ("own_0:Mine", "own_0:Mine", "Mine")
-    assert (task.required, task.sees_obstacles, task.pushes) == (None, False, None)
+    assert (task.required, task.sees_obstacles, task.things) == (None, False, ())
     run = roll_out_in_batch(Still(), ROBOT, task, NOMINAL, episodes=3, seed=1)
     start = draw_episodes(ROBOT, task, NOMINAL, seed=1, numbers=np.arange(3))
     away = np.hypot(start.start.x - start.goal.current[:, 0], start.start.y - start.goal.current[:, 1])
@@ -227,6 +232,101 @@ def test_a_class_that_only_a_bag_names_is_never_imported(own, tmp_path):
     assert not (tmp_path / "run").exists()
     load_task(name)  # a user asked for it
     assert load_recorded_task(name, bag).name == name
+
+
+GATE = """
+    things = (Thing("gate"), Thing("box", Block(0.1, 0.3, 0.2, 0.3, 0.2)))
+    def draw(self, draws, robot, *, training):
+        state, places = Start((1.0, 2.0), (0.0, 2.0), 1.0).draw(draws, training=training)
+        ahead = np.stack((state.x + np.cos(state.yaw), state.y + np.sin(state.yaw), state.yaw), axis=-1)
+        return state, goals_at(places).among({"gate": places + 1.0, "box": ahead})
+    def observe(self, state, goal):
+        gate = goal.things["gate"]
+        return pose_errors(state, gate, heading=False).position, gate[..., 2] + 0.0 * state.x
+"""
+OF_THINGS = "from fulmar_core.things import Thing\nfrom fulmar_core.dynamics.pushing import Block\n"
+
+
+def test_things_of_its_own_are_observed_and_those_with_a_body_are_pushed_by_every_simulator_alike(own):
+    task = load_task(own(GATE, head=OF_THINGS))
+    task.check(ROBOT)
+    assert [thing.wire.name for thing in task.things] == ["gate/pose", "box/pose"]
+    assert task.subject == "box"
+    simulation = BatchSimulation(ROBOT, task, IDEAL, worlds=3, seed=1, dtype=np.float64)
+    before = {name: pose.copy() for name, pose in simulation.things.items()}
+    alone = MockBackend(ROBOT, things=task.things)
+    alone.reset(draw_episodes(ROBOT, task, IDEAL, seed=1, numbers=np.arange(1))[0], seed=1)
+    command = np.tile([0.4, 0.0], (3, 1))
+    for _ in range(40):
+        simulation.step(command)
+        sample = alone.step(simulation.command[0], simulation.substeps)
+    np.testing.assert_array_equal(simulation.things["gate"], before["gate"])
+    assert np.all(np.linalg.norm(simulation.things["box"] - before["box"], axis=1) > 0.1)
+    np.testing.assert_allclose(sample.things["box"], simulation.things["box"][0], atol=1e-6)
+    np.testing.assert_allclose(simulation.observe()[:, 1], before["gate"][:, 2], rtol=1e-6)
+
+
+KEEPS = """
+    def begun(self, goal, state):
+        return goal.among({"start": np.stack((state.x, state.y, state.yaw), axis=-1)})
+"""
+
+
+def test_a_goal_counts_when_every_thing_is_seen_and_what_the_task_keeps_goes_on_until_one_is_lost(own):
+    task = load_task(own(GATE + KEEPS, head=OF_THINGS))
+    loop = ControlLoop(ROBOT, task, Still())
+    mission, here = Mission(loop), at_rest(*np.ones((3, 1)))
+    mission.give(goal_at((2.0, 0.0, 0.0)), 1)
+    assert mission.lacking == "place of the gate"
+    mission.see_thing("gate", np.array([1.0, 2.0, 0.5]), 2 * S)
+    assert mission.lacking == "place of the box"
+    assert loop.goal is None
+    assert mission.lacks_something_of(2 * S)
+    mission.see_thing("box", np.zeros(3), 2 * S)
+    assert not mission.lacks_something_of(2 * S)
+    loop.inputs(here, 2 * S)
+    mission.see_thing("gate", np.array([1.5, 2.0, 0.5]), 3 * S)
+    kept = {name: pose.tolist() for name, pose in loop.goal.things.items()}
+    assert kept == {"start": [[1.0] * 3], "gate": [[1.5, 2.0, 0.5]], "box": [[0.0] * 3]}
+    mission.turn_to(3 * S + 1)
+    assert mission.lacking == "place of the box"
+    mission.see_thing("box", np.zeros(3), 4 * S)
+    loop.inputs(here[np.array([0])], 4 * S)  # it begins anew: what the task keeps is there
+    assert set(loop.goal.things) == {"start", "gate", "box"}
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("    things = ('gate',)", "things = ('gate',) must be a tuple of fulmar_core.things.Thing"),
+        ("    things = (Thing('a'), Thing('a'))", "no name twice"),
+        ("    things = (Thing('gate'),)", "draw returned a Goal without the pose of gate in its things."),
+        (
+            "    things = (Thing('gate'),)\n    def draw(self, draws, robot, *, training):\n"
+            "        state, places = Start((1.0, 2.0), (0.0, 2.0), 1.0).draw(draws, training=training)\n"
+            "        return state, goals_at(places).among({'gate': places[:, :2]})",
+            "draw returned a Goal with things['gate'] of shape (3, 2), it must be (3, 3)",
+        ),
+        (
+            "    def advance(self, goal, state, time_s): return replace(goal, things=goal.done)",
+            "advance returned a Goal whose things are a ndarray, not a mapping",
+        ),
+    ],
+)
+def test_a_mistake_about_things_is_one_line(own, more, says):
+    assert says in complaint(own(more, head=OF_THINGS))
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("Gate 1", "'Gate 1' is no name of a thing: use lower-case letters"),
+        ("mocap", "'mocap' cannot be a thing: 'mocap/pose' is another topic."),
+    ],
+)
+def test_a_name_that_no_thing_can_have_is_refused_with_the_line_of_the_user(own, name, says):
+    with pytest.raises(ConfigError, match=rf"{says}.*own_0.py:\d+"):
+        load_task(own(f"    things = (Thing('{name}'),)", head=OF_THINGS))
 
 
 def test_no_law_no_excitation_and_no_shipped_bundle_knows_it(own):

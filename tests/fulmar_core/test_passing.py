@@ -15,7 +15,7 @@ from fulmar_core.references.race_corners import draw_corners
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.passing import PassingTask
-from fulmar_core.tasks.race_gates import crossings
+from fulmar_core.tasks.race_gates import LAST, crossings
 from fulmar_core.tasks.race_track import RaceTrack
 from fulmar_core.tasks.waypoints import Course, headings_along
 from fulmar_core.trajectories import Judge
@@ -44,7 +44,7 @@ def reward(task, before, after, goal):
 
 
 def square(done=0.0, place=(-1.0, 0.0)):
-    return Goal(np.array([SQUARE]), np.array([done]), np.zeros((1, 0, 3)), np.array([place]))
+    return Goal(np.array([SQUARE]), np.array([done]), np.zeros((1, 0, 3)), {LAST: np.array([[*place, 0.0]])})
 
 
 @EACH
@@ -166,7 +166,7 @@ def test_gates_are_counted_step_by_step_and_once_each():
         goal = GATES.advance(goal, body(x, 0.1), 0.0)
         judge.see(body(x, 0.1))
         assert goal.done.tolist() == [1.0 if x >= 0.0 else 0.0]
-        assert goal.block.tolist() == [[x, 0.1]]
+        assert goal.things[LAST][:, :2].tolist() == [[x, 0.1]]
     for x in np.linspace(1.0, -1.0, 21):  # back again: the next gate is another one
         goal = GATES.advance(goal, body(x, 0.1), 0.0)
     assert goal.done.tolist() == judge.goal.done.tolist() == [1.0]
@@ -257,7 +257,7 @@ def test_starts_lie_at_the_distance_of_the_task_and_within_its_cone(task):
 
 def test_gates_begin_where_the_robot_is():
     start, goal = GATES.draw(draws(50), BASE, training=False)
-    np.testing.assert_array_equal(goal.block, np.stack((start.x, start.y), axis=-1))
+    np.testing.assert_array_equal(goal.things[LAST], np.stack((start.x, start.y, start.yaw), axis=-1))
 
 
 @EACH

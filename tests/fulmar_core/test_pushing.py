@@ -12,7 +12,7 @@ from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.dynamics.pushing import SIDEWAYS, push
-from fulmar_core.goal import goal_at
+from fulmar_core.goal import goal_at, offset_to
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
@@ -142,21 +142,23 @@ def test_a_slow_robot_is_stopped_and_never_thrown_back():
 
 def test_the_batch_moves_its_blocks_and_a_reset_puts_them_back():
     simulation = BatchSimulation(BASE, TASK, load_scenario("ideal"), worlds=3, seed=1, dtype=np.float64)
-    simulation.goal.block[1] = simulation.goal.block[1] + 100.0  # out of reach
+    simulation.goal.things["block"][1, :2] += 100.0  # out of reach
     x, y = simulation.truth.x.copy(), simulation.truth.y.copy()
-    yaw = np.arctan2(simulation.goal.block[:, 1] - y, simulation.goal.block[:, 0] - x)
+    yaw = np.arctan2(simulation.goal.things["block"][:, 1] - y, simulation.goal.things["block"][:, 0] - x)
     simulation.truth.yaw[:] = yaw
-    before = simulation.goal.block.copy()
+    before = simulation.goal.things["block"].copy()
     for _ in range(80):
         simulation.step(np.tile([0.45, 0.0], (3, 1)))
-    moved = np.linalg.norm(simulation.goal.block - before, axis=1)
+    moved = np.linalg.norm(simulation.goal.things["block"] - before, axis=1)
     assert moved[0] > 0.5
     assert moved[1] == 0.0
     assert moved[2] > 0.5
-    kept = simulation.goal.block.copy()
+    kept = simulation.goal.things["block"].copy()
     simulation.reset([0])
-    np.testing.assert_array_equal(simulation.goal.block[1:], kept[1:])
-    assert np.linalg.norm(simulation.goal.block[0] - simulation.goal.targets[0, 0, :2]) == pytest.approx(1.0)
+    np.testing.assert_array_equal(simulation.goal.things["block"][1:], kept[1:])
+    assert np.linalg.norm(
+        simulation.goal.things["block"][0, :2] - simulation.goal.targets[0, 0, :2]
+    ) == pytest.approx(1.0)
 
 
 @EACH_ROBOT
@@ -164,7 +166,7 @@ def test_the_batch_moves_its_blocks_and_a_reset_puts_them_back():
 def test_nothing_touches_at_the_start_and_distances_are_as_the_task_says(robot, training):
     n = 500
     start, goal = TASK.draw(Draws(4, np.arange(n), np.zeros(n)), robot, training=training)
-    dx, dy = goal.block[:, 0] - start.x, goal.block[:, 1] - start.y
+    dx, dy = offset_to(start, goal.things["block"])
     c, s = np.cos(start.yaw), np.sin(start.yaw)
     assert np.all(outline_of(robot).gap(c * dx + s * dy, c * dy - s * dx) > BLOCK.radius)
     low, high = TASK.training_block_distance if training else TASK.block_distance
@@ -178,7 +180,7 @@ def test_nothing_touches_at_the_start_and_distances_are_as_the_task_says(robot, 
 
 
 def test_names_tell_what_is_in_the_columns():
-    goal = replace(goal_at((3.0, 1.0, 0.0)), block=np.array([2.0, 1.0]))
+    goal = goal_at((3.0, 1.0, 0.0)).among({"block": np.array([2.0, 1.0, 0.0])})
     state = PlanarState(*(np.asarray(v) for v in (2.0, 0.0, np.pi / 2, 0.0, 0.3, 0.1)))
     seen = {name: float(v) for name, v in zip(TASK.observation_names, TASK.observe(state, goal), strict=True)}
     assert seen == pytest.approx(
@@ -202,7 +204,7 @@ def test_names_tell_what_is_in_the_columns():
 
 
 def at(block, place=(0.0, 0.0)):
-    return replace(goal_at((*place, 0.0)), block=np.array(block, dtype=float))
+    return goal_at((*place, 0.0)).among({"block": np.array([*block, 0.0])})
 
 
 def test_pushing_the_block_home_pays_and_pushing_it_away_costs():
@@ -229,10 +231,9 @@ def test_a_robot_sees_whether_it_stands_behind_the_block_or_beside_it(x, y, behi
 
 def test_a_judge_is_told_where_the_block_is():
     judge = Judge(TASK, at((1.0, 0.0)), 0.1)
-    assert float(TASK.errors(body(), judge.see(body(), np.array([0.05, 0.0]))).position) == pytest.approx(
-        0.05
-    )
-    assert judge.see(body()).block.tolist() == [0.05, 0.0]
+    moved = judge.see(body(), {"block": np.array([0.05, 0.0, 0.0])})
+    assert float(TASK.errors(body(), moved).position) == pytest.approx(0.05)
+    assert judge.see(body()).things["block"].tolist() == [0.05, 0.0, 0.0]
 
 
 def test_blocks_that_cannot_be_are_refused():

@@ -173,10 +173,10 @@ def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
     robot, task = load_robot(robot), replace(load_task(name), episode_s=8.0)
     # Errors magnified as much as this task's make rounding grow past any tolerance at the usual boldness.
     boldness = 0.15 if name == "drift_track_velocities" else 0.3
-    controller, block = Habit(robot, task, boldness=boldness), getattr(task, "block", None)
+    controller = Habit(robot, task, boldness=boldness)
     batch = roll_out_in_batch(controller, robot, task, IDEAL, episodes=3, seed=5)
     alone = roll_out_in_backends(
-        controller, lambda: MockBackend(robot, block=block), task, IDEAL, episodes=3, seed=5
+        controller, lambda: MockBackend(robot, things=task.things), task, IDEAL, episodes=3, seed=5
     )
     for column in ("x", "y", "position_error", "velocity_error", "goals", "touching", "outside", "shares"):
         one, other = (np.asarray(getattr(run, column), dtype=float) for run in (batch, alone))

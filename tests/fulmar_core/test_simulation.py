@@ -9,7 +9,6 @@ import pytest
 
 from fulmar_core.counter_rng import START
 from fulmar_core.disturbances.scenario import Actuation, Kick, Push, Scenario, Sensing, Wave, load_scenario
-from fulmar_core.goal import Goal
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.planar import COLUMNS, at_rest
@@ -49,10 +48,19 @@ def everything(simulation, index=...):
     return {
         **{f"true {name}": getattr(simulation.truth, name)[index].copy() for name in COLUMNS},
         **{f"measured {name}": getattr(simulation.measured, name)[index].copy() for name in COLUMNS},
-        **{name: getattr(simulation.goal, name)[index].copy() for name in Goal.__slots__},
+        **{name: getattr(simulation.goal, name)[index].copy() for name in ("targets", "done", "obstacles")},
         "command": simulation.command[index].copy(),
         "observation": simulation.observe()[index].copy(),
     }
+
+
+def test_a_snapshot_with_other_things_is_refused():
+    snapshots = [
+        BatchSimulation(load_robot("turtlebot2"), load_task(name), load_scenario("ideal"), worlds=2, seed=1)
+        for name in ("push_block", "go_to_position")
+    ]
+    with pytest.raises(ValueError, match="the snapshot has other things"):
+        snapshots[0].restore(snapshots[1].snapshot())
 
 
 def assert_equal(one, other):

@@ -39,7 +39,7 @@ def test_a_mirrored_situation_is_seen_as_the_mirror_says(robot, task, alike):
     observer, mirror = Observer(the_robot, the_task), Mirror.of(the_robot, the_task, alike)
 
     def goal(points):
-        return Goal(points, np.zeros(WORLDS, dtype=int), np.zeros((WORLDS, 0, 3)), np.zeros((WORLDS, 2)))
+        return Goal(points, np.zeros(WORLDS, dtype=int), np.zeros((WORLDS, 0, 3)))
 
     sign = IMAGE[alike]
     seen = observer(PlanarState(*pose, *velocity), goal(targets), shares * scale)

@@ -22,7 +22,7 @@ def draw(robot, count=MANY):
 
 
 def goal(*targets, done=0.0):
-    return Goal(np.array(targets), np.asarray(done), np.zeros((0, 3)), np.zeros(2))
+    return Goal(np.array(targets), np.asarray(done), np.zeros((0, 3)))
 
 
 def moving(ahead, left, turn, yaw=0.7):
@@ -56,7 +56,7 @@ def test_there_is_a_target_for_every_moment_of_an_episode(robot):
 
 def test_each_target_holds_for_its_time_and_worlds_may_be_at_different_times():
     targets = [(0.1 * i, 0.0, 0.0) for i in range(5)]
-    many = Goal(np.array([targets] * 4), np.zeros(4), np.zeros((4, 0, 3)), np.zeros((4, 2)))
+    many = Goal(np.array([targets] * 4), np.zeros(4), np.zeros((4, 0, 3)))
     state = PlanarState(*np.zeros((6, 4)))
     time_s = TASK.hold_s * np.array([0.0, 0.99, 1.0, 3.5])
     assert TASK.advance(many, state, time_s).done.tolist() == [0.0, 0.0, 1.0, 3.0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseArray
@@ -41,9 +43,7 @@ def test_a_point_has_no_heading():
 
 def test_of_many_targets_a_point_is_the_one_that_counts():
     goal = goal_at(*COURSE)
-    message = goal_message(
-        type(goal)(goal.targets, np.asarray(1.0), goal.obstacles, goal.block), "goal_point", 0
-    )
+    message = goal_message(replace(goal, done=np.asarray(1.0)), "goal_point", 0)
     assert (message.point.x, message.point.y) == (0.0, 3.0)
 
 

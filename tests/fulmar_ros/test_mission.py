@@ -89,7 +89,7 @@ def test_the_block_of_each_state_is_waited_for():
     told = mission("push_block")
     told.give(goal_at((1.0, 0.0, 0.0)), 1)
     assert told.lacking == "place of the block"
-    told.see_block(np.array([0.5, 0.0]), 3 * S)
+    told.see_thing("block", np.array([0.5, 0.0, 0.0]), 3 * S)
     assert not told.lacking
     assert told.lacks_something_of(4 * S)
     assert not told.lacks_something_of(3 * S)
@@ -98,21 +98,21 @@ def test_the_block_of_each_state_is_waited_for():
 def test_the_geofence_is_about_the_robot_where_a_block_has_to_get_to_a_place():
     told = mission("push_block")
     told.give(goal_at((1.0, 0.0, 0.0)), 1)
-    told.see_block(np.array([0.5, 0.0]), 3 * S)
+    told.see_thing("block", np.array([0.5, 0.0, 0.0]), 3 * S)
     assert told.distance(at(21.0)) == pytest.approx(20.0)
-    told.see_block(np.array([31.0, 0.0]), 4 * S)
+    told.see_thing("block", np.array([31.0, 0.0, 0.0]), 4 * S)
     assert told.distance(at(21.0)) == pytest.approx(30.0)
 
 
 def test_a_block_that_nobody_has_seen_for_long_is_lacking_until_it_is_seen_again():
     told = mission("push_block")
     told.give(goal_at((1.0, 0.0, 0.0)), 1)
-    told.see_block(np.array([0.5, 0.0]), 3 * S)
+    told.see_thing("block", np.array([0.5, 0.0, 0.0]), 3 * S)
     told.turn_to(4 * S)
     assert not told.lacking
     told.turn_to(4 * S + 1)
     assert told.lacking == "place of the block"
-    told.see_block(np.array([0.5, 0.0]), 5 * S)
+    told.see_thing("block", np.array([0.5, 0.0, 0.0]), 5 * S)
     assert not told.lacking
 
 

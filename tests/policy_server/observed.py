@@ -16,6 +16,6 @@ def inputs_seeing(observations: Any) -> Inputs:
     rows = np.atleast_2d(np.asarray(observations, dtype=float))
     count = len(rows)
     unknown = np.full(count, np.nan)
-    goal = Goal(np.full((count, 1, 3), np.nan), unknown, np.zeros((count, 0, 3)), np.full((count, 2), np.nan))
+    goal = Goal(np.full((count, 1, 3), np.nan), unknown, np.zeros((count, 0, 3)))
     state = PlanarState(*(unknown for _ in COLUMNS))
     return Inputs(state, goal, rows, np.zeros((count, 0)), None, 0, np.nan)

@@ -7,12 +7,17 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.cli import app
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
 from tests.conftest import RosDomain
 from tests.own_files import own_folder
 from tests.ros.cli import fulmar, json_of
@@ -34,8 +39,8 @@ class Measures(Circle):
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The files of the page, in the current folder."""
-    task, controller = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    (tmp_path / "my_task.py").write_text(task)
+    task, controller, gate = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "my_task.py").write_text(task + gate)
     (tmp_path / "my_orbit.py").write_text(controller)
     with own_folder(tmp_path, monkeypatch):
         yield tmp_path
@@ -69,6 +74,41 @@ def test_the_task_of_the_page_is_done_in_run_evaluation_and_rerun(
     assert (found["task"], found["success_rate"]) == ("my_task:Circle", 1.0)
     ask("report", "bag", *TASK)
     assert "Reached" in (folder / "bag" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_thing_of_its_own_comes_over_the_wires_into_observation_bag_rerun_and_report(
+    ros_domain: RosDomain, folder: Path
+) -> None:
+    gated = ("--task", "my_task:ThroughGate")
+    run = ("run", "turtlebot2", *gated, *CONTROLLER, "--lockstep", "--duration", "6", "--record", "bag")
+    done = fulmar(*run, "--json", env=ros_domain.env, cwd=folder)
+    assert done.returncode in (0, 1), done.stderr
+    assert not json_of(done.stdout)["failure"]
+    load_task(gated[1])  # a user asked for it
+    record = read_run(folder / "bag")
+    (gate,) = record.things.values()
+    drawn = draw_episode(
+        load_robot("turtlebot2"), load_task(gated[1]), load_scenario("nominal"), seed=0, number=0
+    )
+    np.testing.assert_allclose(gate.pose, np.tile(drawn.goal.things["gate"], (len(gate), 1)), atol=1e-9)
+    assert len(gate) == len(record.odom)
+    for through in ("direct", "node"):
+        words = [
+            "bag",
+            "rerun",
+            "bag",
+            *gated,
+            *CONTROLLER,
+            "--from",
+            "odometry",
+            "--through",
+            through,
+            "--json",
+        ]
+        again = fulmar(*words, env=ros_domain.env, cwd=folder)
+        assert json_of(again.stdout)["same"], again.stdout
+    assert CliRunner().invoke(app, ["report", "bag", *gated], catch_exceptions=False).exit_code == 0
+    assert "the way of the gate" in (folder / "bag" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -16,14 +16,14 @@ from fulmar_core.tasks import load_task
 
 @pytest.fixture(scope="session")
 def episode():
-    """Builds an episode: place and motion of the start, obstacles, block, and numbers of the world by name."""
+    """Builds an episode: place and motion of the start, obstacles, things, and numbers of the world by name."""
     task, ideal = load_task("go_to_pose"), load_scenario("ideal")
 
-    def build(robot, *, start=(0.0,) * 6, obstacles=None, block=None, **world):
+    def build(robot, *, start=(0.0,) * 6, obstacles=None, things=None, **world):
         goal = goal_at((0.0, 0.0, 0.0), obstacles=obstacles)
         return Episode(
             PlanarState(*(np.asarray(float(value)) for value in start)),
-            goal if block is None else replace(goal, block=np.array(block)),
+            goal.among({name: np.array(pose) for name, pose in (things or {}).items()}),
             replace(
                 draw_episode(robot, task, ideal, seed=0, number=0).world,
                 **{name: np.asarray(value, dtype=float) for name, value in world.items()},

@@ -10,6 +10,7 @@ from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.obstacles import TOUCH, clearance
+from fulmar_core.things import Thing
 from sim_nodes.mock_backend import MockBackend
 
 mujoco = pytest.importorskip("mujoco")
@@ -17,7 +18,7 @@ mujoco = pytest.importorskip("mujoco")
 from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
 
 EVERY = config_names("robots")
-BLOCK = load_task("push_block").block
+BLOCK = load_task("push_block").things
 AHEAD = np.array([[1.6, 0.0, 0.21], [9.0, 9.0, 0.0], [0.0, 5.0, 0.21]])
 
 
@@ -68,14 +69,14 @@ def test_obstacles_of_another_episode_stand_elsewhere_and_those_of_none_nowhere(
 def test_a_block_is_pushed_ahead_about_as_the_core_pushes_it(name, episode):
     robot = load_robot(name)
     places = []
-    for backend in (MujocoBackend(robot, sensor_noise=False, block=BLOCK), MockBackend(robot, block=BLOCK)):
-        sample = backend.reset(episode(robot, block=(1.1, 0.0)), seed=0)
-        np.testing.assert_allclose(sample.block, (1.1, 0.0), atol=1e-9)
+    for backend in (MujocoBackend(robot, sensor_noise=False, things=BLOCK), MockBackend(robot, things=BLOCK)):
+        sample = backend.reset(episode(robot, things={"block": (1.1, 0.0, 0.0)}), seed=0)
+        np.testing.assert_allclose(sample.things["block"], (1.1, 0.0, 0.0), atol=1e-9)
         for _ in range(40):
             sample = backend.step(ahead(robot), 10)
-            if sample.block[0] > 1.5:
+            if sample.things["block"][0] > 1.5:
                 break
-        places.append(sample.block)
+        places.append(sample.things["block"])
     theirs, ours = places
     assert theirs[0] == pytest.approx(ours[0], abs=0.15)
     assert abs(theirs[1]) < 0.1
@@ -84,13 +85,18 @@ def test_a_block_is_pushed_ahead_about_as_the_core_pushes_it(name, episode):
 
 def test_a_block_that_nobody_touches_stays_where_it_is(episode):
     robot = load_robot("turtlebot2")
-    backend = MujocoBackend(robot, sensor_noise=False, block=BLOCK)
-    backend.reset(episode(robot, block=(1.0, 1.0)), seed=0)
+    backend = MujocoBackend(robot, sensor_noise=False, things=BLOCK)
+    backend.reset(episode(robot, things={"block": (1.0, 1.0, 0.0)}), seed=0)
     sample = backend.step(ahead(robot), 100)
-    np.testing.assert_allclose(sample.block, (1.0, 1.0), atol=1e-4)
+    np.testing.assert_allclose(sample.things["block"], (1.0, 1.0, 0.0), atol=1e-4)
 
 
-def test_without_a_block_none_is_reported(episode):
-    robot = load_robot("turtlebot2")
-    assert MujocoBackend(robot).reset(episode(robot), seed=0).block is None
-    assert MockBackend(robot).reset(episode(robot), seed=0).block is None
+def test_what_is_not_pushed_stays_where_the_episode_puts_it_and_what_is_not_declared_is_not_reported(episode):
+    robot, poses = load_robot("turtlebot2"), {"gate": (0.3, 0.0, 1.5), "kept": (9.0, 9.0, 0.0)}
+    for kind in (MujocoBackend, MockBackend):
+        backend = kind(robot, things=(Thing("gate"),))
+        backend.reset(episode(robot, things=poses), seed=0)
+        sample = backend.step(ahead(robot), 400)
+        assert sample.truth.position_in_world[0] > 0.5  # through it
+        assert {name: tuple(pose) for name, pose in sample.things.items()} == {"gate": poses["gate"]}
+        assert not kind(robot).reset(episode(robot), seed=0).things

@@ -106,7 +106,7 @@ def test_commands_that_lie_otherwise_in_memory_have_a_kernel_of_their_own(traced
 def test_a_step_that_changes_the_shape_of_what_moves_is_refused(traced, monkeypatch):
     batch = BatchSimulation(ROBOT, TASK, RANDOMISED, worlds=WORLDS, seed=5)
     monkeypatch.setattr(
-        type(batch.task), "advance", lambda task, goal, truth, time_s: replace(goal, block=goal.block[:, :1])
+        type(batch.task), "advance", lambda task, goal, truth, time_s: replace(goal, done=goal.done[:1])
     )
     with pytest.raises(TypeError, match="a step made"):
         CompiledStep(batch)(batch.command, effort=0.1)

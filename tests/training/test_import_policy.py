@@ -35,7 +35,7 @@ def _states(seed=3):
     rng = np.random.default_rng(seed)
     x, y, yaw, vx, vy, turn = rng.uniform(-2.0, 2.0, (6, WORLDS))
     targets = rng.uniform(-3.0, 3.0, (WORLDS, 4, 3))
-    goal = Goal(targets, np.zeros(WORLDS), no_obstacles(WORLDS), np.zeros((WORLDS, 2)))
+    goal = Goal(targets, np.zeros(WORLDS), no_obstacles(WORLDS))
     return PlanarState(x, y, yaw, 0.2 * vx, 0.2 * vy, 0.2 * turn), goal
 
 

@@ -23,10 +23,9 @@ from fulmar_bringup.run_record import Actuation, GivenGoal, HealthSample, Motion
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.paths import config_names
 from fulmar_core.rotation import rotate
-from fulmar_core.tasks import load_recorded_task
+from fulmar_core.tasks import Task, load_recorded_task
 from fulmar_core.topics import (
     ACTUATORS_STATE,
-    BLOCK,
     COMMAND,
     DIAGNOSTICS,
     GOAL_WIRES,
@@ -40,7 +39,7 @@ from fulmar_core.topics import (
     goal_wires,
 )
 from fulmar_ros.bag_writer import RUN_RECORD
-from fulmar_ros.message_reader import goal_of, obstacles_of
+from fulmar_ros.message_reader import goal_of, obstacles_of, thing_of
 
 Decoded = list[tuple[int, Any]]  # when it was recorded [ns], and the message
 
@@ -116,7 +115,7 @@ class _Reader:
             commanded=_actuation(self._commands()),
             goals=tuple(sorted(self._goals(info.get("task")), key=lambda goal: goal.log_s)),
             obstacles=self._obstacles(),
-            block=_places(self._messages(BLOCK)),
+            things=self._things(info.get("task")),
             controller=next((text for text in reversed(texts) if text), {}),
             health=_health(self._messages(STATUS) + self._messages(DIAGNOSTICS), self._bag.name),
             warnings=tuple(self._warnings),
@@ -162,9 +161,9 @@ class _Reader:
     def _goals(self, task: object) -> list[GivenGoal]:
         """What the controller was told; it hears the topic of its task alone."""
         goals, frames = [], self._bag.frames
-        heard = _goal_wires_of(task, self._bag.path)
+        known = self._task_of(task)
         for wire in (wire for topic in GOAL_WIRES for wire in goal_wires(topic)):
-            if wire not in heard:
+            if known is not None and wire not in goal_wires(known.goal_topic):
                 self._warn_of_others(wire, task)
                 continue
             for log_ns, message in self._messages(wire):
@@ -182,6 +181,29 @@ class _Reader:
                 f"{count} messages of {self._bag.topic_name(wire)} are left out: no goals of the task '{task}'."
             )
 
+    def _task_of(self, name: object) -> Task | None:
+        """The task of the run; None where it is not known here."""
+        try:
+            return load_recorded_task(str(name), self._bag.path)
+        except ConfigError:
+            return None
+
+    def _things(self, task: object) -> dict[str, Places]:
+        """Where the things of the task were; of a task that is not known here, none."""
+        known = self._task_of(task)
+        found = {thing.name: self._places(thing.wire) for thing in (known.things if known else ())}
+        return {name: places for name, places in found.items() if len(places)}
+
+    def _places(self, wire: Wire) -> Places:
+        every = [
+            (stamp_of(message) / NS, thing_of(message, self._bag.frames)[0])
+            for _, message in self._messages(wire)
+        ]
+        read = [(stamp_s, *pose) for stamp_s, pose in every if pose is not None]
+        self._lost(wire, len(every) - len(read), "tell no pose")
+        table = np.array(read).reshape(-1, 4)
+        return Places(table[:, 0], table[:, 1:])
+
     def _obstacles(self) -> np.ndarray:
         """Obstacles of the last message, shape (m, 3)."""
         nothing = np.zeros((0, 3))
@@ -192,14 +214,6 @@ class _Reader:
         if discs is None:
             self._warnings.append(f"the obstacles cannot be used: {problem}.")
         return nothing if discs is None else discs
-
-
-def _goal_wires_of(task: object, bag: Path) -> list[Wire]:
-    """Where goals of a task are published; anywhere, of a task that is not known here."""
-    try:
-        return list(goal_wires(load_recorded_task(str(task), bag).goal_topic))
-    except ConfigError:
-        return [wire for topic in GOAL_WIRES for wire in goal_wires(topic)]
 
 
 def _motion(found: Odometries) -> Motion:
@@ -216,14 +230,6 @@ def _motion(found: Odometries) -> Motion:
 
 def _actuation(found: Vectors) -> Actuation:
     return Actuation(found.stamp_ns / NS, found.log_ns / NS, found.names, found.values)
-
-
-def _places(found: Decoded) -> Places:
-    xy = [(message.pose.position.x, message.pose.position.y) for _, message in found]
-    return Places(
-        stamp_s=np.array([stamp_of(message) / NS for _, message in found]),
-        xy=np.array(xy, dtype=float).reshape(-1, 2),
-    )
 
 
 def _health(found: Decoded, name: str) -> tuple[HealthSample, ...]:

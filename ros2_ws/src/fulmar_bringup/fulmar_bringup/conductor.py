@@ -23,7 +23,7 @@ from fulmar_bringup.node_table import NodeSpec, RunPlan
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import state_words, time_bar
-from fulmar_bringup.run_record import Actuation, Motion, Places, RunRecord
+from fulmar_bringup.run_record import Actuation, Motion, RunRecord
 from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
@@ -325,7 +325,7 @@ def _nothing_recorded(request: RunRequest) -> RunRecord:
         commanded=actuation,
         goals=(),
         obstacles=np.empty((0, 3)),
-        block=Places(none, np.empty((0, 2))),
+        things={},
         controller={},
         health=(),
         warnings=(),

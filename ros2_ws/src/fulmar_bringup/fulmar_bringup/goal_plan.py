@@ -53,7 +53,7 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
     as_path = is_path_of_places(task) and isinstance(file, Positions | Poses)
     fits = goal_sequence(file, robot, as_path=as_path).topic == task.goal_topic
     fits &= not (isinstance(file, Positions) and task.tolerance.heading_deg > 0.0)
-    if not fits or task.sees_obstacles or task.pushes:  # whose surroundings the seed draws
+    if not fits or task.sees_obstacles or task.things:  # whose surroundings the seed draws
         raise ConfigError(
             f"the goals '{goals}' are no goals of task '{task.name}'. "
             f"Leave --task out: they are for '{default_task(goals)}'."

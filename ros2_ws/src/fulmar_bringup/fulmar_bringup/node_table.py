@@ -18,7 +18,6 @@ from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
-    BLOCK,
     CLOCK,
     DEVICE_STATE,
     ESTOP,
@@ -162,7 +161,7 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
             ODOMETRY.name,
             *(wire.name for wire in goal_wires(task.goal_topic)),
             *((OBSTACLES.name,) if task.sees_obstacles else ()),
-            *((BLOCK.name,) if task.pushes else ()),
+            *(thing.wire.name for thing in task.things),
         ),
         outputs=(command_wire(robot).name, STATUS.name, METADATA.name, OBSERVATION.name, ACTION.name),
     )
@@ -241,7 +240,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             outputs=tuple(dict.fromkeys((ACTUATORS_STATE.name, IMU.name, paced_wire(plan).name))),
         )
     parameters |= _motion_capture(plan)
-    block = (BLOCK.name,) if load_task(plan.task).pushes else ()
+    things = tuple(thing.wire.name for thing in load_task(plan.task).things)
     poses = (MOCAP.name,) if plan.guards.estimator or plan.mocap_hz else ()
     odometry = () if plan.guards.estimator else (ODOMETRY.name,)
     return NodeSpec(
@@ -253,7 +252,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         parameters,
         remappings=dict(plan.remappings),
         inputs=(command_wire(load_robot(plan.robot)).name,),
-        outputs=(CLOCK.name, TRUTH.name, ACTUATORS_STATE.name, IMU.name, *odometry, *poses, *block),
+        outputs=(CLOCK.name, TRUTH.name, ACTUATORS_STATE.name, IMU.name, *odometry, *poses, *things),
     )
 
 
@@ -300,6 +299,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         files: As `bag_origin.attachments` gives it.
     """
     texts = {"directory": directory, "run_info": info, "attachments": files}
+    things = load_task(plan.task).things
     usual = asdict(Recording())
     unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
     return NodeSpec(
@@ -308,9 +308,11 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         "recorder_node",
         "fulmar_ros.recorder_node",
         plan.namespace,
-        {key: text for key, text in texts.items() if text} | unusual,
+        {key: text for key, text in texts.items() if text}
+        | unusual
+        | ({"things": [thing.name for thing in things]} if things else {}),
         remappings=dict(plan.remappings),
-        observed=tuple(wire.name for wire in WIRES if wire.recorded),
+        observed=tuple(wire.name for wire in (*WIRES, *(thing.wire for thing in things)) if wire.recorded),
     )
 
 

@@ -332,7 +332,7 @@ def _moved(task: Task, mission: Goal, start: PoseTuple, goal: PoseTuple) -> tupl
         )
     x, y, heading = goal
     target = np.array([[x, y, math.radians(heading)]])
-    if not (mission.obstacles.size or mission.block.any()):
+    if not (mission.obstacles.size or task.things):
         old = mission.current
         start = (x + start[0] - float(old[0]), y + start[1] - float(old[1]), start[2])
     return replace(mission, targets=target), start

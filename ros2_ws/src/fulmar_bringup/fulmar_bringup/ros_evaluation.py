@@ -23,7 +23,6 @@ import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.domains import reserved_domains
-from fulmar_bringup.judged_task import task_of
 from fulmar_bringup.node_table import RunPlan, run_goals_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
@@ -35,6 +34,7 @@ from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.goal import Goal
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
 from fulmar_core.orphans import end_with
+from fulmar_core.path_task import judged_task
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import load_robot
 from fulmar_ros.plant_node import PlantNode
@@ -209,7 +209,8 @@ def _episodes(
     numbers: range,
     progress: Progress,
 ) -> Trajectories:
-    robot, task, scenario = load_robot(plan.robot), task_of(plan), load_scenario(plan.scenario)
+    robot, scenario = load_robot(plan.robot), load_scenario(plan.scenario)
+    task = judged_task(plan.task, episode_s=plan.duration_s, goals=plan.goals)
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
     steps = episode_steps(task, control_dt)
     runs: list[Trajectories] = []
@@ -249,7 +250,7 @@ def _episodes(
         ) -> None:
             assert sample.truth is not None
             truths.append(planar_of(sample.truth))
-            goals.append(judge.see(truths[-1], sample.block))
+            goals.append(judge.see(truths[-1], sample.things))
             commands.append(np.array(command))
 
         with _goal_told(plan, episode, plant, overseer, group, alive):

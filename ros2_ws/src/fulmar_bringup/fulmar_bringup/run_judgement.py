@@ -5,14 +5,14 @@ The rules themselves live in `fulmar_core.metrics`; here a record is only brough
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fulmar_bringup.run_record import Actuation, GivenGoal, Motion, Places, RunRecord
 from fulmar_core.errors import BagError
-from fulmar_core.goal import Goal
+from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targets, episode_metrics, successes
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot, load_robot
@@ -36,7 +36,7 @@ class Judgement:
     time_s: np.ndarray  # (n,) ends of the steps: evenly spaced, simulated time [s]
     samples: np.ndarray  # (n,) index into `record.motion` of each time
     aims: np.ndarray  # (n, 3) target that counted at each time
-    block: np.ndarray  # (n, 2) where the thing to push was, NaN where there is none [m]
+    things: dict[str, np.ndarray]  # (n, 3) where each thing of the task was, of those recorded [m, m, rad]
     run: Trajectories  # one episode of n steps; without a record of the actuators, its shares are NaN
     figures: dict[str, float]  # of `metrics.episode_metrics`; NaN or absent: there is none
     duration_s: float  # [s]
@@ -110,9 +110,9 @@ def judge(record: RunRecord) -> Judgement | None:
     robot = load_robot(_text(record, "robot"))
     time_s, samples = _even(motion)
     states = planar_of(motion.states)
-    block = _block(record.block, motion.stamp_s[samples], states[samples])
+    things = {name: _at(places, motion.stamp_s[samples]) for name, places in record.things.items()}
     newest = _newest(record, task, goals)[samples]
-    goal = _goals_at(task, goals, newest, record.obstacles, states[samples], states[0], block, time_s[0])
+    goal = _goals_at(task, goals, newest, record.obstacles, states[samples], states[0], things, time_s[0])
     # Steps one after another have the shape of episodes side by side.
     log = TrajectoryLog(robot, task, float(time_s[0]))
     log.add(states[samples], goal, _applied(record.actuation, robot, motion.stamp_s[0] + time_s - time_s[0]))
@@ -127,7 +127,7 @@ def judge(record: RunRecord) -> Judgement | None:
         time_s=time_s,
         samples=samples,
         aims=goal.current,
-        block=block if len(record.block) else np.full((len(time_s), 2), np.nan),
+        things=things,
         run=run,
         figures={name: float(values[0]) for name, values in episode_metrics(run, task).items()},
         duration_s=float(motion.stamp_s[-1] - motion.stamp_s[0]),
@@ -205,35 +205,34 @@ def _goals_at(
     obstacles: np.ndarray,
     states: PlanarState,
     first: PlanarState,
-    block: np.ndarray,
+    things: dict[str, np.ndarray],
     dt: float,
 ) -> Goal:
     """The goal that a judge counts at each step: its current target alone, shape (n,)."""
-    count = len(newest)
-    aims, done = np.empty((count, 3)), np.zeros(count)
+    # What no message tells of is taken to be where the robot is.
+    unseen = np.stack((states.x, states.y, states.yaw), axis=-1)
+    things = {thing.name: unseen for thing in task.things} | things
+    counted: list[Goal] = []
     number, before, judge = -1, 0.0, None
     last = first
     for step, which in enumerate(newest):
         if judge is None or which != number:
             if judge is not None:  # what was reached so far counts on; of velocities, one more is over
                 before += float(judge.goal.done) + (task.goal_topic == "goal_velocity")
-            place = np.array([last.x, last.y])
-            judge = Judge(task, Goal(given[which].targets, np.asarray(0.0), obstacles, place), dt)
-            number = which
+            now = {name: pose[step] for name, pose in things.items()}
+            begun = task.begun(Goal(given[which].targets, np.asarray(0.0), obstacles, now), last)
+            judge, number = Judge(task, begun, dt), which
         last = states[step]
-        goal = judge.see(last, block[step])
-        aims[step], done[step] = goal.current, before + goal.done
-    discs = np.broadcast_to(
-        obstacles if len(obstacles) else np.zeros((1, 3)), (count, max(1, len(obstacles)), 3)
-    )
-    return Goal(aims[:, None, :], done, discs, block)
+        goal = judge.see(last, {name: pose[step] for name, pose in things.items()})
+        discs = goal.obstacles if len(goal.obstacles) else np.zeros((1, 3))
+        done = np.asarray(before + goal.done)
+        counted.append(replace(goal, targets=goal.current[None], done=done, obstacles=discs))
+    return stack_goals(counted)
 
 
-def _block(block: Places, stamp_s: np.ndarray, states: PlanarState) -> np.ndarray:
-    """Where the thing to push is at some times, the robot's own place where there is none, shape (n, 2) [m]."""
-    if not len(block):
-        return np.stack((states.x, states.y), axis=-1)
-    return block.xy[np.clip(np.searchsorted(block.stamp_s, stamp_s + 1e-6, side="right") - 1, 0, None)]
+def _at(places: Places, stamp_s: np.ndarray) -> np.ndarray:
+    """Where a thing is at some times, shape (n, 3) [m, m, rad]."""
+    return places.pose[np.clip(np.searchsorted(places.stamp_s, stamp_s + 1e-6, side="right") - 1, 0, None)]
 
 
 def _even(motion: Motion) -> tuple[np.ndarray, np.ndarray]:

@@ -55,10 +55,10 @@ class Actuation:
 
 @dataclass(frozen=True)
 class Places:
-    """Where one thing was over time."""
+    """Where one thing of the task was over time."""
 
     stamp_s: np.ndarray  # (n,) [s]
-    xy: np.ndarray  # (n, 2) in the world [m]
+    pose: np.ndarray  # (n, 3) in the world [m, m, rad]
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -97,7 +97,7 @@ class RunRecord:
     commanded: Actuation  # `actuators/command`; the stamp is that of the observation it answers
     goals: tuple[GivenGoal, ...]
     obstacles: np.ndarray  # (m, 3) x [m], y [m], radius [m]; those given last
-    block: Places  # the thing to push; empty where there is none
+    things: dict[str, Places]  # by name, those that the bag has
     controller: dict[str, Any]  # its metadata
     health: tuple[HealthSample, ...]
     warnings: tuple[str, ...]  # what could not be read

@@ -26,6 +26,7 @@ from fulmar_bringup.system import System
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import namespace_of
+from fulmar_core.tasks import load_task
 from fulmar_core.topics import CLOCK, WIRES, command_wire
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
@@ -122,6 +123,8 @@ def _from_outside(plan: RunPlan) -> set[str]:
         found.add(command_wire(load_robot(plan.robot)).name)
     if plan.hardware:  # motion capture, or another node that knows where the robot is
         found |= {"odom", "mocap/pose"}
+    if plan.hardware and not plan.emulated:  # an emulator sees no things
+        found |= {thing.wire.name for thing in load_task(plan.task).things}
     return found
 
 

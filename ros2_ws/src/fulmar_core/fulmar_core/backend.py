@@ -5,7 +5,7 @@ The same node runs on any backend; only the constructor argument differs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -14,6 +14,7 @@ from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
+from fulmar_core.things import Poses
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class Sample:
     odometry: RigidBodyState | None  # measured, without a batch axis; None: somebody else measures it
     imu: ImuSample | None  # None: the robot has no inertial unit
     truth: RigidBodyState | None  # None: not a simulator
-    block: np.ndarray | None = None  # (2,) where the thing to push is, in the world; None: there is none [m]
+    things: Poses = field(default_factory=dict)  # where the task's things are, each (3,)
     stamp_ns: int | None = None  # when it was captured; None: just now, by the clock of who asked [ns]
     applied: np.ndarray | None = None  # (n,) what the actuators were told; None: the very command
 

@@ -189,6 +189,7 @@ def unknown_inputs(loop: ControlLoop, stamp_ns: int) -> Inputs:
     """Inputs of one robot whose state and goal are not known: NaN."""
     unknown = np.full(1, np.nan)
     state = PlanarState(*(unknown for _ in COLUMNS))
-    goal = Goal(np.full((1, 1, 3), np.nan), np.zeros(1), np.zeros((1, 0, 3)), np.full((1, 2), np.nan))
+    things = {thing.name: np.full((1, 3), np.nan) for thing in loop.task.things}
+    goal = Goal(np.full((1, 1, 3), np.nan), np.zeros(1), np.zeros((1, 0, 3)), things)
     observation = np.full((1, len(loop.observer.names)), np.nan)
     return Inputs(state, goal, observation, loop.previous, None, stamp_ns, loop.dt)

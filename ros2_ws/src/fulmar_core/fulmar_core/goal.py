@@ -1,8 +1,9 @@
-"""What an episode is about: targets in their order, and things that stand about."""
+"""What an episode is about: targets in their order, obstacles, and things of the task's own."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,16 +26,31 @@ class Goal:
     # (..., m, 3 or more) x [m], y [m], radius [m] of discs, and what a task adds to them; m may be 0, a radius of 0 is
     # no obstacle.
     obstacles: Array
-    block: Array  # (..., 2) place that moves: of the thing to push; with gates, of the robot a step ago [m]
+    # Poses (..., 3) x [m], y [m], yaw [rad] in the world by name: of what `Task.things` declares, and of whatever else
+    # a task keeps from step to step.
+    things: Mapping[str, Array] = field(default_factory=dict)
 
     def write(self, index: Any, other: Goal) -> None:
         """Overwrite some worlds of a batch in place."""
-        for name in ("targets", "done", "obstacles", "block"):
-            getattr(self, name)[index] = getattr(other, name)
+        for mine, theirs in zip(self.arrays(), other.arrays(), strict=True):
+            mine[index] = theirs
 
     def __getitem__(self, index: Any) -> Goal:
         """Pick worlds out of a batch."""
-        return Goal(self.targets[index], self.done[index], self.obstacles[index], self.block[index])
+        return self.mapped(lambda array: array[index])
+
+    def arrays(self) -> tuple[Array, ...]:
+        """Every array, things last."""
+        return (self.targets, self.done, self.obstacles, *self.things.values())
+
+    def mapped(self, change: Callable[[Array], Array]) -> Goal:
+        """The goal with every array changed, in the order of `arrays`."""
+        targets, done, obstacles = change(self.targets), change(self.done), change(self.obstacles)
+        return Goal(targets, done, obstacles, {name: change(pose) for name, pose in self.things.items()})
+
+    def among(self, things: Mapping[str, Array]) -> Goal:
+        """The goal with some things where they are now."""
+        return replace(self, things={**self.things, **things}) if things else self
 
     @property
     def current(self) -> Array:
@@ -78,7 +94,6 @@ def goal_at(*targets: tuple[float, float, float], obstacles: np.ndarray | None =
         np.array(targets, dtype=float),
         np.asarray(0.0),
         np.zeros((0, 3)) if obstacles is None else np.asarray(obstacles, dtype=float),
-        np.zeros(2),
     )
 
 
@@ -89,17 +104,18 @@ def goals_at(targets: Array) -> Goal:
         targets: Poses or body velocities as of `Goal`, shape (n, 3).
     """
     zero = array_namespace(targets).zeros_like(targets[:, 0])
-    return Goal(targets[:, None, :], zero, no_obstacles(len(targets)), targets[:, :2] * 0.0)
+    return Goal(targets[:, None, :], zero, no_obstacles(len(targets)))
 
 
 def stack_goals(goals: list[Goal]) -> Goal:
     """Join single goals into a batch along a new first axis."""
-    return Goal(*(np.stack([getattr(g, name) for g in goals]) for name in Goal.__slots__))
+    stacked = map(np.stack, zip(*(goal.arrays() for goal in goals), strict=True))
+    return goals[0].mapped(lambda _: next(stacked))
 
 
 def goal_in_float64(goal: Goal) -> Goal:
     """The same goal as NumPy arrays of float64."""
-    return Goal(*(np.asarray(getattr(goal, name), dtype=float) for name in Goal.__slots__))
+    return goal.mapped(lambda array: np.asarray(array, dtype=float))
 
 
 def offset_to(state: PlanarState, target: Array) -> tuple[Array, Array]:

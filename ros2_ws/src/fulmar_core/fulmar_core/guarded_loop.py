@@ -56,7 +56,7 @@ class GuardedLoop:
 
     Attributes:
         loop: Advances the goal, observes, and limits commands.
-        mission: Goal, obstacles and block.
+        mission: Goal, obstacles and things.
         succession: The controller that acts, and its fallback.
         newest: The newest usable measurement since the activation.
         acted: Control steps with a command of the controller's own since the activation.
@@ -178,10 +178,10 @@ class GuardedLoop:
             self.mission.see_obstacles(discs, stamp_ns)
             self._follow_mission()
 
-    def take_block(self, place: np.ndarray, stamp_ns: int) -> None:
-        """Take the place of the block, shape (2,) [m]."""
+    def take_thing(self, name: str, pose: np.ndarray, stamp_ns: int) -> None:
+        """Take the pose of a thing of the task, shape (3,) [m, m, rad]."""
         with self._lock:
-            self.mission.see_block(place, stamp_ns)
+            self.mission.see_thing(name, pose, stamp_ns)
             self._follow_mission()
 
     def take(self, measurement: Measurement, now_ns: int) -> bool:

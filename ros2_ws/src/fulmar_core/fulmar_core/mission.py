@@ -1,4 +1,4 @@
-"""What one robot was asked to do: goal, obstacles and block, as they were received."""
+"""What one robot was asked to do: goal, obstacles and things, as they were received."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.schedule import Schedule
 
 GOALS_REMEMBERED = 200  # stamps of goals; publishers repeat at most the last 100
-BLOCK_LASTS_NS = 1_000_000_000  # where a block was longer ago, it need not be any more
+THING_LASTS_NS = 1_000_000_000  # where a thing was longer ago, it need not be any more
 
 GoalKey = tuple[int, int]  # stamp [ns] and hash of the targets
 
@@ -41,9 +41,7 @@ class Mission:
         timed = self._task.goal_topic == "goal_velocity"
         self._schedule: Schedule[Goal] | None = Schedule() if timed else None
         self._obstacles: np.ndarray | None = None if self._task.sees_obstacles else np.zeros((0, 3))
-        self._pushes = self._task.pushes is not None
-        self._block: np.ndarray | None = None
-        self._block_stamp_ns = 0
+        self._things: dict[str, tuple[np.ndarray, int]] = {}  # where each was, and when, of those seen [ns]
         self._given: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # since the last drop
         self._void: deque[GoalKey] = deque(maxlen=GOALS_REMEMBERED)  # refused, or dropped
         self.goal_stamp_ns = 0
@@ -54,9 +52,9 @@ class Mission:
     def lacking(self) -> str:
         """What the task needs and has not come; empty if everything is known."""
         parts = {"goal": self._given_goal, "obstacles": self._obstacles}
-        if self._pushes:
-            parts["place of the block"] = self._block
-        return next((name for name, part in parts.items() if part is None), "")
+        unseen = [thing.name for thing in self._task.things if thing.name not in self._things]
+        lacking = [name for name, part in parts.items() if part is None]
+        return next(iter((*lacking, *(f"place of the {name}" for name in unseen))), "")
 
     @property
     def done(self) -> int:
@@ -112,29 +110,30 @@ class Mission:
             self._void.append(_key(goal, stamp_ns))
 
     def turn_to(self, stamp_ns: int) -> None:
-        """Let the goal count that belongs to a time of the plant's clock [ns]; forget a block not seen for long."""
+        """Let the goal count that belongs to a time of the plant's clock [ns]; forget things not seen for long."""
         if self._schedule is not None:
             due = self._schedule.at(stamp_ns)
             if due is not self._given_goal:
                 self._take(due, anew=self._given_goal is None or due is None)
-        if self._pushes and self._block is not None and stamp_ns - self._block_stamp_ns > BLOCK_LASTS_NS:
-            self._block = None
-            self._loop.goal = None
+        for name, (_, seen_ns) in list(self._things.items()):
+            if stamp_ns - seen_ns > THING_LASTS_NS:
+                del self._things[name]
+                self._loop.begin(None)
 
     def see_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
         """Take obstacles, shape (m, 3), instead of those known so far."""
         self._obstacles, self.obstacles_stamp_ns = discs, stamp_ns
         self._refresh()
 
-    def see_block(self, place: np.ndarray, stamp_ns: int) -> None:
-        """Take the place of the block, shape (2,) [m]."""
-        self._block, self._block_stamp_ns = place, stamp_ns
+    def see_thing(self, name: str, pose: np.ndarray, stamp_ns: int) -> None:
+        """Take the pose of a thing, shape (3,) [m, m, rad]."""
+        self._things[name] = pose, stamp_ns
         self._refresh()
 
     def lacks_something_of(self, stamp_ns: int) -> bool:
-        """Whether the block, or a streamed goal, of this stamp is still to come."""
-        block = self._pushes and self._block_stamp_ns != stamp_ns
-        return block or (self._streamed and self.goal_stamp_ns != stamp_ns)
+        """Whether a thing, or a streamed goal, of this stamp is still to come."""
+        seen = sum(seen_ns == stamp_ns for _, seen_ns in self._things.values())
+        return seen < len(self._task.things) or (self._streamed and self.goal_stamp_ns != stamp_ns)
 
     def distance(self, state: PlanarState) -> float:
         """Distance from the current target [m]; 0 where the task has none, infinite before one is known.
@@ -162,21 +161,18 @@ class Mission:
         self._given_goal = goal
         if anew:
             self._loop.begin(None)
-        else:
-            self._loop.goal = None
+        elif self._loop.goal is not None:
+            self._loop.goal = replace(self._loop.goal, done=np.zeros(1))
         self._refresh()
 
     def _refresh(self) -> None:
         """Give the loop its goal among what stands about now, as far along as it has come."""
         goal, obstacles = self._given_goal, self._obstacles
-        block = self._block if self._pushes else np.zeros(2)
-        if goal is None or obstacles is None or block is None:
+        if goal is None or obstacles is None or len(self._things) < len(self._task.things):
             return
-        before = self._loop.goal
-        done = goal.done if before is None else before.done[0]
-        if not self._pushes:
-            block = goal.block if before is None else before.block[0]
-        batched = stack_goals([replace(goal, done=np.asarray(done), obstacles=obstacles, block=block)])
+        before = goal if self._loop.goal is None else self._loop.goal[0]
+        here = {**before.things, **{name: pose for name, (pose, _) in self._things.items()}}
+        batched = stack_goals([replace(goal, done=np.asarray(before.done), obstacles=obstacles, things=here)])
         self._loop.goal = self._task.surveyed(batched, self._loop.robot)
 
 

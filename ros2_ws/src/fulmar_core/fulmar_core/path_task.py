@@ -5,16 +5,19 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
 from fulmar_core.counter_rng import Draws
+from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.goal_files import FollowedPath
+from fulmar_core.goal_files import FollowedPath, load_goals
 from fulmar_core.planar import PlanarState, at_rest, to_body
 from fulmar_core.references.look_ahead import LookAhead
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.track_velocities import TrackVelocities
 
 
@@ -46,7 +49,7 @@ class FollowPath(TrackVelocities):
         places = self.path.points[index.astype(int)]
         state = at_rest(places[:, 0], places[:, 1], yaw)
         targets = np.zeros((len(yaw), 1, 3))
-        goal = Goal(targets, index, no_obstacles(draws.worlds), np.zeros((len(yaw), 2)))
+        goal = Goal(targets, index, no_obstacles(draws.worlds))
         return state, self.advance(goal, state, np.zeros_like(yaw))
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
@@ -62,8 +65,8 @@ class FollowPath(TrackVelocities):
         speed = path.speed / np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
         u, v = to_body(np.asarray(state.yaw), way[..., 0] * speed, way[..., 1] * speed)
         target = np.stack((u, v, np.zeros_like(u)), axis=-1)[..., None, :]
-        targets = np.asarray(target, dtype=goal.targets.dtype)
-        return Goal(targets, passed.astype(goal.targets.dtype), goal.obstacles, goal.block)
+        dtype = goal.targets.dtype
+        return dataclasses.replace(goal, targets=np.asarray(target, dtype=dtype), done=passed.astype(dtype))
 
     def off_path(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Distance to the nearest point of the whole path, shapes (n,) [m]."""
@@ -77,3 +80,28 @@ def path_task(task: TrackVelocities, file: FollowedPath) -> FollowPath:
     """The task of following a path, with the tolerances and the observation of tracking velocities."""
     told = {field.name: getattr(task, field.name) for field in dataclasses.fields(task)}
     return FollowPath(**told, path=file.planner(), lead_s=file.lead_s)
+
+
+def judged_task(name: str, *, episode_s: float = 0.0, goals: str = "") -> Task:
+    """The task that episodes are judged by.
+
+    Args:
+        name: As of `load_task`.
+        episode_s: Length of an episode; 0: the task's own [s].
+        goals: Goal file whose path is followed; empty: none.
+
+    Raises:
+        ConfigError: Unknown name, a goal file that is no path for ever, or a task that tracks no velocities.
+    """
+    task = load_task(name)
+    if episode_s:
+        task = cast(Task, dataclasses.replace(cast(Any, task), episode_s=episode_s))  # all are dataclasses
+    if not goals:
+        return task
+    file = load_goals(goals)
+    if not isinstance(file, FollowedPath) or not isinstance(task, TrackVelocities):
+        raise ConfigError(f"episodes are judged along paths of velocities alone; '{goals}' is none.")
+    try:
+        return path_task(task, file)
+    except ValueError as error:
+        raise ConfigError(f"goals '{goals}': {error}") from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +20,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
+from fulmar_core.things import Poses
 
 SIDE_BY_SIDE = 256  # simulators alive at once
 WORLDS = 2048  # of a batch at once: nearly as fast as more, and their record stays below some 200 MB
@@ -157,8 +157,8 @@ class _Worlds(Protocol):
         ...
 
     @property
-    def block(self) -> Array | None:
-        """Where the things to push are, shape (worlds, 2); None where there are none [m]."""
+    def things(self) -> Poses:
+        """Where the task's things are, each (worlds, 3)."""
         ...
 
     def move(self, command: Array) -> None:
@@ -175,12 +175,11 @@ def _roll_out(
     loop.reset()
     loop.begin(goal_in_float64(goal))
     for number in range(episode_steps(task, loop.dt)):
-        if worlds.block is not None:
-            assert loop.goal is not None
-            loop.goal = replace(loop.goal, block=np.asarray(worlds.block, dtype=float))
+        assert loop.goal is not None
+        loop.goal = goal_in_float64(loop.goal.among(worlds.things))
         step = loop.step(worlds.measured, round(1e9 * number * loop.dt))
         worlds.move(step.command)
-        log.add(worlds.truth, judge.see(worlds.truth, worlds.block), step.command)
+        log.add(worlds.truth, judge.see(worlds.truth, worlds.things), step.command)
         progress((number + 1) * len(goal.done))
     return log.trajectories()
 
@@ -201,5 +200,4 @@ class _Backends:
     def _take(self, samples: list[Sample]) -> None:
         self.measured = stack_planar([planar_of(sample.measured) for sample in samples])
         self.truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])
-        places = [sample.block for sample in samples if sample.block is not None]
-        self.block = np.stack(places) if len(places) == len(samples) else None
+        self.things = {name: np.stack([each.things[name] for each in samples]) for name in samples[0].things}

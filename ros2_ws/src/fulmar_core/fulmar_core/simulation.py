@@ -23,6 +23,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.tasks import Task
+from fulmar_core.things import Poses, push_things
 from fulmar_core.upcoming import Beginning, UpcomingEpisodes
 
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
@@ -160,15 +161,15 @@ class BatchSimulation(Moves):
             command: What its actuators do, within their limits, shape (worlds, n).
         """
         self.truth = PlanarState(*(self._real(getattr(state, name)) for name in COLUMNS))
-        self.goal = Goal(*(self._real(getattr(goal, name)) for name in Goal.__slots__))
+        self.goal = goal.mapped(self._real)
         self.command = self._real(command)
         self._actuation.hold(self._xp.asarray(self.command.T, copy=True))
         self._measure()
 
     @property
-    def block(self) -> Array | None:
-        """Where the things to push are, shape (worlds, 2); None where there are none [m]."""
-        return self.goal.block if self.task.pushes else None
+    def things(self) -> Poses:
+        """Where the task's things are, each (worlds, 3)."""
+        return {thing.name: self.goal.things[thing.name] for thing in self.task.things}
 
     def step(self, command: Array) -> None:
         """Do one control step of a learner: limit and apply its command, and advance the goals by what is measured.
@@ -214,8 +215,9 @@ class BatchSimulation(Moves):
             off_centre=self._off_centre,
         )
         self._steps = self._steps + 1
-        if self.task.pushes:
-            self.goal, self.truth = self.task.pushed(self.goal, before, self.truth, self.robot)
+        if self.task.things:
+            moved, self.truth = push_things(self.task.things, self.things, before, self.truth, self.robot)
+            self.goal = self.goal.among(moved)
         self._measure()
 
     def moving(self) -> dict[str, Any]:
@@ -235,6 +237,8 @@ class BatchSimulation(Moves):
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Go on from a snapshot of a simulation that was built alike."""
+        if snapshot["goal"].things.keys() != self.goal.things.keys():
+            raise ValueError("the snapshot has other things.")
         self.take(copy.deepcopy(snapshot))
         self._upcoming.forget()
 
@@ -257,7 +261,7 @@ class BatchSimulation(Moves):
         )
         return (
             PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS)),
-            Goal(*(self._side_by_side(getattr(drawn.goal, name)) for name in Goal.__slots__)),
+            drawn.goal.mapped(self._side_by_side),
             World(*(self._real(getattr(drawn.world, name)) for name in FIELDS)).packed(),
         )
 

@@ -194,14 +194,21 @@ OBSTACLES = Wire(
     "on demand",
     "cylinders in `odom` to keep off; `scale.x` is the diameter",
 )
-BLOCK = Wire(
-    "block/pose",
-    "geometry_msgs/msg/PoseStamped",
-    "plant",
-    "stream",
-    "with each odometry, where there is a block",
-    "place of the thing to push, stamped as the odometry",
-)
+
+
+def thing_wire(name: str) -> Wire:
+    """Where the pose of a thing of a task's world is published; see `fulmar_core.things`."""
+    return Wire(
+        f"{name}/pose",
+        "geometry_msgs/msg/PoseStamped",
+        "plant",
+        "stream",
+        f"with each odometry, where there is a {name}",
+        f"place of the {name}, stamped as the odometry",
+    )
+
+
+BLOCK = thing_wire("block")
 AIR_BEARING = Wire(
     "air_bearing/state",
     "std_msgs/msg/Bool",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.planar import PlanarState, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.things import Poses
 
 
 @dataclass(frozen=True)
@@ -68,15 +70,8 @@ class TrajectoryLog:
             goal: Goal that the judge counts at that time, same leading shape.
             command: What was applied, shape (n,) or (episodes, n).
         """
-        values = _step_columns(self._robot, self._task, truth, goal)
-        values["shares"] = np.asarray(command) / self._robot.actuators.scale
-        shape = np.shape(truth.x)
-        for name, column in self._columns.items():
-            value = np.asarray(values[name])
-            dtype = bool if value.dtype == bool else np.float32
-            kept = np.empty(value.shape if name == "shares" else shape, dtype)
-            kept[...] = value
-            column.append(kept)
+        for name, kept in self._kept(truth, goal, command):
+            self._columns[name].append(kept)
 
     def add_episode(self, truths: list[PlanarState], goals: list[Goal], commands: list[np.ndarray]) -> None:
         """Note all control steps of one episode at once, which costs little more than one of them.
@@ -88,14 +83,18 @@ class TrajectoryLog:
         """
         each = [goals[0]] if all(goal is goals[0] for goal in goals) else goals
         counted = stack_goals(each)[np.zeros(len(goals), dtype=int)] if len(each) == 1 else stack_goals(each)
-        values = _step_columns(self._robot, self._task, stack_planar(truths), counted)
-        values["shares"] = np.stack(commands) / self._robot.actuators.scale
-        for name, column in self._columns.items():
+        for name, kept in self._kept(stack_planar(truths), counted, np.stack(commands)):
+            self._columns[name].extend(kept)
+
+    def _kept(self, state: PlanarState, goal: Goal, command: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        values = _step_columns(self._robot, self._task, state, goal)
+        values["shares"] = np.asarray(command) / self._robot.actuators.scale
+        for name in COLUMNS:
             value = np.asarray(values[name])
-            dtype = bool if value.dtype == bool else np.float32
-            kept = np.empty(value.shape if name == "shares" else (len(truths),), dtype)
+            shape = value.shape if name == "shares" else np.shape(state.x)
+            kept = np.empty(shape, bool if value.dtype == bool else np.float32)
             kept[...] = value
-            column.extend(kept)
+            yield name, kept
 
     def trajectories(self) -> Trajectories:
         """Everything noted so far; the log is empty afterwards."""
@@ -136,17 +135,16 @@ class Judge:
         self._task, self._dt, self._steps = task.judged, control_dt, 0
         self.goal = goal
 
-    def see(self, truth: PlanarState, block: np.ndarray | None = None) -> Goal:
+    def see(self, truth: PlanarState, things: Poses | None = None) -> Goal:
         """The goal after one more control step, by the true state at its end.
 
         Args:
             truth: True state.
-            block: Where the thing to push is by now, shape (..., 2), for tasks that have one [m].
+            things: Where the task's things are by now, of the same leading shape.
         """
         self._steps += 1
-        if block is not None and self._task.pushes:
-            self.goal = dataclasses.replace(self.goal, block=block)
-        self.goal = self._task.counted(self.goal, truth, np.asarray(self._steps * self._dt))
+        time_s = np.asarray(self._steps * self._dt)
+        self.goal = self._task.counted(self.goal.among(things or {}), truth, time_s)
         return self.goal
 
 

@@ -34,7 +34,7 @@ from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.message_reader import block_of, goal_of, obstacles_of, stamp_ns
+from fulmar_ros.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
 from fulmar_ros.node_robot import own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap
@@ -84,7 +84,7 @@ class ControllerNode(LifecycleNode):
         self._frames = own_frames(self, self.robot)
         self._read_odometry, self._read_applied = OdometryReader(self._frames), VectorReader(self._names)
         self._late: Measurement | None = (
-            None  # waits in lock step for the block or the goal of the same stamp
+            None  # waits in lock step for the things or the goal of the same stamp
         )
         self._pause_ns = self.settings.pause_ns(self.robot)
         self._applied = AppliedHistory(self.settings.hold_ns(self.robot))
@@ -120,7 +120,7 @@ class ControllerNode(LifecycleNode):
             on_odometry=self._on_odometry,
             on_goal=self._on_goal,
             on_obstacles=self._on_obstacles,
-            on_block=self._on_block,
+            on_thing=self._on_thing,
             on_estop=self._on_estop,
             on_estop_released=self._on_estop_released,
             on_swap=self._on_swap,
@@ -231,12 +231,12 @@ class ControllerNode(LifecycleNode):
         self._guarded.take_obstacles(discs, stamp)
         self._tell_status()
 
-    def _on_block(self, message: PoseStamped) -> None:
-        place, problem = block_of(message, self._frames)
-        if place is None:
-            self.get_logger().warning(f"place of the block refused: {problem}")
+    def _on_thing(self, name: str, message: PoseStamped) -> None:
+        pose, problem = thing_of(message, self._frames)
+        if pose is None:
+            self.get_logger().warning(f"place of the {name} refused: {problem}")
             return
-        self._guarded.take_block(place, stamp_ns(message.header.stamp))
+        self._guarded.take_thing(name, pose, stamp_ns(message.header.stamp))
         self._go_on()
 
     def _on_applied(self, data: bytes) -> None:

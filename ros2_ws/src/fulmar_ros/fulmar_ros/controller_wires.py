@@ -23,7 +23,6 @@ from fulmar_core.topics import (
     ACTUATORS_HEALTH,
     ACTUATORS_STATE,
     AIR_BEARING,
-    BLOCK,
     DIAGNOSTICS,
     ESTOP,
     ESTOP_RELEASED,
@@ -62,7 +61,7 @@ class ControllerWires:
         on_odometry: Callable[[bytes], None],
         on_goal: Callable[[GoalMessage], None],
         on_obstacles: Callable[[MarkerArray], None],
-        on_block: Callable[[PoseStamped], None],
+        on_thing: Callable[[str, PoseStamped], None],
         on_estop: Callable[[Bool], None],
         on_estop_released: Callable[[String], None],
         on_swap: Callable[[String], None],
@@ -80,7 +79,7 @@ class ControllerWires:
             on_odometry: Receives every odometry message, serialised.
             on_goal: Told every goal.
             on_obstacles: Told all obstacles whenever they change.
-            on_block: Told where the block is.
+            on_thing: Told the name of a thing and where it is.
             on_estop: Told whether the e-stop is pressed.
             on_estop_released: Called after each reset of the e-stop.
             on_swap: Told which policy shall go on.
@@ -143,12 +142,10 @@ class ControllerWires:
             self._subscriptions += subscribe_operator(node, MarkerArray, OBSTACLES, on_obstacles)
             reliably.append(OBSTACLES)
         self.subscribed = {ODOMETRY: lockstep, **dict.fromkeys(reliably, True)}  # and whether reliably
-        if task.pushes:
-            self._subscriptions.append(
-                node.create_subscription(
-                    PoseStamped, BLOCK.name, on_block, subscriber_qos(BLOCK, reliable=lockstep)
-                )
-            )
+        for thing in task.things:
+            stream = subscriber_qos(thing.wire, reliable=lockstep)
+            told = partial(on_thing, thing.name)
+            self._subscriptions.append(node.create_subscription(PoseStamped, thing.wire.name, told, stream))
 
     def _command_writer(self) -> TwistWriter | VectorWriter:
         return TwistWriter(self._frames) if self._by_velocity else VectorWriter(self._actuators.names)

@@ -78,23 +78,23 @@ def goal_of(message: Any, frames: Frames = PLAIN) -> tuple[Goal | None, str]:
             return None, f"goal has {len(poses)} waypoints, must have 1 to {MOST_WAYPOINTS}"
         targets = []
         for pose in poses:
-            target, problem = _target(getattr(pose, "pose", pose))  # stamped in a path, not in an array
+            target, problem = _planar(getattr(pose, "pose", pose))  # stamped in a path, not in an array
             if target is None:
-                return None, problem
+                return None, f"goal {problem}"
             targets.append(target)
     if not np.isfinite(targets).all():
         return None, "goal holds a value that is not finite"
     return goal_at(*targets), ""
 
 
-def _target(pose: Any) -> tuple[tuple[float, float, float] | None, str]:
+def _planar(pose: Any) -> tuple[tuple[float, float, float] | None, str]:
     p, q = pose.position, pose.orientation
     quat = np.array([q.x, q.y, q.z, q.w])
     if not (np.isfinite(quat).all() and np.isfinite((p.x, p.y, p.z)).all()):
-        return None, "goal holds a value that is not finite"
+        return None, "holds a value that is not finite"
     norm = math.sqrt(float(quat @ quat))
     if abs(norm - 1.0) > 0.01:
-        return None, f"goal quaternion has norm {norm:.3f}, must be 1"
+        return None, f"quaternion has norm {norm:.3f}, must be 1"
     return (p.x, p.y, float(yaw_of(quat / norm))), ""
 
 
@@ -121,9 +121,9 @@ def obstacles_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | Non
     return found, ""
 
 
-def block_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
-    """Where a message says that the block is, shape (2,) [m], or None and why it says nothing; as `goal_of`."""
-    place = message.pose.position
-    if frames.plain(message.header.frame_id) != FRAME or not np.isfinite((place.x, place.y)).all():
-        return None, "it must be finite and in 'odom'"
-    return np.array([place.x, place.y]), ""
+def thing_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
+    """Where a message says that a thing is, shape (3,) [m, m, rad], or None and why it says nothing; as `goal_of`."""
+    if frames.plain(message.header.frame_id) != FRAME:
+        return None, f"frame is '{shortened(message.header.frame_id)}', must be '{FRAME}'"
+    pose, problem = _planar(message.pose)
+    return None if pose is None else np.array(pose), problem

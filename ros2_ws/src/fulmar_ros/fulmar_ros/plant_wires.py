@@ -18,6 +18,7 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
+from fulmar_core.planar import at_rest, rigid_of
 from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
@@ -25,7 +26,6 @@ from fulmar_core.safety.input_gate import BACK_NS
 from fulmar_core.state import RigidBodyState
 from fulmar_core.topics import (
     ACTUATORS_STATE,
-    BLOCK,
     CLOCK,
     ESTOP,
     ESTOP_RELEASED,
@@ -37,6 +37,7 @@ from fulmar_core.topics import (
     TRUTH,
     VELOCITY_COMMAND,
     command_wire,
+    thing_wire,
 )
 from fulmar_ros.command_writers import writers_of
 from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
@@ -118,7 +119,9 @@ class PlantWires:
         self._write_imu = ImuWriter(robot, frames)
         self._write_state = VectorWriter(robot.actuators.names)
         self._node = node
-        self._block: Publisher | None = None
+        self._things: dict[
+            str, Publisher
+        ] = {}  # most robots are alone, so that each is made when it is there
         wire = command_wire(robot)
         # By the clock the newest command counts. A reliable reader would hold it back while one that a network lost is
         # asked for again, which takes seconds.
@@ -156,8 +159,8 @@ class PlantWires:
             node.destroy_publisher(publisher)
 
     def _publishers(self) -> list[Publisher]:
-        made = (self._odometry, self._poses, self._imu, self._state, self._truth, self._clock, self._block)
-        return [publisher for publisher in made if publisher is not None]
+        made = (self._odometry, self._poses, self._imu, self._state, self._truth, self._clock)
+        return [*(publisher for publisher in made if publisher is not None), *self._things.values()]
 
     def subscribers(self) -> int:
         """Matched subscriptions of the odometry, of the poses in its place, or of the actuators' state."""
@@ -177,8 +180,8 @@ class PlantWires:
             time_ns = self._captured_ns = sample.stamp_ns
         with self.lock:
             self._sent.note(time_ns, time.monotonic_ns())
-        if sample.block is not None:
-            self._publish_block(sample.block, time_ns)
+        for name, pose in sample.things.items():
+            self._publish_thing(name, pose, time_ns)
         if self._odometry is not None and sample.odometry is not None:
             self._publish(self._odometry, self._write_odometry.raw(sample.odometry, time_ns))
         if resend:
@@ -198,15 +201,11 @@ class PlantWires:
         if self._poses is not None:
             self._publish(self._poses, self._write_pose.write(state, stamp))
 
-    def _publish_block(self, place: np.ndarray, time_ns: int) -> None:
-        """Say where the block is; most robots push none, so that the endpoint is made when one is there."""
-        if self._block is None:
-            self._block = self._node.create_publisher(PoseStamped, BLOCK.name, self._qos(BLOCK))
-        message = PoseStamped()
-        message.header.frame_id, message.header.stamp = self._frames.odom, stamp_of(time_ns)
-        message.pose.position.x, message.pose.position.y = float(place[0]), float(place[1])
-        message.pose.orientation.w = 1.0
-        self._publish(self._block, message)
+    def _publish_thing(self, name: str, pose: np.ndarray, time_ns: int) -> None:
+        if name not in self._things:
+            wire = thing_wire(name)
+            self._things[name] = self._node.create_publisher(PoseStamped, wire.name, self._qos(wire))
+        self._publish(self._things[name], self._write_pose.write(rigid_of(at_rest(*pose)), time_ns))
 
     def publish_truth(self, sample: Sample, time_ns: int) -> None:
         """Publish where the robot really is, if the backend knows and somebody listens."""

@@ -15,7 +15,7 @@ from rclpy.subscription import Subscription
 
 from fulmar_core.errors import BagError
 from fulmar_core.exit_codes import DONE, FAILED
-from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire
+from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire, thing_wire
 from fulmar_ros.bag_per_goal import BagPerGoal
 from fulmar_ros.bag_ring import BagRing
 from fulmar_ros.bag_thread import BagThread
@@ -51,7 +51,8 @@ class RecorderNode(Node):
         self._robot = self.get_namespace().strip("/") or "robot"
         self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
         self._run_info, self._attachments = settings.run(), settings.files()
-        found = {wire: _message_class(wire) for wire in WIRES if wire.recorded}
+        wires = dict.fromkeys((*WIRES, *(thing_wire(name) for name in settings.things if name)))
+        found = {wire: _message_class(wire) for wire in wires if wire.recorded}
         classes = {wire: kind for wire, kind in found.items() if kind is not None}
         # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
         self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}

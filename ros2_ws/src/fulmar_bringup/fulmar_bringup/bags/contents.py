@@ -171,7 +171,7 @@ def _space_of(topic: Topic) -> str:
 
 def is_of_wire(topic: str, wire: Wire) -> bool:
     """Whether the name of a topic, under any robot, is that of a wire, and of no other with a longer name."""
-    ends = [other.name for other in WIRES if f"/{topic}".endswith(f"/{other.name.lstrip('/')}")]
+    ends = [other.name for other in (*WIRES, wire) if f"/{topic}".endswith(f"/{other.name.lstrip('/')}")]
     return bool(ends) and max(ends, key=len) == wire.name
 
 

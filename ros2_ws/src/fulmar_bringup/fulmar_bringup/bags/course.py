@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,14 +34,14 @@ from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
     AIR_BEARING,
-    BLOCK,
     OBSERVATION,
     OBSTACLES,
     VELOCITY_COMMAND,
+    Wire,
     command_wire,
     goal_wires,
 )
-from fulmar_ros.message_reader import goal_of, obstacles_of
+from fulmar_ros.message_reader import goal_of, obstacles_of, thing_of
 
 NS = 1_000_000_000
 
@@ -63,7 +65,7 @@ class Course:
     sample: np.ndarray  # (n,) index into the odometry, ABSENT where it is not in the bag
     goals: tuple[Told, ...]
     obstacles: tuple[Told, ...]
-    blocks: tuple[Told, ...]
+    things: dict[str, tuple[Told, ...]]  # poses of the things of the task, by name
     presses: tuple[Told, ...]  # of the e-stop, see `presses_of`
     bearing: tuple[Told, ...]  # the air bearing: true is on; empty where nothing is recorded of one
     applied: Vectors  # what the actuators did from each stamp on; empty where that is not recorded
@@ -181,11 +183,8 @@ def course_of(
         odometry=seen,
         sample=_first_of(seen.stamp_ns, stamp_ns),
         goals=_goals(bag, the_task, goal, int(log_ns[0]), warnings),
-        obstacles=_obstacles(bag, warnings),
-        blocks=tuple(
-            Told(log, stamp_of(m), np.array([m.pose.position.x, m.pose.position.y]), index)
-            for index, (log, m) in enumerate(messages(bag.of(BLOCK)))
-        ),
+        obstacles=_told(bag, OBSTACLES, obstacles_of, warnings),
+        things={thing.name: _told(bag, thing.wire, thing_of, warnings) for thing in the_task.things},
         presses=presses_of(bag),
         bearing=tuple(
             Told(log, 0, bool(m.data), index) for index, (log, m) in enumerate(messages(bag.of(AIR_BEARING)))
@@ -322,14 +321,7 @@ def _first_of(stamps: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 def _goals(
     bag: Bag, task: Task, asked: PoseTuple | None, begin_ns: int, warnings: list[str]
 ) -> tuple[Told, ...]:
-    found, frames = [], bag.frames
-    for wire in goal_wires(task.goal_topic):
-        for index, (log, message) in enumerate(messages(bag.of(wire))):
-            goal, problem = goal_of(message, frames)
-            if goal is None:
-                warnings.append(f"a message of {wire.name} was left out: {problem}.")
-                continue
-            found.append(Told(log, stamp_of(message), goal, index))
+    found = [told for wire in goal_wires(task.goal_topic) for told in _told(bag, wire, goal_of, warnings)]
     found.sort(key=lambda each: each.log_ns)
     if asked is not None:
         found = [Told(begin_ns, 0, _goal(asked))]
@@ -340,15 +332,18 @@ def _goal(pose: PoseTuple) -> Goal:
     return goal_at((pose[0], pose[1], float(np.deg2rad(pose[2]))))
 
 
-def _obstacles(bag: Bag, warnings: list[str]) -> tuple[Told, ...]:
-    found, frames = [], bag.frames
-    for index, (log, message) in enumerate(messages(bag.of(OBSTACLES))):
-        discs, problem = obstacles_of(message, frames)
-        if discs is None:
-            warnings.append(f"a message of {OBSTACLES.name} was left out: {problem}.")
+def _told(
+    bag: Bag, wire: Wire, read: Callable[[Any, Frames], tuple[Any, str]], warnings: list[str]
+) -> tuple[Told, ...]:
+    """What the messages of a wire say, without those that `read` finds a problem with."""
+    found = []
+    for index, (log, message) in enumerate(messages(bag.of(wire))):
+        what, problem = read(message, bag.frames)
+        if problem:
+            warnings.append(f"a message of {wire.name} was left out: {problem}.")
             continue
-        stamp = stamp_of(message.markers[0]) if message.markers else 0
-        found.append(Told(log, stamp, discs, index))
+        stamped = message.markers[:1] if wire is OBSTACLES else [message]
+        found.append(Told(log, stamp_of(stamped[0]) if stamped else 0, what, index))
     return tuple(found)
 
 

@@ -34,7 +34,6 @@ from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
     AIR_BEARING,
-    BLOCK,
     GOAL_POSES,
     GOAL_WIRES,
     METADATA,
@@ -186,7 +185,10 @@ class _Wires:
         self.odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
         self.goal = node.create_publisher(TYPES[goal.name], goal.name, publisher_qos(goal))
         self.obstacles = node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
-        self.block = node.create_publisher(PoseStamped, BLOCK.name, publisher_qos(BLOCK))
+        self.things = {
+            thing.wire.name: node.create_publisher(PoseStamped, thing.wire.name, publisher_qos(thing.wire))
+            for thing in course.task.things
+        }
         self.bearing = node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
         self.applied = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
         wire = command_wire(course.robot)
@@ -255,9 +257,9 @@ def _feed(
     wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
     time.sleep(SETTLE_S)
     wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].what)))
-    told = {
-        name: course.before(getattr(course, name)) for name in ("goals", "obstacles", "blocks", "bearing")
-    }
+    every = {name: getattr(course, name) for name in ("goals", "obstacles", "bearing")}
+    every |= {thing.wire.name: course.things[thing.name] for thing in course.task.things}
+    told = {name: course.before(each) for name, each in every.items()}
     applied_at = np.searchsorted(
         course.applied.stamp_ns, course.stamp_ns
     )  # the first state of each step or after it
@@ -319,8 +321,8 @@ def _raw_messages(bag: Bag, course: Course, odometry: str | None) -> dict[str, l
         "odometry": bag.odometry(odometry).data,
         "goals": bag.of(GOAL_WIRES[course.task.goal_topic]).data,
         "obstacles": bag.of(OBSTACLES).data,
-        "blocks": bag.of(BLOCK).data,
         "bearing": bag.of(AIR_BEARING).data,
+        **{thing.wire.name: bag.of(thing.wire).data for thing in course.task.things},
     }
 
 
@@ -339,7 +341,7 @@ def _tell(
         "bearing": wires.bearing,
         "obstacles": wires.obstacles,
         "goals": wires.goal,
-        "blocks": wires.block,
+        **wires.things,
     }
     echoes = {"obstacles": "obstacles_stamp_ns", "goals": "goal_stamp_ns"}
     for name, publisher in publishers.items():

@@ -18,9 +18,9 @@ from fulmar_bringup.bags.verdict import judge_answers
 from fulmar_bringup.domains import own_domain
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot
+from fulmar_core.tasks import Task, load_task
 from fulmar_core.topics import (
     ACTION,
-    BLOCK,
     COMMAND,
     GOAL_WIRES,
     METADATA,
@@ -28,24 +28,13 @@ from fulmar_core.topics import (
     OBSTACLES,
     ODOMETRY,
     VELOCITY_COMMAND,
-    WIRES,
 )
 
 STEPS = 100  # control steps of each
 SEED = 11
 LARGEST = 200_000  # bytes of the MCAP file
-KEPT = (
-    ODOMETRY,
-    COMMAND,
-    VELOCITY_COMMAND,
-    OBSERVATION,
-    ACTION,
-    METADATA,
-    OBSTACLES,
-    BLOCK,
-    *GOAL_WIRES.values(),
-)
 STEPPED = (ODOMETRY, COMMAND, VELOCITY_COMMAND)
+KEPT = (*STEPPED, OBSERVATION, ACTION, METADATA, OBSTACLES, *GOAL_WIRES.values())
 # What a machine and a moment leave in a record, and what therefore stays out of one that is kept.
 OF_THE_MACHINE = ("policy", "command", "git_revision", "fulmar_version", "goals", "path")
 # Another processor adds float32 sums of a network in another order, and rounds a sine otherwise in the last bit.
@@ -123,7 +112,7 @@ def record_reference(reference: Reference, folder: Path) -> Path:
         if outcome.failure:
             raise RunFailed(f"reference '{reference.name}': {outcome.failure}")
         new = Path(scratch) / "kept" / reference.name
-        _write_kept(open_bag(recorded), new)
+        _write_kept(open_bag(recorded), new, load_task(reference.task))
         first = first_difference(check_reference(new))
         if first is not None:
             raise RunFailed(
@@ -137,15 +126,15 @@ def record_reference(reference: Reference, folder: Path) -> Path:
     return target
 
 
-def _write_kept(bag: Bag, folder: Path) -> None:
+def _write_kept(bag: Bag, folder: Path, task: Task) -> None:
     from fulmar_ros.bag_writer import BagWriter
 
     info = {key: value for key, value in (bag.info or {}).items() if key not in OF_THE_MACHINE}
     writer = BagWriter(folder, run_info=info)
-    delivery = {wire.name: wire.delivery for wire in WIRES}
-    topics = [(wire, bag.of(wire)) for wire in KEPT if len(bag.of(wire))]
+    kept = (*KEPT, *(thing.wire for thing in task.things))
+    topics = [(wire, bag.of(wire)) for wire in kept if len(bag.of(wire))]
     for wire, topic in topics:
-        writer.add_topic(topic.name, topic.type, delivery[wire.name])
+        writer.add_topic(topic.name, topic.type, wire.delivery)
     # A machine that was slow to start refuses its first odometry as too old: a reference begins where it is believed.
     begin_ns = min(_stamps(bag.of(OBSERVATION)), default=0)
     every = sorted(

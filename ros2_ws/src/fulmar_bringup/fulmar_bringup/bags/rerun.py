@@ -142,14 +142,16 @@ class _Rerun:
         acted, reasons = np.zeros(count, dtype=bool), [""] * count
         goals = course.before(course.goals)
         bearing = course.before(course.bearing)
-        obstacles, blocks = course.before(course.obstacles), course.before(course.blocks)
+        obstacles = course.before(course.obstacles)
+        things = {name: course.before(poses) for name, poses in course.things.items()}
         changes = course.before(course.changes) if self._load else {}
         guard.loop.controller.reset()
         for step in range(count):
             for told in obstacles.get(step, ()):
                 guard.take_obstacles(told.what, told.stamp_ns)
-            for told in blocks.get(step, ()):
-                guard.take_block(told.what, told.stamp_ns)
+            for name, poses in things.items():
+                for told in poses.get(step, ()):
+                    guard.take_thing(name, told.what, told.stamp_ns)
             for told in bearing.get(step, ()):
                 guard.take_bearing(bool(told.what))
             for told in goals.get(step, ()):

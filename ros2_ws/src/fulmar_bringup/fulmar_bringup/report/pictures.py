@@ -76,8 +76,8 @@ def _trajectory(runs: Sequence[View]) -> Picture:
     Circles show the robot's outline along the way; the stroke inside points where it is heading."""
     if any(len(run.record.obstacles) for run in runs):
         caption += " Grey discs are obstacles."
-    if any(not np.isnan(judgement.block).all() for _, judgement in judged(runs)):
-        caption += " The dashed line is the way of the block, the square its end."
+    for name in dict.fromkeys(name for _, judgement in judged(runs) for name in judgement.things):
+        caption += f" The dashed line is the way of the {name}, the square its end."
     if any(len(judgement.path) for _, judgement in judged(runs)):
         caption += " The dashed line is the path that was to be followed."
     if counting(runs):

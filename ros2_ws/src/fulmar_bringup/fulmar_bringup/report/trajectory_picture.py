@@ -33,9 +33,9 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
             _word(axes, "start", xy[0], radius, va="bottom")
             for x, y, disc in run.record.obstacles:
                 axes.add_patch(Circle((x, y), disc, facecolor=FAINT, alpha=0.55, linewidth=0, zorder=3))
-        if not np.isnan(judgement.block).all():
-            axes.plot(*judgement.block.T, color=run.colour, linestyle=DASHED, linewidth=1.2, zorder=4)
-            axes.plot(*judgement.block[-1], "s", color=run.colour, markersize=5, zorder=6)
+        for x, y, _ in (pose.T for pose in judgement.things.values()):
+            axes.plot(x, y, color=run.colour, linestyle=DASHED, linewidth=1.2, zorder=4)
+            axes.plot(x[-1], y[-1], "s", color=run.colour, markersize=5, zorder=6)
         if order == 0 and len(judgement.path):
             axes.plot(*judgement.path.T, color=INK, linestyle=DASHED, linewidth=0.8, zorder=3)
         if judgement.counts:
@@ -59,8 +59,8 @@ def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
         tolerance_cm = 100.0 * judgement.task.tolerance.position
         half_cm = CLOSE_UP * tolerance_cm
         places = run.record.motion.position[judgement.samples, :2]
-        if not np.isnan(judgement.block).all():
-            places = judgement.block  # what shall be at the goal
+        if judgement.task.subject in judgement.things:
+            places = judgement.things[judgement.task.subject][:, :2]
         x, y = 100.0 * (places - judgement.targets[-1, :2]).T
         late = judgement.time_s >= judgement.window_start_s
         axes.plot(x, y, color=run.colour, linewidth=1.0, alpha=0.35)

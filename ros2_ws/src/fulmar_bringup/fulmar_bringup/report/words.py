@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from fulmar_bringup.report.view import View
-from fulmar_core.tasks import Task
 
 Row = tuple[str, str, list[str]]  # what, an explanation, and the cell of each run
 
@@ -41,7 +40,7 @@ def verdict(run: View) -> tuple[str, str]:
             f"and the turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, "
             "changes of the target included."
         )
-    what, error = _what(judgement.task), _length(run.summary["final_position_error_m"])
+    what, error = f"the {judgement.task.subject}", _length(run.summary["final_position_error_m"])
     if run.summary["final_heading_error_deg"] is not None:
         error += f" and {_value(run.summary['final_heading_error_deg'], '°', 1)}"
     if judgement.success:
@@ -74,15 +73,10 @@ def rule(runs: Sequence[View]) -> str:
                     f"within {tolerance.yaw_rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
                 )
             return (
-                f"A run counts as reached if {_what(task)} stays within {100 * tolerance.position:g} cm"
+                f"A run counts as reached if the {task.subject} stays within {100 * tolerance.position:g} cm"
                 f"{heading} of the goal for all of the last {tolerance.hold_s:g} s."
             )
     return ""
-
-
-def _what(task: Task) -> str:
-    """What shall be at the goal."""
-    return "the block" if task.pushes else "the robot"
 
 
 def table(runs: Sequence[View]) -> list[Row]:

@@ -11,11 +11,8 @@ from fulmar_core.goal import offset_to
 from fulmar_core.planar import to_body, wrapped
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.obstacles import FAR, SIGHT
-from fulmar_core.tasks.passing import PassingTask
-from fulmar_core.tasks.track_velocities import TrackVelocities
 from fulmar_core.tasks.ways import TOUCHING
 
 Vector = tuple[np.ndarray, np.ndarray]  # ahead and to the left, shapes (n,) [m]
@@ -49,9 +46,8 @@ class BodyFrame:
 
     def __init__(self, robot: Robot, task: Task) -> None:
         """Look at what the task asks for."""
-        self.tracks = isinstance(task, TrackVelocities)
-        self.passes = isinstance(task, PassingTask)
-        self.heads = isinstance(task, GoToPose) or (isinstance(task, PassingTask) and task.heads)
+        self.tracks, self.passes = task.goal_topic == "goal_velocity", task.goal_topic == "goal_path"
+        self.heads = task.goal_topic == "goal_pose" or bool(getattr(task, "heads", False))
         self._around = task if isinstance(task, GoToPositionWithObstacles) else None
         self._clearance = self._around.obstacles.clearance(robot) if self._around else 0.0
 

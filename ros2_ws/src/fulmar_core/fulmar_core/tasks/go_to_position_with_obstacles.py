@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from fulmar_core.arrays import array_namespace, clip
@@ -65,12 +65,11 @@ class GoToPositionWithObstacles(Task):
         """Draw starts, goals and obstacles; see `Task.draw`."""
         start, goal = self._plain.draw(draws, robot, training=training)
         discs = self.obstacles.draw(draws, robot, start, goal.current)
-        return start, self.surveyed(Goal(goal.targets, goal.done, discs, goal.block), robot)
+        return start, self.surveyed(replace(goal, obstacles=discs), robot)
 
     def surveyed(self, goal: Goal, robot: Robot) -> Goal:
         """A batch of goals, as NumPy, whose obstacles are just discs, with the ways around them for a robot."""
-        discs = self.obstacles.survey(goal.obstacles, goal.current, robot)
-        return Goal(goal.targets, goal.done, discs, goal.block)
+        return replace(goal, obstacles=self.obstacles.survey(goal.obstacles, goal.current, robot))
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `Task.observe`."""

@@ -8,6 +8,7 @@ leaves out is as there.
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -24,18 +25,12 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance
+from fulmar_core.things import Thing
 from fulmar_core.topics import GOAL_WIRES
 
 METHODS = ("draw", "observe", "reward", "errors")
 ATTRIBUTES = ("episode_s", "tolerance", "goal_topic", "observation_names")
-SHIPPED_ONLY = (
-    "pushes",
-    "pushed",
-    "step_s",
-    "judged",
-    "fitted",
-    "surveyed",
-)  # members that own tasks cannot have
+SHIPPED_ONLY = ("step_s", "judged", "fitted", "surveyed")  # members that own tasks cannot have
 ROLE = "task"  # in messages
 TRIED = 3  # episodes that `check` draws
 
@@ -67,12 +62,14 @@ def load_own_task(path: str) -> OwnTask:
                 f"{ROLE} '{path}': has '{name}', which only shipped tasks can have. Leave it out."
             )
     names, required = own.observation_names, getattr(own, "required", None)
+    things = getattr(own, "things", ())
     for right, name, must in (
         (
             _is_number(own.episode_s) and own.episode_s > 0.0,
             "episode_s",
             "a number of seconds, greater than 0",
         ),
+        (_are_things(things), "things", "a tuple of fulmar_core.things.Thing, no name twice"),
         (isinstance(own.tolerance, Tolerance), "tolerance", "a fulmar_core.tasks.terms.Tolerance"),
         (_are_names(names), "observation_names", "a tuple of names, none of them twice"),
         (
@@ -99,6 +96,7 @@ def load_own_task(path: str) -> OwnTask:
         own=own,
         required=None if required is None else int(required),
         sees_obstacles=bool(getattr(own, "sees_obstacles", False)),
+        things=tuple(things),
     )
 
 
@@ -120,6 +118,7 @@ class OwnTask(Task):
     own: Any
     required: int | None = None
     sees_obstacles: bool = False
+    things: tuple[Thing, ...] = ()
 
     @property
     def source(self) -> Path:
@@ -263,13 +262,19 @@ class OwnTask(Task):
         if not isinstance(found, Goal):
             raise self._wrong(member, f"returned {_kind(found)}, it must be a Goal")
         lead = tuple(np.shape(state.x))
-        for name, tail in (
-            ("targets", (None, 3)),
-            ("done", ()),
-            ("obstacles", (None, None)),
-            ("block", (2,)),
+        if not isinstance(found.things, Mapping):
+            raise self._wrong(
+                member, f"returned a Goal whose things are {_kind(found.things)}, not a mapping"
+            )
+        for thing in self.things:
+            if thing.name not in found.things:
+                raise self._wrong(member, f"returned a Goal without the pose of {thing.name} in its things")
+        for name, value, tail in (
+            ("targets", found.targets, (None, 3)),
+            ("done", found.done, ()),
+            ("obstacles", found.obstacles, (None, None)),
+            *((f"things['{name}']", pose, (3,)) for name, pose in found.things.items()),
         ):
-            value = getattr(found, name)
             shape, must = tuple(np.shape(value)), (*lead, *tail)
             if len(shape) != len(must) or any(
                 want not in (None, size) for size, want in zip(shape, must, strict=True)
@@ -294,6 +299,12 @@ def _are_names(value: Any) -> bool:
     if not isinstance(value, tuple | list) or not value:
         return False
     return all(isinstance(name, str) and name for name in value) and len(set(value)) == len(value)
+
+
+def _are_things(value: Any) -> bool:
+    if not isinstance(value, tuple | list) or not all(isinstance(thing, Thing) for thing in value):
+        return False
+    return len({thing.name for thing in value}) == len(value)
 
 
 def _kind(value: Any) -> str:

@@ -104,6 +104,10 @@ class PassingTask(Task):
         reach = self.tolerance.position - _SURE * robot.sensors.odometry.position.std
         return replace(self, reach=max(self.reach, reach))
 
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """See `Task.farthest_start`."""
+        return "start_distance", self.start_distance[1]
+
     @abstractmethod
     def places(self, draws: Draws) -> np.ndarray:
         """Draw where the targets are, shape (worlds, k, 2) [m]."""
@@ -119,7 +123,7 @@ class PassingTask(Task):
         x, y = places[:, 0, 0] + distance * np.cos(bearing), places[:, 0, 1] + distance * np.sin(bearing)
         targets = np.concatenate((places, heading[..., None]), axis=-1)
         n = draws.worlds
-        return at_rest(x, y, yaw), Goal(targets, np.zeros(n), no_obstacles(n), np.zeros((n, 2)))
+        return at_rest(x, y, yaw), Goal(targets, np.zeros(n), no_obstacles(n))
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `Task.observe`."""
@@ -155,7 +159,7 @@ class PassingTask(Task):
 
     def _after(self, goal: Goal, state: PlanarState, reached: Array) -> Goal:
         done = goal.done + array_namespace(goal.done).astype(reached, goal.done.dtype)
-        return Goal(goal.targets, done, goal.obstacles, goal.block)
+        return replace(goal, done=done)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -11,16 +12,18 @@ import numpy as np
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.dynamics.outline import outline_of
-from fulmar_core.dynamics.pushing import Block, push
-from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.dynamics.pushing import Block
+from fulmar_core.goal import Goal, no_obstacles, offset_to
 from fulmar_core.planar import PlanarState, at_rest, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.passing import toward
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
+from fulmar_core.things import Thing
 
 Range = tuple[float, float]
+BLOCK = "block"  # name of the thing
 APART = 0.05  # least gap between robot and block at the start [m]
 ROOM = 0.5  # span of starts for robots too large for the usual one [m]
 
@@ -79,10 +82,15 @@ class PushBlock(Task):
                     f"distances must be [low, high] with 0 <= low <= high, found [{low}, {high}]."
                 )
 
-    @property
-    def pushes(self) -> Block:
+    @functools.cached_property
+    def things(self) -> tuple[Thing, ...]:
         """The block."""
-        return self.block
+        return (Thing(BLOCK, self.block),)
+
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """As of `Task`: the block's and the robot's distances add up."""
+        name = "training_block_distance" if training else "block_distance"
+        return f"{name}' + 'start_distance", getattr(self, name)[1] + self.start_distance[1]
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw where robot and block start, and where the block belongs; see `Task.draw`."""
@@ -100,11 +108,12 @@ class PushBlock(Task):
             block[:, 0] + away * np.cos(angles[:, 1]), block[:, 1] + away * np.sin(angles[:, 1]), angles[:, 2]
         )
         targets = np.concatenate((place, np.zeros((n, 1))), axis=-1)[:, None, :]
-        return start, Goal(targets, np.zeros(n), no_obstacles(n), block)
+        pose = np.concatenate((block, np.zeros((n, 1))), axis=-1)
+        return start, Goal(targets, np.zeros(n), no_obstacles(n), {BLOCK: pose})
 
     def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `Task.observe`."""
-        block_x, block_y, block_distance = toward(state, goal.block)
+        block_x, block_y, block_distance = toward(state, goal.things[BLOCK])
         place_x, place_y, _ = toward(state, goal.current)
         dx, dy, distance = self._way(goal)
         divisor = clip(distance, self.fine_distance, None)
@@ -122,13 +131,6 @@ class PushBlock(Task):
             block_x * fine_x + block_y * fine_y,
             block_x * fine_y - block_y * fine_x,
         )
-
-    def pushed(
-        self, goal: Goal, before: PlanarState, after: PlanarState, robot: Robot
-    ) -> tuple[Goal, PlanarState]:
-        """Where the block is after a step, and what pushing left of the robot's speed; see `Task`."""
-        x, y, slowed = push(before, after, goal.block[..., 0], goal.block[..., 1], self.block, robot)
-        return replace(goal, block=array_namespace(x).stack((x, y), axis=-1)), slowed
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step: how the robot moved, and how the block did; see `Task.reward`."""
@@ -160,14 +162,14 @@ class PushBlock(Task):
 
     def _way(self, goal: Goal) -> tuple[Array, Array, Array]:
         """From the block to its place in the world, and how far that is [m]."""
-        target = goal.current
-        dx, dy = target[..., 0] - goal.block[..., 0], target[..., 1] - goal.block[..., 1]
+        target, block = goal.current, goal.things[BLOCK]
+        dx, dy = target[..., 0] - block[..., 0], target[..., 1] - block[..., 1]
         return dx, dy, array_namespace(dx).sqrt(dx * dx + dy * dy)
 
     def _stance(self, state: PlanarState, goal: Goal) -> tuple[Array, Array]:
         """Distance of the robot from the block [m], and 1 behind it, -1 in front of it, 0 where it is at its place."""
         xp = array_namespace(state.x)
-        bx, by = goal.block[..., 0] - state.x, goal.block[..., 1] - state.y
+        bx, by = offset_to(state, goal.things[BLOCK])
         b = xp.sqrt(bx * bx + by * by)
         dx, dy, d = self._way(goal)
         size = clip(b, 1e-3, None) * clip(d, self.fine_distance, None)

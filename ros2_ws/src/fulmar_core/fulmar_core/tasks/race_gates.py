@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from fulmar_core.tasks.passing import PassingTask, WaypointReward, bearing_of, n
 from fulmar_core.tasks.race_track import RaceTrack
 from fulmar_core.tasks.terms import Errors, pose_errors
 
+LAST = "robot_a_step_ago"  # pose that a goal keeps
 JUMP = 1.0  # who moves farther than this in one step was carried, or the goal is new [m]
 ENTRY = 1.0  # where to turn who is behind a gate: so far in front of it [m]
 
@@ -58,12 +59,13 @@ class RaceGates(PassingTask):
         return start, self.begun(goal, start)
 
     def begun(self, goal: Goal, state: PlanarState) -> Goal:
-        """The goal with the place from which the next step leads; see `Task`."""
-        return replace(goal, block=array_namespace(state.x).stack((state.x, state.y), axis=-1))
+        """The goal with the pose from which the next step leads; see `Task`."""
+        return goal.among({LAST: array_namespace(state.x).stack((state.x, state.y, state.yaw), axis=-1)})
 
     def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
         """Whether the current gate is passed in its direction; see `PassingTask.reached`."""
-        return crossings(goal.block[..., 0], goal.block[..., 1], state, goal.current, radius)[0]
+        last = goal.things[LAST]
+        return crossings(last[..., 0], last[..., 1], state, goal.current, radius)[0]
 
     def _after(self, goal: Goal, state: PlanarState, reached: Array) -> Goal:
         return self.begun(super()._after(goal, state, reached), state)

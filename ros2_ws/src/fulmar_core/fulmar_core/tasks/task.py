@@ -6,12 +6,12 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Self
 
 from fulmar_core.counter_rng import Draws
-from fulmar_core.dynamics.pushing import Block
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.terms import Errors, Tolerance, pose_errors
+from fulmar_core.things import Thing
 
 
 class Task(ABC):
@@ -52,9 +52,19 @@ class Task(ABC):
         return False
 
     @property
-    def pushes(self) -> Block | None:
-        """The block that has to get to the goal; None where the robot itself has to."""
-        return None
+    def things(self) -> tuple[Thing, ...]:
+        """What stands or moves in its world: every goal has the pose of each in `Goal.things`."""
+        return ()
+
+    @property
+    def subject(self) -> str:
+        """Name of what has to get to the goal: a thing that is pushed, or the robot."""
+        return next((thing.name for thing in self.things if thing.body is not None), "robot")
+
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """Key in its file and largest distance of a start from the first target; 0 where nothing limits it [m]."""
+        start, name = getattr(self, "start", None), "training_distance" if training else "distance"
+        return ("", 0.0) if start is None else (f"start.{name}", getattr(start, name)[1])
 
     @property
     def step_s(self) -> float | None:
@@ -115,15 +125,6 @@ class Task(ABC):
     def counted(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
         """As `advance`, for evaluations: a target counts within the tolerance."""
         return self.advance(goal, state, time_s)
-
-    def pushed(
-        self, goal: Goal, before: PlanarState, after: PlanarState, robot: Robot
-    ) -> tuple[Goal, PlanarState]:
-        """Where the block is after a step in the core's batch, and the robot once the block has held it up.
-
-        Simulators with contacts move the block themselves.
-        """
-        return goal, after
 
     def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
         """Whether a state touches something it must not, shape (...,); None where nothing stands about."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from fulmar_core.arrays import array_namespace, clip
@@ -76,9 +76,7 @@ class TrackVelocities(Task):
             rate = self.turning if can.lateral_speed > 0.0 else 0.0  # others would have to turn with it
             targets = self._turned(targets, draws.uniform(-rate, rate, count))
         zero = xp.zeros_like(yaw)
-        return at_rest(zero, zero, yaw), Goal(
-            targets, zero, no_obstacles(draws.worlds), targets[:, 0, :2] * 0.0
-        )
+        return at_rest(zero, zero, yaw), Goal(targets, zero, no_obstacles(draws.worlds))
 
     def _turned(self, targets: Array, rates: Array) -> Array:
         """Targets at every `STEP_S`, which turn at some rates [rad/s] while they hold, shape (worlds, steps, 3)."""
@@ -108,7 +106,7 @@ class TrackVelocities(Task):
         done = xp.floor((time_s + 1e-6) / self.step_s)
         last = goal.targets.shape[-2] - 1
         done = xp.astype(clip(done, 0.0, float(last)), goal.done.dtype)
-        return Goal(goal.targets, xp.zeros_like(goal.done) + done, goal.obstacles, goal.block)
+        return replace(goal, done=xp.zeros_like(goal.done) + done)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""
