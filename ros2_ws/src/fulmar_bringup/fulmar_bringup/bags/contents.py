@@ -83,7 +83,7 @@ class Bag:
 
     @property
     def robot(self) -> str:
-        """Name of the robot, empty where the bag does not say."""
+        """Type of the robot, empty where the bag does not say."""
         return str((self.info or {}).get("robot") or "")
 
     @property
