@@ -43,6 +43,7 @@ def run_policy(ros_domain: RosDomain, folder: Path, task: str, *more: str) -> Pa
     return folder / "bag"
 
 
+@pytest.mark.slow
 def test_the_estimate_that_a_policy_uses_of_its_valves_is_in_the_bag_of_its_run(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -36,6 +36,7 @@ def test_valves_stay_closed_until_the_bearing_is_on_and_close_when_it_goes_off(
         until(lambda: neighbour.commands[-1].any())
 
 
+@pytest.mark.slow
 def test_in_lock_step_a_late_bearing_is_waited_for_and_the_bag_runs_again_the_same(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -31,6 +31,7 @@ class Lacks:
 """
 
 
+@pytest.mark.slow
 def test_the_controller_of_the_page_reaches_its_goal_in_run_evaluation_and_rerun(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -46,6 +46,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         yield tmp_path
 
 
+@pytest.mark.slow
 def test_the_task_of_the_page_is_done_in_run_evaluation_and_rerun(
     ros_domain: RosDomain, folder: Path
 ) -> None:
@@ -76,6 +77,7 @@ def test_the_task_of_the_page_is_done_in_run_evaluation_and_rerun(
     assert "Reached" in (folder / "bag" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_thing_of_its_own_comes_over_the_wires_into_observation_bag_rerun_and_report(
     ros_domain: RosDomain, folder: Path
 ) -> None:

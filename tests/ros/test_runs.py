@@ -155,6 +155,7 @@ def test_a_realtime_run_holds_its_rate_and_records_every_wire(ros_domain: RosDom
     assert record.controller["sha256"]
 
 
+@pytest.mark.slow
 def test_evaluation_through_ros_agrees_with_mujoco_alone(ros_domain: RosDomain, tmp_path: Path) -> None:
     """The same episodes, the same simulator, the same law: ROS in between must not change the verdict."""
     asked = (

@@ -154,6 +154,7 @@ def environments():
     ]
 
 
+@pytest.mark.slow
 def test_a_learner_sees_the_same_and_pays_what_effort_costs_now(environments, never_traced_again):
     plain, compiled = environments
     for env in environments:
