@@ -24,7 +24,9 @@ def test_runs_of_two_names_share_a_domain_and_one_name_is_refused_in_one_line(mo
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
         with claimed_domain("alpha"), claimed_domain("beta") as shared:
             assert shared == domain
-            with pytest.raises(ConfigError, match=r"another `fulmar run` is using .* for 'beta', .* another --name"):
+            with pytest.raises(
+                ConfigError, match=r"another `fulmar run` is using .* for 'beta', .* another --name"
+            ):
                 claimed_domain("beta").__enter__()
 
 
