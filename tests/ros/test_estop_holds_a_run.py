@@ -26,6 +26,7 @@ FAR = ("--start", "3,0,0", "--goal", "0,0,0", "--duration", "60", "--rate", "3")
 def test_a_run_goes_on_after_an_e_stop_its_reset_and_a_new_goal(
     neighbour: Neighbour, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
+    neighbour.withdraw_command()  # a plant obeys no two nodes
     run = start_fulmar(
         "run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--estop", *FAR, "--record", "bag",
         "--json", env=ros_domain.env, cwd=tmp_path,
