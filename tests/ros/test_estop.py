@@ -268,6 +268,7 @@ def test_an_e_stop_node_that_hangs_keeps_neither_its_robot_nor_another_from_bein
         for node in nodes:
             node.send_signal(signal.SIGSTOP)
         done = fulmar("estop", "--json", env=ros_domain.env, cwd=tmp_path)
+        assert done.stdout.startswith("{"), done
         said = {answer["robot"]: answer for answer in json.loads(done.stdout)["robots"]}
         assert said["floating_platform"]["done"], said
         assert "no e-stop node answers" in said["floating_platform"]["said"]
