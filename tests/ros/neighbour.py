@@ -38,6 +38,13 @@ NAMESPACE = f"/{ROBOT}"
 AHEAD = 4.0  # where the neighbour's goals are [m]
 
 
+class Said(dict[str, tuple[str, dict[str, str]]]):
+    """The newest words and values of each node's status; of one that has said nothing yet, nothing."""
+
+    def __missing__(self, node: str) -> tuple[str, dict[str, str]]:
+        return "", {}
+
+
 class Neighbour:
     """Another node: publishes by hand, and keeps what it hears."""
 
@@ -47,7 +54,7 @@ class Neighbour:
         self._goals = 0
         self.applied: list[np.ndarray] = []
         self.commands: list[np.ndarray] = []
-        self.said: dict[str, tuple[str, dict[str, str]]] = {}
+        self.said = Said()
         listen, many = self.node.create_subscription, {"reliable": True, "depth": 50}
         listen(
             JointState,

@@ -201,7 +201,7 @@ def test_silence_closes_the_valves_and_the_state_shows_it(rig: Rig) -> None:
     until(lambda: not rig.device[-1].any())
     assert time.monotonic() - silent < 0.2 + 0.02 + 0.15
     until(lambda: not rig.neighbour.applied[-1].any())
-    until(lambda: rig.neighbour.said.get("plant", ("", {}))[1].get("air_bearing") == "on")
+    until(lambda: rig.neighbour.said["plant"][1].get("air_bearing") == "on")
 
 
 @pytest.mark.slow
