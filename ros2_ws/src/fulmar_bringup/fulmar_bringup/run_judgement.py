@@ -209,7 +209,7 @@ def _goals_at(
     dt: float,
 ) -> Goal:
     """The goal that a judge counts at each step: its current target alone, shape (n,)."""
-    # What no message tells of is taken to be where the robot is.
+    # A thing without a message counts as being where the robot is.
     unseen = np.stack((states.x, states.y, states.yaw), axis=-1)
     things = {thing.name: unseen for thing in task.things} | things
     counted: list[Goal] = []

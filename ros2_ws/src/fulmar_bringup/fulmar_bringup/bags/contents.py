@@ -98,7 +98,7 @@ class Bag:
 
     @property
     def frames(self) -> Frames:
-        """Frames that messages may be in, with their prefix or without; by the only odometry where nobody says."""
+        """Frames of the messages, with the robot's prefix; the only odometry names it where the run record does not."""
         spaces = {space for topic in self.topics.values() if (space := _space_of(topic))}
         name = self.name or (spaces.pop() if len(spaces) == 1 else "")
         return Frames(f"{name}/") if name else PLAIN
