@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 import signal
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from fulmar_bringup.domains import reserved_domains
+from fulmar_cli import main as command_line
+from tests.fulmar_cli.bag_commands import POLICY
+from tests.synthetic_run import CALM, Plan, write_run
 
 
 @dataclass(frozen=True)
@@ -66,3 +72,53 @@ def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosDomain]:
         for name, value in own.items():
             monkeypatch.setenv(name, value)
         yield RosDomain(number, {**os.environ, **own})
+
+
+@pytest.fixture(scope="session")
+def reached(tmp_path_factory) -> Path:
+    """A run that reached its goal."""
+    return write_run(tmp_path_factory.mktemp("runs") / "reached", Plan())
+
+
+@pytest.fixture(scope="session")
+def calm(tmp_path_factory) -> Path:
+    """The same way with other gains, under the name of a policy."""
+    return write_run(tmp_path_factory.mktemp("runs") / "calm", Plan(controller="policy", weights=CALM))
+
+
+@pytest.fixture(scope="session")
+def silenced(tmp_path_factory) -> Path:
+    """A run whose controller fell silent and did not come back."""
+    return write_run(
+        tmp_path_factory.mktemp("runs") / "silenced", Plan(duration_s=15.0, silence_s=(8.0, 15.1))
+    )
+
+
+@pytest.fixture
+def copy_of(tmp_path) -> Callable[[Path], Path]:
+    """Copies of bags, to be damaged."""
+
+    def copy(bag: Path) -> Path:
+        return Path(shutil.copytree(bag, tmp_path / bag.name))
+
+    return copy
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    """A copy of a reference bag, to be changed or damaged."""
+    return Path(shutil.copytree(POLICY, tmp_path / "bag"))
+
+
+@pytest.fixture
+def fulmar(monkeypatch, capsys):
+    """Run a command line in this process: exit code, standard output, standard error."""
+
+    def call(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fulmar", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            command_line.main()
+        captured = capsys.readouterr()
+        return int(ended.value.code or 0), captured.out, captured.err
+
+    return call

@@ -11,9 +11,20 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = ["fulmar_bringup", "fulmar_core", "fulmar_ros", "hardware_drivers", "policy_server", "sim_nodes"]
+PACKAGES = [
+    "fulmar_bags",
+    "fulmar_benchmarks",
+    "fulmar_bringup",
+    "fulmar_cli",
+    "fulmar_core",
+    "fulmar_evaluation",
+    "fulmar_ros",
+    "hardware_drivers",
+    "policy_server",
+    "sim_nodes",
+]
 PROGRAMS = {
-    "fulmar_bringup/fulmar": "fulmar_bringup.cli",
+    "fulmar_cli/fulmar": "fulmar_cli.main",
     "fulmar_ros/estimator_node": "fulmar_ros.estimator_node",
     "fulmar_ros/estop_node": "fulmar_ros.estop_node",
     "fulmar_ros/goal_node": "fulmar_ros.goal_node",
@@ -77,7 +88,7 @@ def workspace(repository, tmp_path_factory):
 def built(workspace):
     result = workspace.colcon("build", "--base-paths", "src")
     assert result.returncode == 0, result.stdout + result.stderr
-    assert "6 packages finished" in result.stdout
+    assert f"{len(PACKAGES)} packages finished" in result.stdout
     return workspace
 
 
@@ -90,19 +101,18 @@ def files_below(folder):
     }
 
 
-def test_colcon_finds_six_ament_python_packages(workspace):
+def test_colcon_finds_ament_python_packages(workspace):
     lines = workspace.colcon("list", "--base-paths", "src").stdout.splitlines()
     found = {line.split("\t")[0]: line.split("\t")[2] for line in lines}
     assert found == dict.fromkeys(PACKAGES, "(ros.ament_python)")
 
 
-def test_bringup_is_built_after_everything_it_starts(workspace):
+def test_packages_are_built_from_the_core_to_the_command_line(workspace):
     order = workspace.colcon(
         "list", "--base-paths", "src", "--names-only", "--topological-order"
     ).stdout.split()
-    assert order[0] == "fulmar_core"
-    assert order[1] == "fulmar_ros"
-    assert order[-1] == "fulmar_bringup"
+    assert order[:3] == ["fulmar_core", "fulmar_bags", "fulmar_ros"]
+    assert order[-4:] == ["fulmar_bringup", "fulmar_evaluation", "fulmar_benchmarks", "fulmar_cli"]
 
 
 @pytest.mark.parametrize("name", PACKAGES)
@@ -164,6 +174,6 @@ def test_every_program_finds_its_installed_main(built, program, module):
 
 
 def test_the_installed_command_line_answers(built):
-    result = built.sourced("fulmar_bringup/lib/fulmar_bringup/fulmar --help")
+    result = built.sourced("fulmar_cli/lib/fulmar_cli/fulmar --help")
     assert result.returncode == 0, result.stderr
     assert re.search(r"usage", result.stdout, re.IGNORECASE)

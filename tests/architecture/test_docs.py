@@ -14,7 +14,7 @@ import pytest
 import typer.main
 from typer.testing import CliRunner
 
-from fulmar_bringup.cli import app
+from fulmar_cli.main import app
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = {path.stem: path for path in sorted(DOCS.glob("*.md"))}

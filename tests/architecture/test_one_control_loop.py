@@ -16,7 +16,7 @@ WRITTEN = {
     f"{CORE}/observation.py": "what the step observes with",
     f"{CORE}/simulation.py": "the batch that learners step",
     f"{CORE}/learning_step.py": "a step of a learner",
-    "ros2_ws/src/fulmar_bringup/fulmar_bringup/benchmark/throughput.py": "measures that one",
+    "ros2_ws/src/fulmar_benchmarks/fulmar_benchmarks/throughput.py": "measures that one",
     "policy_server/policy.py": "inputs of a network beside its observation",
     "policy_server/own_controller.py": "a user's class behind the interface of controllers",
     f"{CORE}/tasks/go_to_position_with_obstacles.py": "a part of what its task observes",

@@ -8,7 +8,7 @@ import shlex
 import pytest
 import typer.main
 
-from fulmar_bringup.cli import app
+from fulmar_cli.main import app
 from fulmar_core.topics import WIRES
 
 COMMAND = re.compile(r"^(fulmar .*)$", re.MULTILINE)

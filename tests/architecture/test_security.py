@@ -25,8 +25,11 @@ from policy_server.shipped import policies_directory
 
 ON_THE_ROBOT = (
     "ros2_ws/src/fulmar_core/fulmar_core",
+    "ros2_ws/src/fulmar_bags/fulmar_bags",
     "ros2_ws/src/fulmar_ros/fulmar_ros",
     "ros2_ws/src/fulmar_bringup/fulmar_bringup",
+    "ros2_ws/src/fulmar_evaluation/fulmar_evaluation",
+    "ros2_ws/src/fulmar_cli/fulmar_cli",
     "policy_server",
     "hardware_drivers",
     "sim_nodes",

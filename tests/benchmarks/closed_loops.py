@@ -145,7 +145,7 @@ def _run(case: Case, seed: int, campaign: Campaign, free: queue.SimpleQueue[int]
 
 def _output(case: Case, seed: int, seconds: float, domain: int, record: Path) -> tuple[str, str]:
     """What the command prints: its JSON object; and what is to be said where that is missing."""
-    run = [sys.executable, "-m", "fulmar_bringup.cli", "run", case.robot, "--task", case.task]
+    run = [sys.executable, "-m", "fulmar_cli.main", "run", case.robot, "--task", case.task]
     run += ["--seed", str(seed), "--duration", str(seconds), "--record", str(record), "--json"]
     with case.prepared(seed) as command:
         try:

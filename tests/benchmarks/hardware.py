@@ -11,9 +11,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
+from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
 from hardware_drivers.settings import MavlinkBoat, load_hardware
@@ -101,8 +101,8 @@ def hardware(
 
     fulmar benchmark hardware --hardware turtlebot2 --episodes 8 --seconds 25
     """
-    from fulmar_bringup.extras import require
     from fulmar_bringup.system import modules_of
+    from fulmar_cli.extras import require
     from tests.benchmarks.closed_loops import Campaign, measure
 
     cases = cases_of([name.strip() for name in only.split(",")] if only else None)

@@ -10,13 +10,13 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import output, print_json
-from fulmar_bringup.faults.two_hosts import ACROSS, Quality, two_hosts
 from fulmar_bringup.progress import work_bar
+from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import ConfigError
 from fulmar_core.exit_codes import FAILED
+from fulmar_evaluation.faults.two_hosts import ACROSS, Quality, two_hosts
 from tests.benchmarks.closed_loops import Command
 
 
@@ -76,9 +76,9 @@ def network(
 
     fulmar benchmark network --episodes 4 --seconds 20
     """
-    from fulmar_bringup.extras import require
-    from fulmar_bringup.faults.two_hosts import Quality, why_not
     from fulmar_bringup.system import modules_of
+    from fulmar_cli.extras import require
+    from fulmar_evaluation.faults.two_hosts import Quality, why_not
     from tests.benchmarks.closed_loops import Campaign, measure
 
     if why_not():

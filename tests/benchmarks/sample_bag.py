@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bags.message_types import type_store
+from fulmar_bags.writer import BagWriter
 from fulmar_core.robot import Robot
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.rotation import rotate_inverse
 from fulmar_core.state import RigidBodyState
 from fulmar_core.topics import ACTUATORS_STATE, ODOMETRY, Wire
-from fulmar_ros.bag_types import type_store
-from fulmar_ros.bag_writer import BagWriter
 
 NS = 1_000_000_000
 

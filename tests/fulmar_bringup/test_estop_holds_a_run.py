@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
-from fulmar_bringup import conductor
-from fulmar_bringup.bag_reader import read_run
-from fulmar_bringup.commands.run import verdict
+from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import HealthSample
+from fulmar_bringup import run_executor
 from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.run_record import HealthSample
-from fulmar_bringup.run_summary import summarise
 from fulmar_bringup.supervisor import Report
+from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import RunFailed
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
+from fulmar_evaluation.run_summary import summarise
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mock", 5.0)
 PRESSED = "e-stop: pressed. Reset it: fulmar estop --reset: actuators in their safe state"
@@ -42,9 +42,9 @@ def said(level: str, message: str, mode: str = "running") -> Report:
 
 
 def wait_for_end(monkeypatch: pytest.MonkeyPatch, *plants: Report, end_on_estop: bool = False) -> None:
-    monkeypatch.setattr(conductor, "raise_if_ended", lambda _group: None)
+    monkeypatch.setattr(run_executor, "raise_if_ended", lambda _group: None)
     group = SimpleNamespace()
-    conductor._wait_for_end(PLAN, Overseer(*plants), group, lambda *_: None, end_on_estop=end_on_estop)
+    run_executor._wait_for_end(PLAN, Overseer(*plants), group, lambda *_: None, end_on_estop=end_on_estop)
 
 
 def test_an_e_stop_holds_the_run_until_its_time_is_over(monkeypatch):

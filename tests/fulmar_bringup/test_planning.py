@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.conductor import conduct
 from fulmar_bringup.node_table import plant_spec
 from fulmar_bringup.planning import plan_run
+from fulmar_bringup.run_executor import execute
 from fulmar_core.bundle_signature import make_keys, sign_bundle
 from fulmar_core.errors import BundleError, ConfigError, DeviceError, UnknownNameError
 from fulmar_core.paths import config_directory
@@ -190,9 +190,11 @@ def test_a_run_without_its_device_starts_nothing_and_says_what_is_missing(plan, 
         backend="hardware",
         hardware=str(path),
     )
-    monkeypatch.setattr("fulmar_bringup.conductor.ProcessGroup", lambda: pytest.fail("a process is started"))
+    monkeypatch.setattr(
+        "fulmar_bringup.run_executor.ProcessGroup", lambda: pytest.fail("a process is started")
+    )
     with pytest.raises(DeviceError, match="/dev/ttyNONE: there is no such serial port"):
-        conduct(plan(**more, goal=(1.0, 0.0, 0.0)))
+        execute(plan(**more, goal=(1.0, 0.0, 0.0)))
 
 
 def test_a_boat_is_armed_by_its_file_or_by_the_command_line(plan, tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 from fulmar_bringup.progress import live_line
+from fulmar_bringup.run_executor import Execution
 from fulmar_bringup.standing_system import Ending, keep_up, plan_system
 from fulmar_bringup.system import varied_system
 from fulmar_core.errors import ConfigError, UnknownNameError
@@ -62,7 +63,7 @@ def test_velocities_get_no_bag_for_each_goal(plan):
     ],
 )
 def test_a_system_that_is_stopped_has_not_failed(reason, failure, monkeypatch):
-    monkeypatch.setattr("fulmar_bringup.standing_system.run_nodes", lambda *_: (reason, 0))
+    monkeypatch.setattr("fulmar_bringup.standing_system.run_nodes", lambda *_: Execution(reason, 0))
     assert keep_up(None, None, None) == Ending(failure, None)
 
 

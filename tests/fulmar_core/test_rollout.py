@@ -186,7 +186,7 @@ def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
 
 
 def test_judging_works_where_training_is_not_installed(monkeypatch):
-    from fulmar_bringup.cli import app
+    from fulmar_cli.main import app
 
     for name in [name for name in sys.modules if name.split(".")[0] == "training"]:
         monkeypatch.delitem(sys.modules, name)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from fulmar_bags.message_types import type_store
 from fulmar_core.topics import DIAGNOSTICS, ESTOP, ODOMETRY, STATUS
-from fulmar_ros.bag_types import type_store
 from fulmar_ros.fault_signs import fault_finder
 
 TOPICS = {

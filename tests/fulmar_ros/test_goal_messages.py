@@ -10,10 +10,7 @@ from geometry_msgs.msg import PoseArray
 from nav_msgs.msg import Odometry
 from visualization_msgs.msg import Marker, MarkerArray
 
-from fulmar_core.goal import goal_at
-from fulmar_core.robot_name import frames_of
-from fulmar_ros.goal_messages import goal_message, obstacles_message
-from fulmar_ros.message_reader import (
+from fulmar_bags.message_reader import (
     MOST_OBSTACLES,
     MOST_WAYPOINTS,
     goal_of,
@@ -21,6 +18,9 @@ from fulmar_ros.message_reader import (
     obstacles_of,
     stamp_ns,
 )
+from fulmar_core.goal import goal_at
+from fulmar_core.robot_name import frames_of
+from fulmar_ros.goal_messages import goal_message, obstacles_message
 
 NAN = float("nan")
 COURSE = ((1.0, -2.0, 0.5), (0.0, 3.0, -3.0), (4.0, 4.0, 0.0))

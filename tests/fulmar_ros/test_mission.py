@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from fulmar_bags.message_reader import obstacles_of
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
@@ -17,7 +18,6 @@ from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.goal_messages import obstacles_message
-from fulmar_ros.message_reader import obstacles_of
 
 S = 1_000_000_000
 ROBOT = load_robot("turtlebot2")

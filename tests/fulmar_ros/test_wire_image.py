@@ -9,11 +9,11 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
+from fulmar_bags.message_reader import measurement_of
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import frames_of
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.convert import OdometryWriter, TwistWriter, VectorWriter
-from fulmar_ros.message_reader import measurement_of
 from fulmar_ros.wire_image import LATEST_NS, WireImage
 from fulmar_ros.wire_readers import OdometryReader, TwistReader, VectorReader
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_bringup.bags.comparison import first_difference
-from fulmar_bringup.bags.reference import LARGEST, REFERENCES, check_reference
+from fulmar_bags.comparison import first_difference
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.input_gate import InputGate
 from fulmar_core.tasks.go_to_pose import GoToPose
+from fulmar_evaluation.rerun.reference_bags import LARGEST, REFERENCES, check_reference
 from policy_server.policy import Policy
 
 BAGS = Path(__file__).parent / "bags"
@@ -86,7 +86,7 @@ def test_a_changed_safety_decision_is_told_with_its_step(monkeypatch):
 
 
 def test_a_narrower_geofence_is_told(monkeypatch):
-    import fulmar_bringup.bags.course as course
+    import fulmar_bags.control_steps as course
 
     def narrow(name):
         robot = load_robot(name)

@@ -14,7 +14,7 @@ from typing import Any
 import psutil
 import yaml
 
-FULMAR = [sys.executable, "-m", "fulmar_bringup.cli"]
+FULMAR = [sys.executable, "-m", "fulmar_cli.main"]
 WATCHDOG_TRIP = "plant: no command for"  # how a run begins to say that its watchdog tripped
 
 

@@ -12,13 +12,13 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
-from fulmar_bringup.bags.contents import open_bag
-from fulmar_bringup.bags.decode import stamps_ns
-from fulmar_bringup.bags.player import play, schedule
-from fulmar_bringup.bags.reference import TOLERANCES
+from fulmar_bags.contents import open_bag
+from fulmar_bags.decode import stamps_ns
+from fulmar_bags.message_reader import stamp_ns
+from fulmar_bringup.player import play, schedule
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import CLOCK, ODOMETRY
-from fulmar_ros.message_reader import stamp_ns
+from fulmar_evaluation.rerun.reference_bags import TOLERANCES
 from fulmar_ros.qos import subscriber_qos
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of

@@ -15,6 +15,7 @@ from nav_msgs.msg import Odometry
 from rclpy.lifecycle import TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import Lqr
@@ -37,7 +38,6 @@ from fulmar_core.topics import (
 from fulmar_ros import control_beat
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.goal_messages import goal_message
-from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain

@@ -10,10 +10,10 @@ import psutil
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from fulmar_bringup.conductor import RunOutcome, conduct
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.supervisor import Supervisor
+from fulmar_evaluation.run_outcome import RunOutcome, run_and_evaluate
 from tests.conftest import RosDomain
 from tests.ros.cli import child_running, fulmar, json_of, nothing_left, start_fulmar, wait_for_children
 
@@ -55,7 +55,7 @@ def outcome_with(
     monkeypatch.setattr(Supervisor, "_hear", hear)
     if ends:
         monkeypatch.setattr(ProcessGroup, "stop_all", stop_otherwise)
-    return conduct(
+    return run_and_evaluate(
         plan_run(
             robot="floating_platform",
             task="go_to_pose",

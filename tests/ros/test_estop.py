@@ -20,10 +20,10 @@ from std_msgs.msg import Bool, Int8
 from std_srvs.srv import Trigger
 
 from fulmar_bringup import robot_operator
-from fulmar_bringup.commands.estop import estop
 from fulmar_bringup.reset_robots import release_without_node
 from fulmar_bringup.running_robots import running_robots, unfit_publishers
 from fulmar_bringup.stop_robots import Stopped, stop_robots
+from fulmar_cli.commands.estop import estop
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER, TELEOP
 from fulmar_ros.estop_node import EstopNode

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.commands.faults import names_in
-from fulmar_bringup.faults import network_faults
-from fulmar_bringup.faults.fault import Fault
-from fulmar_bringup.faults.finding import Outcome, stopped
-from fulmar_bringup.faults.live_system import LiveSystem, NothingShown, live_system
-from fulmar_bringup.faults.suite import EVERY, faults_of, run_faults
-from fulmar_bringup.faults.surroundings import request_of
+from fulmar_cli.commands.faults import names_in
 from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_evaluation.faults import network_faults
+from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.fault_environment import request_of
+from fulmar_evaluation.faults.fault_result import Outcome, stopped
+from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
+from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 

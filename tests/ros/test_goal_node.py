@@ -16,12 +16,12 @@ import rclpy
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal_files import single_goal
 from fulmar_core.topics import GOAL_WIRES
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.goal_node import GoalNode
-from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.benchmark.latency.cells import Cell, cells_of, measure
-from fulmar_bringup.benchmark.latency.endurance import endure
-from fulmar_bringup.commands.benchmark_latency import latency
+from fulmar_benchmarks.latency.cells import Cell, cells_of, measure
+from fulmar_benchmarks.latency.endurance import endure
+from fulmar_cli.commands.benchmark_latency import latency
 from fulmar_core.errors import ConfigError
 
 pytestmark = pytest.mark.real_time

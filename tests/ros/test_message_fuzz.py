@@ -24,13 +24,13 @@ from sensor_msgs.msg import Imu, JointState, Joy
 from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray, String
 from visualization_msgs.msg import Marker, MarkerArray
 
+from fulmar_bags.message_reader import goal_of
 from fulmar_core.robot import load_robot
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.estimator_node import EstimatorNode
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.goal_node import GoalNode
-from fulmar_ros.message_reader import goal_of
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.recorder_node import RecorderNode
 from fulmar_ros.teleop_node import TeleopNode

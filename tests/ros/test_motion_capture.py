@@ -12,9 +12,9 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import qos_profile_sensor_data
 
-from fulmar_bringup.bags.contents import open_bag
+from fulmar_bags.contents import open_bag
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.topics import MOCAP, ODOMETRY
-from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import spinning
 from sim_nodes.sim_node import make_backend

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from fulmar_bringup.bag_reader import read_run
-from fulmar_bringup.cli import app
+from fulmar_bags.run_reader import read_run
+from fulmar_cli.main import app
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError

@@ -13,12 +13,12 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.backend import Sample
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.topics import COMMAND, ODOMETRY, SIMULATION_START_NS
 from fulmar_ros.convert import VectorWriter
-from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import subscriber_qos

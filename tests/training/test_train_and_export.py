@@ -166,7 +166,7 @@ def test_a_seed_of_the_episodes_that_judge_is_refused(robot, task, small_setting
 
 
 def test_evaluate_judges_with_a_seed_that_no_run_has_learned_from():
-    from fulmar_bringup.commands.evaluate import evaluate
+    from fulmar_cli.commands.evaluate import evaluate
 
     assert inspect.signature(evaluate).parameters["seed"].default == JUDGE_SEED
 

@@ -22,5 +22,4 @@ setup(
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
         (f"share/{NAME}/layouts", glob("layouts/*.json")),
     ],
-    entry_points={"console_scripts": ["fulmar = fulmar_bringup.cli:main"]},
 )

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from fulmar_bringup.commands.arguments import JsonOption, SeedOption
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import step_bar
+from fulmar_cli.commands.arguments import JsonOption, SeedOption
 from fulmar_core.exit_codes import FAILED
 
 
@@ -46,7 +46,7 @@ def estimator(
     """
     import dataclasses
 
-    from fulmar_bringup.extras import require
+    from fulmar_cli.extras import require
     from fulmar_core.robot import load_robot
 
     require("filterpy", *(["matplotlib"] if picture else []))
@@ -72,7 +72,7 @@ def estimator(
         "required": lines,
     }
     if picture is not None:
-        from fulmar_bringup.report.style import as_png
+        from fulmar_evaluation.report.style import as_png
         from tests.benchmarks.estimator.picture import draw
 
         picture.parent.mkdir(parents=True, exist_ok=True)

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from fulmar_bringup.commands.arguments import JsonOption, SeedOption
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
+from fulmar_cli.commands.arguments import JsonOption, SeedOption
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
 
@@ -51,7 +51,7 @@ def identify(
 
     fulmar benchmark identify --robots kingfisher,turtlebot2 --platforms 5
     """
-    from fulmar_bringup.extras import require
+    from fulmar_cli.extras import require
     from tests.benchmarks.identification.campaign import document_of, run_identification
     from tests.benchmarks.identification.trial import Trial
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.driven_run import driven_run
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.identification.identify import Weight, identify
 from fulmar_core.robot import load_robot
+from fulmar_evaluation.driven_run import driven_run
 from tests.benchmarks.identification.driving import drive, speeds_of_wheels
 from tests.benchmarks.identification.machines import draw_machine
 

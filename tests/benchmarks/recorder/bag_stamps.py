@@ -8,9 +8,9 @@ from pathlib import Path
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from fulmar_bringup.bags.contents import open_bag
-from fulmar_bringup.bags.decode import stamps_ns
-from fulmar_ros.bag_records import bag_files
+from fulmar_bags.contents import open_bag
+from fulmar_bags.decode import stamps_ns
+from fulmar_bags.records import bag_files
 
 
 def stamps_by_topic(bag: Path) -> dict[str, list[int]]:

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.commands.arguments import JsonOption
 from fulmar_bringup.console import console, output, print_json
+from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import FAILED
 
@@ -54,7 +54,7 @@ def recorder(
 
     fulmar benchmark recorder --parts loss,kills --loss-s 30 --kills 10 --json
     """
-    from fulmar_bringup.extras import require
+    from fulmar_cli.extras import require
     from tests.benchmarks.recorder.document import PARTS, Asked, measure
 
     names = tuple(name.strip() for name in parts.split(","))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.node_table import RunPlan
-from fulmar_ros.provenance import fulmar_version, git_revision
+from fulmar_core.provenance import fulmar_version, git_revision
 from tests.benchmarks.recorder.cost import cost_of_recording
 from tests.benchmarks.recorder.kills import killed
 from tests.benchmarks.recorder.lockstep import lost_in_lock_step

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bringup.bag_reader import read_run
-from fulmar_bringup.conductor import conduct
+from fulmar_bags.run_reader import read_run
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.planning import plan_run
 from fulmar_core.errors import RunFailed
@@ -21,6 +20,7 @@ from fulmar_core.topics import (
     SIMULATION_START_NS,
     TRUTH,
 )
+from fulmar_evaluation.run_outcome import run_and_evaluate
 from tests.benchmarks.recorder.bag_stamps import stamps_by_topic
 
 WIRES = (ODOMETRY, TRUTH, COMMAND, ACTUATORS_STATE, OBSERVATION, ACTION)
@@ -60,7 +60,7 @@ def lost_in_lock_step(robot: str, *, control_hz: float, simulated_s: float, out:
         command="fulmar benchmark recorder",
     )
     with own_domain():
-        failure = conduct(request).failure
+        failure = run_and_evaluate(request).failure
     log_s = read_run(request.record).odom.log_s if request.record.exists() else np.empty(0)
     if len(log_s) < 2:
         raise RunFailed(f"nothing was recorded: {failure or 'the run said nothing'}.")

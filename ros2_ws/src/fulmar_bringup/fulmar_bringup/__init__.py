@@ -1,4 +1,1 @@
-"""The front door: the command line and the launcher.
-
-May import everything, and nothing imports it.
-"""
+"""Starts what others run: systems, node rows, supervisor, launch file, one run, commissioning."""

@@ -13,10 +13,10 @@ from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_of, gains_path
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
+from fulmar_core.provenance import fulmar_version, git_revision
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.own_task import OwnTask
-from fulmar_ros.provenance import fulmar_version, git_revision
 from policy_server.controllers import controller_entry
 from policy_server.shipped import shipped_policy
 

@@ -11,6 +11,7 @@ import numpy as np
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.errors import ConfigError
+from fulmar_core.goal import PoseTuple
 from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities, load_goals
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
@@ -20,8 +21,6 @@ from fulmar_core.tasks import Task
 DEFAULT_TASKS = {Positions: "go_to_position", Poses: "go_to_pose"}  # all others are about velocities
 SHOWN = 400  # points of a path that a record carries along
 SPARE_S = 5.0  # after everything is done, to see that it stays so
-
-PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
 
 
 def default_task(goals: str) -> str:

@@ -32,7 +32,7 @@ from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.geofence import check_starts
-from fulmar_core.goal import Goal
+from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.own_class import is_own
 from fulmar_core.planar import PlanarState, wrapped
@@ -47,7 +47,6 @@ from hardware_drivers.settings import UNARMED, MavlinkBoat, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry
 from policy_server.shipped import shipped_policies, shipped_policy
 
-PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
 PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
 
 

@@ -9,7 +9,11 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.conductor import (
+from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
+from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.planning import RunRequest, chosen_recording, plan_run
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.run_executor import (
     LAST_WORDS_S,
     STOPPED,
     passed_s,
@@ -18,16 +22,13 @@ from fulmar_bringup.conductor import (
     silence_limits_s,
     with_plant_reaction,
 )
-from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
-from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.planning import PoseTuple, RunRequest, chosen_recording, plan_run
-from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.starting import raise_if_ended, while_starting
 from fulmar_bringup.supervisor import Report, Supervisor
 from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
 from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.errors import ConfigError, RunFailed
+from fulmar_core.goal import PoseTuple
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from policy_server.controllers import controller_entry
@@ -121,7 +122,7 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
         How it ended.
 
     Raises:
-        ConfigError: As of `conduct`.
+        ConfigError: As of `execute`.
         DeviceError: The device is not there.
     """
     stopped, plant_report = "", Report()
@@ -142,7 +143,7 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
             raise
         return ""
 
-    failure, _ = run_nodes(request, watch)
+    failure = run_nodes(request, watch).failure
     trips = plant_report.values.get("watchdog_trips")
     asked = re.fullmatch(rf"{STOPPED}|stopped by SIG[A-Z]+", failure)  # also while the nodes still start
     return Ending("" if asked else failure, int(trips) if trips else None)

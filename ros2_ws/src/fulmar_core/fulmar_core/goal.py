@@ -12,6 +12,8 @@ from fulmar_core.arrays import array_namespace
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
+PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
+
 
 @dataclass(frozen=True, slots=True)
 class Goal:

@@ -13,6 +13,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
+from fulmar_bags.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
 from fulmar_core.control_loop import Step
 from fulmar_core.controller_settings import POLICY, ControllerSettings
 from fulmar_core.controllers.controller import Controller, Inputs
@@ -34,7 +35,6 @@ from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
 from fulmar_ros.node_robot import own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.policy_swap import PolicySwap

@@ -15,12 +15,12 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
+from fulmar_bags.message_reader import NS, turned
 from fulmar_core.robot import Robot
 from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
-from fulmar_ros.message_reader import NS, turned
 from fulmar_ros.wire_image import LATEST_NS, WireImage, marks
 
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent

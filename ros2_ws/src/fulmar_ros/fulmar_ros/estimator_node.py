@@ -16,6 +16,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import Imu
 
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.errors import shortened
 from fulmar_core.estimation.estimator import Estimate, Estimator
 from fulmar_core.estimation.settings import load_estimator
@@ -25,7 +26,6 @@ from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.health import Health
-from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.node_robot import name_of, own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos

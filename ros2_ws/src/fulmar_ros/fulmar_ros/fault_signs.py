@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from fulmar_bags.message_types import type_store
 from fulmar_core.topics import DIAGNOSTICS, ESTOP, STATUS, Wire
-from fulmar_ros.bag_types import type_store
 
 ERROR, STALE = 2, 3  # levels of diagnostic_msgs/DiagnosticStatus
 RECORDER = "recorder"

@@ -15,6 +15,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from fulmar_bags.message_reader import measurement_of
 from fulmar_core.exit_codes import DONE, FAILED
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile, load_goals
@@ -28,7 +29,6 @@ from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, ODOMETRY
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.health import Health
 from fulmar_ros.late_subscribers import LateSubscribers
-from fulmar_ros.message_reader import measurement_of
 from fulmar_ros.node_robot import heard_words, name_of, own_frames
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos

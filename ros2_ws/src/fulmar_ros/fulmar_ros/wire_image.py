@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 from rclpy.serialization import deserialize_message, serialize_message
 
-from fulmar_ros.message_reader import NS
+from fulmar_bags.message_reader import NS
 
 Numbers: TypeAlias = Sequence[float]
 LATEST_NS = 2**31 * NS  # seconds of a message have 32 bits

@@ -12,11 +12,11 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from fulmar_bags.message_reader import BODY_FRAME, FRAME, measurement_of, stamp_ns, turned
 from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.convert import OdometryWriter, TwistWriter, VectorWriter
-from fulmar_ros.message_reader import BODY_FRAME, FRAME, measurement_of, stamp_ns, turned
 
 
 class OdometryReader:

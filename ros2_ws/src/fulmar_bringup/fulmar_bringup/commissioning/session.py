@@ -15,6 +15,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.commissioning.response import Pulse, Track
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import Robot
@@ -30,7 +31,6 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.convert import TwistWriter, VectorWriter
-from fulmar_ros.message_reader import stamp_ns
 from fulmar_ros.node_robot import name_of, own_frames
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 

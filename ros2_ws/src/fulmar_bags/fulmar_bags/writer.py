@@ -1,0 +1,223 @@
+"""Writes one rosbag2 folder: MCAP files one after the other and their `metadata.yaml`. Knows no rclpy.
+
+What was flushed is readable by every rosbag2 and MCAP reader, whatever happens to the process afterwards.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fulmar_bags.message_types import message_type, offered_qos
+from fulmar_bags.metadata import BagSpan, TopicCount, write_metadata
+from fulmar_bags.part import BagPart, Topic
+from fulmar_core.errors import BagError
+from fulmar_core.topics import Delivery
+from fulmar_core.whole_files import sync_folder
+
+RUN_RECORD = "fulmar"  # name of the MCAP metadata record and of the entry in `custom_data`
+RUN_KEY = "run"
+# A bag may lack the last second at most; the disk, and a machine that is busy, get the other half of it.
+FLUSH_EVERY_S = 0.5
+
+
+class BagWriter:
+    """One bag being written.
+
+    The caller drives time: `tick` flushes twice a second, so at most a second is lost with the process.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        *,
+        run_info: Mapping[str, Any],
+        attachments: Mapping[str, bytes] | None = None,
+        split_bytes: float = 0.0,
+        split_s: float = 0.0,
+    ) -> None:
+        """Create the bag; it is valid, though empty, from here on.
+
+        Args:
+            directory: The bag folder; absent or empty, its parents are made.
+            run_info: What kind of run this is, anything that JSON can hold.
+            attachments: Files to carry along in each MCAP file, by name.
+            split_bytes: A file of this size is followed by a new one; 0: never.
+            split_s: So is one that was begun so long ago; 0: never [s].
+
+        Raises:
+            BagError: There is something in the folder already, or it cannot be written.
+        """
+        check_free(directory)
+        self.directory = directory
+        self._records = {RUN_RECORD: {RUN_KEY: json.dumps(run_info, sort_keys=True)}}
+        self._attachments = dict(attachments or {})
+        self._split_bytes, self._split_s = split_bytes, split_s
+        self._topics: dict[str, Topic] = {}
+        self._notes: dict[str, str] = {}
+        self._finished: list[BagPart] = []
+        self._last_ns = self._written = self._flushed = self._begun = 0
+        self._next_flush: float | None = None
+        self._split_at = float("inf")
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            sync_folder(directory.parent)
+            self._part = self._new_part()
+            try:
+                self.flush()
+            except OSError:  # the folder stays free for another try
+                self._part.discard()
+                raise
+        except OSError as error:
+            raise BagError(f"{directory}: cannot write a bag here: {error.strerror}.") from error
+
+    @property
+    def messages(self) -> int:
+        """Messages given so far."""
+        return self._written
+
+    @property
+    def messages_on_disk(self) -> int:
+        """Messages that a reader of the bag finds now."""
+        return self._flushed
+
+    @property
+    def files(self) -> int:
+        """MCAP files of the bag so far."""
+        return len(self._finished) + 1
+
+    @property
+    def size(self) -> int:
+        """Bytes of all MCAP files on disk."""
+        return sum(part.size for part in (*self._finished, self._part))
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that the disk has not taken yet, without the chunk in progress."""
+        return self._part.waiting
+
+    def add_topic(self, name: str, type_name: str, delivery: Delivery) -> None:
+        """Announce a topic.
+
+        Args:
+            name: Absolute topic name.
+            type_name: Such as `nav_msgs/msg/Odometry`.
+            delivery: How its publishers offer it.
+
+        Raises:
+            BagError: Unknown type.
+        """
+        self._topics[name] = Topic(name, message_type(type_name), delivery)
+        self._part.add_topic(self._topics[name])
+
+    def write(self, topic: str, data: bytes, *, log_ns: int, publish_ns: int | None = None) -> None:
+        """Add a message.
+
+        Args:
+            topic: A name given to `add_topic`.
+            data: The message in CDR.
+            log_ns: When it came, since the epoch [ns]. Earlier than the one before counts as the same time.
+            publish_ns: When it was sent, if known [ns].
+        """
+        there = self._topics[topic]
+        self._last_ns = max(log_ns, self._last_ns)
+        there.messages += 1
+        self._written += 1
+        self._part.add(
+            topic,
+            data,
+            log_ns=self._last_ns,
+            publish_ns=publish_ns or self._last_ns,
+            sequence=there.messages,
+        )
+
+    def attach(self, name: str, data: bytes) -> None:
+        """Carry a file along that was not there at the beginning, in this MCAP file and all that follow."""
+        self._attachments[name] = data
+        self._part.attach(name, data)
+
+    def note(self, name: str, text: str) -> None:
+        """Say something about the recording in `custom_data`, with the next flush; the last text of a name stays."""
+        self._notes[name] = text
+
+    def tick(self, now: float) -> None:
+        """Flush if the last flush is half a second ago, and begin a new file where one is due; call this often.
+
+        Args:
+            now: Any steady clock [s].
+
+        Raises:
+            OSError: As `flush`.
+        """
+        if self._next_flush is None:
+            self._next_flush, self._split_at = now + FLUSH_EVERY_S, now + (self._split_s or float("inf"))
+        if now < self._next_flush:
+            return
+        self._next_flush = now + FLUSH_EVERY_S
+        self.flush()
+        if now >= self._split_at or 0 < self._split_bytes <= self._part.size:
+            self.split()
+            self._split_at = now + (self._split_s or float("inf"))
+
+    def flush(self) -> None:
+        """Bring every message to the disk.
+
+        Raises:
+            OSError: The disk refuses. What it took before stays readable; the rest is tried again next time.
+        """
+        self._part.flush()
+        self._note_flushed()
+
+    def split(self) -> None:
+        """Go on in a new file; one without messages is not left behind.
+
+        Raises:
+            OSError: As `flush`; the old file goes on.
+        """
+        if not self._part.span.messages:
+            return
+        self.flush()
+        following = self._new_part()
+        self._part.finish_if_there_is_room()
+        self._finished.append(self._part)
+        self._part = following
+        self.flush()
+
+    def close(self) -> None:
+        """Write the rest, the index and the final counts, and let go.
+
+        Raises:
+            OSError: The disk refuses. What it took before stays readable.
+        """
+        for name, text in self._notes.items():
+            self._part.add_record(name, {name: text})
+        self._part.finish()
+        self._note_flushed()
+
+    def _new_part(self) -> BagPart:
+        part = BagPart(self.directory / f"{self.directory.resolve().name}_{self._begun}.mcap")
+        self._begun += 1
+        part.begin(self._records, self._attachments, self._topics.values())
+        return part
+
+    def _note_flushed(self) -> None:
+        self._flushed = self._written
+        topics = [
+            TopicCount(t.name, t.type.name, t.type.hash, offered_qos(t.delivery), t.messages)
+            for t in self._topics.values()
+        ]
+        spans: dict[str, BagSpan] = {part.name: part.span for part in (*self._finished, self._part)}
+        custom = {RUN_RECORD: self._records[RUN_RECORD][RUN_KEY], **self._notes}
+        write_metadata(self.directory, spans, topics, custom)
+
+
+def check_free(directory: Path) -> None:
+    """Refuse a folder that holds something already.
+
+    Raises:
+        BagError: If it does.
+    """
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        raise BagError(f"{directory} exists already, and bags are never overwritten. Name a new folder.")

@@ -1,0 +1,1 @@
+"""Published results beside Fulmar's own, one folder a paper, and measurements of speed."""

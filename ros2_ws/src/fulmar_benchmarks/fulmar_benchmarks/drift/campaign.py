@@ -1,0 +1,157 @@
+"""The benchmark after thesis Tables 3.5 and 3.6: every controller in every row, one document."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fulmar_benchmarks.drift.conditions import (
+    CONDITIONS,
+    PATH_EPISODE_S,
+    PATH_EPISODES,
+    PATH_SCENARIO,
+    PATH_TASK,
+    PATHS,
+    POSE_TASK,
+    ROBOT,
+)
+from fulmar_benchmarks.drift.document import document_of
+from fulmar_benchmarks.drift.physics import physics_of
+from fulmar_benchmarks.drift.unit import DriftUnit
+from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
+from fulmar_benchmarks.unit import Unit, done_already
+from fulmar_benchmarks.work import Outcome, do_all
+from fulmar_bringup.node_table import RunPlan
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from fulmar_evaluation.evaluation import Trial
+from policy_server.shipped import policies_directory
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to judge."""
+
+    rows: Sequence[str]
+    controllers: Sequence[str]
+    through: str  # batch, mujoco or ros
+    episodes: int  # of each condition; paths have at most their own number
+    seed: int
+    folder: Path  # outcomes are kept below it
+    policy: Path | None = None  # bundle for the pose; the shipped one by default
+    tracking_policy: Path | None = None  # bundle for the paths; the shipped one by default
+    jobs: int = 2
+    fresh: bool = False  # judge again what was judged before
+    command: str = ""  # for the record
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The document, and what pictures are drawn from."""
+
+    document: dict[str, Any]
+    outcomes: dict[tuple[str, str], Judged]  # by row and controller
+
+
+def run_drift(
+    request: Request,
+    *,
+    progress: Callable[[float, float], None],
+    on_done: Callable[[Unit, Outcome, bool], None],
+) -> Findings:
+    """Judge every controller in every row, but for what was judged before with the same code and configuration.
+
+    Args:
+        request: What to judge.
+        progress: Told how much is done, and of how much.
+        on_done: Told of each unit: its outcome, and whether it was there before.
+
+    Returns:
+        What was found.
+    """
+    began = time.monotonic()
+    pairs = {
+        (task, controller): _pair(request, task, controller)
+        for task in dict.fromkeys(_task_of_row(row) for row in request.rows)
+        for controller in request.controllers
+    }
+    code = code_hash(request.through)
+    units = {
+        (row, controller): _unit(request, row, controller, pairs[_task_of_row(row), controller], code)
+        for row in request.rows
+        for controller in request.controllers
+        if not pairs[_task_of_row(row), controller].missing
+    }
+    outcomes: dict[Unit, Outcome] = {**done_already(units.values(), fresh=request.fresh)}
+    for unit, before in outcomes.items():
+        on_done(unit, before, True)
+    left: list[Unit] = [unit for unit in units.values() if unit not in outcomes]
+    total = sum(unit.cost for unit in left)
+    outcomes |= do_all(
+        left,
+        jobs=request.jobs,
+        progress=lambda done: progress(done, total),
+        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    )
+    found = {key: outcomes[unit] for key, unit in units.items()}
+    document = document_of(
+        request,
+        pairs={
+            (row, name): pairs[_task_of_row(row), name]
+            for row in request.rows
+            for name in request.controllers
+        },
+        found=found,
+        physics={
+            row: physics_of(_trial(request, row, pairs[POSE_TASK, request.controllers[0]]))
+            for row in request.rows
+            if _task_of_row(row) == POSE_TASK
+        },
+        wall_s=time.monotonic() - began,
+    )
+    return Findings(document, {key: one for key, one in found.items() if isinstance(one, Judged)})
+
+
+def _task_of_row(row: str) -> str:
+    return PATH_TASK if any(path.name == row for path in PATHS) else POSE_TASK
+
+
+def _pair(request: Request, task: str, controller: str) -> Pair:
+    if controller != "policy":
+        return with_law(ROBOT, task, controller)
+    given = request.policy if task == POSE_TASK else request.tracking_policy
+    return with_policy(ROBOT, task, given or policies_directory() / f"{ROBOT}_{task}")
+
+
+def _unit(request: Request, row: str, controller: str, pair: Pair, code: str) -> DriftUnit:
+    return DriftUnit(
+        _trial(request, row, pair),
+        hash_of(pair.sha256, code),
+        request.folder / "outcomes",
+        row=row,
+        controller=controller,
+    )
+
+
+def _trial(request: Request, row: str, pair: Pair) -> Trial:
+    condition = next((one for one in CONDITIONS if one.name == row), None)
+    path = next((one for one in PATHS if one.name == row), None)
+    plan = RunPlan(
+        robot=ROBOT,
+        task=pair.task,
+        controller=pair.controller,
+        backend="mujoco",
+        control_hz=load_robot(ROBOT).timing.control_hz,
+        policy=pair.policy,
+        scenario=condition.scenario if condition else PATH_SCENARIO,
+        seed=request.seed,
+        duration_s=PATH_EPISODE_S if path else load_task(pair.task).episode_s,
+        lockstep=True,
+        goals=path.goals if path else "",
+    )
+    episodes = min(request.episodes, PATH_EPISODES) if path else request.episodes
+    return Trial(plan, request.through, episodes, episodes, request.jobs)

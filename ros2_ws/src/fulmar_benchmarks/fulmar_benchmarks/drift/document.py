@@ -1,0 +1,204 @@
+"""The outcome of the benchmark as one JSON-ready document: what tables, pages and other programs read."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fulmar_benchmarks.drift.asked import requirements
+from fulmar_benchmarks.drift.conditions import CONDITIONS, PATHS
+from fulmar_benchmarks.drift.drop import band_of, drop_percent
+from fulmar_benchmarks.drift.physics import Physics
+from fulmar_benchmarks.drift.published import FIGURES, TRACKING, published
+from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.pairs import Pair
+from fulmar_core.provenance import fulmar_version, git_revision
+
+if TYPE_CHECKING:
+    from fulmar_benchmarks.drift.campaign import Request
+
+FORMAT = 1
+Key = tuple[str, str]  # row and controller
+# Names of our figures by those of the thesis.
+OURS = {
+    **{f"{kind}T{limit}": f"{kind}T{limit}_percent" for kind in "PO" for limit in (5, 2, 1)},
+    "ALV": "ALV_m_s",
+    "AAV": "AAV_rad_s",
+    "AAS": "AAS",
+}
+OF_PATHS = {
+    "velocity_error": "velocity_error_m_s",
+    "velocity_error_std": "velocity_error_std_m_s",
+    "velocity_error_under_way": "velocity_error_under_way_m_s",
+    "velocity_error_under_way_std": "velocity_error_under_way_std_m_s",
+    "path_error": "path_error_m",
+    "path_error_std": "path_error_std_m",
+    "path_error_most": "path_error_most_m",
+    "ALV": "ALV_m_s",
+    "AAS": "AAS",
+}
+
+
+def document_of(
+    request: Request,
+    *,
+    pairs: dict[Key, Pair],
+    found: dict[Key, Judged | str],
+    physics: dict[str, Physics],
+    wall_s: float,
+) -> dict[str, Any]:
+    """The whole document; docs/evaluation.md names its keys.
+
+    Args:
+        request: What was asked for.
+        pairs: Who drives, by row and controller.
+        found: What was judged, or why it could not be.
+        physics: What is possible in the conditions, by row.
+        wall_s: How long it took [s].
+    """
+    rows = {
+        row.name: _row(row, request, pairs, found, physics.get(row.name))
+        for row in (*CONDITIONS, *PATHS)
+        if row.name in request.rows
+    }
+    _add_drops(rows)
+    checks = [check for row in rows for name in request.controllers for check in _checks(row, name, rows)]
+    judged = [one for one in found.values() if isinstance(one, Judged)]
+    steps = sum(one.about["control_steps"] for one in judged)
+    busy_s = sum(one.about["wall_s"] for one in judged)
+    return {
+        "benchmark": "drift",
+        "format": FORMAT,
+        "fulmar_version": fulmar_version(),
+        "git_revision": git_revision(),
+        "command": request.command,
+        "through": request.through,
+        "seed": request.seed,
+        "episodes": request.episodes,
+        "controllers": list(request.controllers),
+        "rows": rows,
+        "requirements": checks,
+        "asked": len(checks),
+        "met": sum(check["met"] is True for check in checks),
+        "open": sum(check["met"] is None for check in checks),
+        "control_steps": steps,
+        "steps_per_s": steps / busy_s if busy_s else None,
+        "wall_s": round(wall_s, 1),
+    }
+
+
+def statistics(values: np.ndarray) -> dict[str, float | None]:
+    """Mean, median, 5th and 95th percentile of what is a number, shape (episodes,)."""
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known)]
+    if not known.size:
+        return {"mean": None, "median": None, "p5": None, "p95": None}
+    low, middle, high = (float(value) for value in np.percentile(known, (5, 50, 95)))
+    return {"mean": float(np.mean(known)), "median": middle, "p5": low, "p95": high}
+
+
+def _row(
+    row: Any,
+    request: Request,
+    pairs: dict[Key, Pair],
+    found: dict[Key, Judged | str],
+    physics: Physics | None,
+) -> dict[str, Any]:
+    told: dict[str, Any] = {"title": row.title, "kind": "path" if physics is None else "pose"}
+    if physics is None:
+        mean, std = TRACKING[row.name]
+        told |= {"goals": row.goals, "published": {"velocity_error": mean, "velocity_error_std": std}}
+    else:
+        told |= {
+            "scenario": row.scenario,
+            "lost_thrusters": row.lost,
+            "bound": {figure: statistics(most) for figure, most in physics.bounds.items()},
+            "feasible_share": float(np.mean(physics.can_hold)),
+        }
+    told["controllers"] = {
+        name: _entry(row.name, name, physics, pairs[row.name, name], found.get((row.name, name)))
+        for name in request.controllers
+    }
+    return told
+
+
+def _entry(
+    row: str, name: str, physics: Physics | None, pair: Pair, outcome: Judged | str | None
+) -> dict[str, Any]:
+    judged = outcome if isinstance(outcome, Judged) else None
+    entry: dict[str, Any] = {
+        "status": "missing" if pair.missing else "failed" if judged is None else "judged",
+        "reason": pair.reason or (outcome if isinstance(outcome, str) else None),
+        "law": pair.law or None,
+        "sha256": pair.sha256 or None,
+    }
+    if physics is not None:
+        beside, figures = published(row, name)
+        entry |= {"published_controller": beside, "published": figures}
+    if judged is None:
+        return entry | {"figures": {}}
+    names = OF_PATHS if physics is None else OURS
+    about = judged.about
+    if physics is not None and physics.can_hold.any():
+        able = physics.can_hold
+        entry["where_feasible"] = {
+            "episodes": int(np.sum(able)),
+            "success_rate": float(np.mean(judged.succeeded[able])),
+            "figures": {key: statistics(judged.figures[ours][able]) for key, ours in names.items()},
+        }
+    return entry | {
+        "episodes": len(judged.succeeded),
+        "success_rate": float(np.mean(judged.succeeded)),
+        "figures": {key: statistics(judged.figures[ours]) for key, ours in names.items()},
+        "control_hz": about["control_hz"],
+        "control_steps": about["control_steps"],
+        "wall_s": about["wall_s"],
+        "steps_per_s": about["control_steps"] / about["wall_s"],
+    }
+
+
+def _add_drops(rows: dict[str, Any]) -> None:
+    """Tell of each figure how far it falls behind the ideal row of the same controller, ours and published."""
+    ideal = rows.get("ideal", {"controllers": {}})["controllers"]
+    for name, row in rows.items():
+        if row["kind"] == "path":
+            continue
+        for controller, entry in row["controllers"].items():
+            own = ideal.get(controller, {}).get("figures", {})
+            entry["drops"] = {
+                figure: _drop(figure, entry["figures"][figure]["mean"], own[figure]["mean"])
+                for figure in FIGURES
+                if entry["figures"] and own
+            }
+            best = published("ideal", controller)[1]
+            entry["published_drops"] = {
+                figure: _drop(figure, value, best[figure])
+                for figure, value in published(name, controller)[1].items()
+            }
+
+
+def _drop(figure: str, value: float, ideal: float) -> dict[str, Any] | None:
+    drop = drop_percent(figure, value, ideal)
+    return None if drop is None else {"percent": drop, "band": band_of(drop).name}
+
+
+def _checks(row: str, controller: str, rows: dict[str, Any]) -> list[dict[str, Any]]:
+    figures = rows[row]["controllers"][controller]["figures"]
+    return [
+        {
+            "row": row,
+            "controller": controller,
+            "figure": asked.figure,
+            "better": "more" if asked.at_least else "less",
+            **{
+                key: value
+                for key, value in dataclasses.asdict(
+                    asked.verdict(figures[asked.figure]["mean"] if figures else None)
+                ).items()
+                if key != "name"
+            },
+        }
+        for asked in requirements(row, controller)
+    ]

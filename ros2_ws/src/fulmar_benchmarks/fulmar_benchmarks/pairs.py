@@ -1,0 +1,163 @@
+"""Which pairs are judged, with which controllers, and what their outcomes depend on."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import fulmar_core
+import policy_server
+import sim_nodes
+from fulmar_benchmarks.unit import Unit
+from fulmar_bringup.node_table import RunPlan
+from fulmar_core.errors import BundleError, ConfigError
+from fulmar_core.paths import config_files
+from fulmar_core.policy_bundle import read_passport
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from fulmar_evaluation.evaluation import Trial
+from policy_server.shipped import policies_directory
+
+KINDS = ("policy", "classical")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A robot at a task, and who drives it."""
+
+    robot: str
+    task: str
+    kind: str  # one of KINDS
+    controller: str = ""  # empty: there is none
+    law: str = ""  # of a classical controller
+    policy: str = ""  # folder of a bundle
+    reason: str = ""  # why there is none
+    sha256: str = ""  # of whatever defines the controller
+    passport: dict[str, Any] = field(default_factory=dict, hash=False)
+
+    @property
+    def missing(self) -> bool:
+        """Whether nobody can drive it."""
+        return not self.controller
+
+
+def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) -> Pair:
+    """Find who drives a robot at a task.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+        kind: policy: the bundle; classical: the law of the robot's family.
+        policies: Folder of bundles named <robot>_<task>; the shipped ones by default.
+
+    Returns:
+        The pair, perhaps with a reason why nobody does.
+    """
+    folder = (policies or policies_directory()) / f"{robot}_{task}"
+    if kind == "policy":
+        return with_policy(robot, task, folder)
+    return with_law(robot, task, "classical")
+
+
+def with_policy(robot: str, task: str, folder: Path) -> Pair:
+    """A pair that the bundle of a folder drives, or why it cannot."""
+    from policy_server.policy import Policy
+
+    if not folder.is_dir():
+        return Pair(robot, task, "policy", reason="no policy is shipped")
+    try:
+        passport = read_passport(folder)
+        Policy(folder, load_robot(robot), load_task(task))
+    except BundleError as error:
+        return Pair(robot, task, "policy", reason=str(error))
+    return Pair(
+        robot,
+        task,
+        "policy",
+        "policy",
+        policy=str(folder.absolute()),
+        sha256=passport.sha256,
+        passport=passport.training,
+    )
+
+
+def with_law(robot: str, task: str, name: str) -> Pair:
+    """A pair that a controller without a bundle drives, or why it cannot.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+        name: Of the controller, one of `policy_server.controllers.CONTROLLERS`.
+    """
+    from policy_server.controllers import Choice, load_controller
+
+    the_robot, the_task = load_robot(robot), load_task(task)
+    try:
+        choice = Choice(the_robot.timing.control_hz)
+        controller = load_controller(name, the_robot, the_task, choice)
+    except ConfigError as error:
+        return Pair(robot, task, "classical", reason=str(error))
+    told = controller.metadata()
+    law = str(getattr(controller, "law", name))
+    return Pair(robot, task, "classical", name, law=law, sha256=str(told["sha256"]))
+
+
+def units_of(
+    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, worlds: int
+) -> list[Unit]:
+    """The work on one pair.
+
+    Args:
+        pair: The pair.
+        ways: Episodes in each way.
+        seed: Seed of the episodes.
+        scenario: Name of the scenario.
+        folder: Where outcomes are kept.
+        worlds: Episodes of a batch at once.
+    """
+    plan = RunPlan(
+        robot=pair.robot,
+        task=pair.task,
+        controller=pair.controller,
+        backend="mujoco",
+        control_hz=load_robot(pair.robot).timing.control_hz,
+        policy=pair.policy,
+        scenario=scenario,
+        seed=seed,
+        duration_s=load_task(pair.task).episode_s,
+        lockstep=True,
+    )
+    return [
+        Unit(Trial(plan, way, episodes, worlds), hash_of(pair.sha256, code_hash(way)), folder)
+        for way, episodes in ways.items()
+    ]
+
+
+def code_hash(way: str) -> str:
+    """Hash of the code, the configuration and the libraries that outcomes of one way depend on."""
+    packages = (fulmar_core, policy_server, *((sim_nodes,) if way != "batch" else ()))
+    files = [
+        path for package in packages for path in sorted(Path(str(package.__file__)).parent.rglob("*.py"))
+    ]
+    files += sorted(
+        path
+        for family in ("robots", "tasks", "scenarios", "controllers", "goals")
+        for path in config_files(family).values()
+    )
+    installed = [_version(name) for name in ("numpy", "onnxruntime", "mujoco")]
+    return hash_of(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files), *installed)
+
+
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return ""
+
+
+def hash_of(*parts: str) -> str:
+    """SHA-256 of some texts in their order."""
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -1,0 +1,141 @@
+"""The benchmark after thesis Table 4.7: every pair judged, one document."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.pairs import Pair, find_pair, units_of
+from fulmar_benchmarks.roboran.document import FORMAT, pair_entry
+from fulmar_benchmarks.unit import Unit, done_already
+from fulmar_benchmarks.work import Outcome, do_all
+from fulmar_core.provenance import fulmar_version, git_revision
+from fulmar_evaluation.evaluation import BATCH_EPISODES
+from fulmar_evaluation.evaluation import EPISODES as JUDGED
+
+EPISODES = {"batch": BATCH_EPISODES, "mujoco": JUDGED, "ros": 16}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to judge."""
+
+    robots: Sequence[str]
+    tasks: Sequence[str]
+    kinds: Sequence[str]  # out of KINDS
+    episodes: dict[str, int]  # in each way
+    seed: int
+    scenario: str
+    folder: Path  # outcomes are kept below it
+    policies: Path | None = None  # folder of bundles; the shipped ones by default
+    jobs: int = 2
+    fresh: bool = False  # judge again what was judged before
+    command: str = ""  # for the record
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The document, and what pictures are drawn from."""
+
+    document: dict[str, Any]
+    pairs: list[Pair]
+    outcomes: dict[Pair, dict[str, Judged]]
+
+
+def run_benchmark(
+    request: Request,
+    *,
+    progress: Callable[[float, float], None],
+    on_done: Callable[[Unit, Outcome, bool], None],
+) -> Findings:
+    """Judge every pair, but for what was judged before with the same code, configuration and controller.
+
+    Args:
+        request: What to judge.
+        progress: Told how much is done, and of how much.
+        on_done: Told of each unit: its outcome, and whether it was there before.
+
+    Returns:
+        What was found.
+    """
+    began = time.monotonic()
+    pairs = [
+        find_pair(robot, task, kind, request.policies)
+        for task in request.tasks
+        for robot in request.robots
+        for kind in request.kinds
+    ]
+    units = {
+        pair: units_of(
+            pair,
+            request.episodes,
+            seed=request.seed,
+            scenario=request.scenario,
+            folder=request.folder / "outcomes",
+            worlds=max(request.episodes.get("batch", 1), 1),
+        )
+        for pair in pairs
+        if not pair.missing
+    }
+    every = [unit for of_pair in units.values() for unit in of_pair]
+    outcomes: dict[Unit, Outcome] = {**done_already(every, fresh=request.fresh)}
+    for unit, before in outcomes.items():
+        on_done(unit, before, True)
+    left = [unit for unit in every if unit not in outcomes]
+    total = sum(unit.cost for unit in left)
+    outcomes |= do_all(
+        left,
+        jobs=request.jobs,
+        progress=lambda done: progress(done, total),
+        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    )
+    by_pair = {pair: {unit.trial.through: outcomes[unit] for unit in units.get(pair, [])} for pair in pairs}
+    entries = [pair_entry(pair, by_pair[pair]) for pair in pairs]
+    document = document_of(
+        entries,
+        episodes=request.episodes,
+        seed=request.seed,
+        scenario=request.scenario,
+        command=request.command,
+        wall_s=time.monotonic() - began,
+    )
+    judged = {
+        pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, Judged)}
+        for pair, ways in by_pair.items()
+    }
+    return Findings(document, pairs, judged)
+
+
+def document_of(
+    entries: list[dict[str, Any]],
+    *,
+    episodes: dict[str, int],
+    seed: int,
+    scenario: str,
+    command: str,
+    wall_s: float,
+) -> dict[str, Any]:
+    """The whole document; docs/evaluation.md names its keys."""
+    met: dict[tuple[str, str], list[bool | None]] = {}
+    for entry in entries:
+        if entry["kind"] == "policy":
+            met.setdefault((entry["robot"], entry["task"]), []).append(entry["met"])
+    return {
+        "benchmark": "roboran",
+        "format": FORMAT,
+        "fulmar_version": fulmar_version(),
+        "git_revision": git_revision(),
+        "command": command,
+        "seed": seed,
+        "scenario": scenario,
+        "episodes": dict(episodes),
+        "pairs": entries,
+        "asked": len(met),
+        "met": sum(True in each for each in met.values()),
+        "open": sum(True not in each and None in each for each in met.values()),
+        "wall_s": round(wall_s, 1),
+    }

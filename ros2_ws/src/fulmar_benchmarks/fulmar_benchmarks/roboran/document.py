@@ -1,0 +1,102 @@
+"""The outcome of a benchmark as one JSON-ready document: what tables, pages and other programs read."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.pairs import Pair
+from fulmar_benchmarks.required import judged_figure, verdicts
+from fulmar_benchmarks.roboran.published import thesis_row
+from fulmar_core.metrics import summarise
+from fulmar_evaluation.evaluation import share_of_mean
+
+FORMAT = 1
+Z95 = 1.96
+
+
+def pair_entry(pair: Pair, outcomes: dict[str, Judged | str]) -> dict[str, Any]:
+    """What is told about one pair.
+
+    Args:
+        pair: The pair.
+        outcomes: By way: what was judged, or why it could not be.
+
+    Returns:
+        An entry of `pairs`; docs/evaluation.md names its keys.
+    """
+    judged = {way: outcome for way, outcome in outcomes.items() if isinstance(outcome, Judged)}
+    faults = [f"{way}: {outcome}" for way, outcome in outcomes.items() if isinstance(outcome, str)]
+    figure = judged_figure(pair.task)
+    values = {way: _value(outcome, figure) for way, outcome in judged.items()}
+    training_s = _seconds(pair.passport.get("wall_s"))
+    same = judged["batch"].about.get("same_at_64_worlds") if "batch" in judged else None
+    checks = (
+        verdicts(pair.robot, pair.task, values, same=same, training_s=training_s)
+        if pair.kind == "policy"
+        else []
+    )
+    met = [check.met for check in checks]
+    return {
+        "robot": pair.robot,
+        "task": pair.task,
+        "kind": pair.kind,
+        "controller": pair.controller or None,
+        "law": pair.law or None,
+        "status": "missing" if pair.missing else "failed" if faults or not judged else "judged",
+        "reason": pair.reason or "; ".join(faults) or None,
+        "sha256": pair.sha256 or None,
+        "training_s": training_s,
+        "judged_figure": figure,
+        "judged": values,
+        "judged_in_batch_on_mujocos_episodes": _on_mujocos_episodes(judged, figure),
+        "same_at_64_worlds": same,
+        "ways": {way: _way(outcome) for way, outcome in judged.items()},
+        "thesis": dataclasses.asdict(thesis_row(pair.robot, pair.task))
+        | {"time_to_target_s": thesis_row(pair.robot, pair.task).time_to_target_s},
+        "verdicts": [dataclasses.asdict(check) for check in checks],
+        "met": None if not met or None in met else all(met),
+    }
+
+
+def wilson(share: float, count: int) -> tuple[float, float]:
+    """95 % interval of a share that was counted (E. B. Wilson 1927)."""
+    spread = Z95**2 / count
+    middle = (share + spread / 2.0) / (1.0 + spread)
+    half = Z95 * math.sqrt(share * (1.0 - share) / count + spread / (4.0 * count)) / (1.0 + spread)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def _way(outcome: Judged) -> dict[str, Any]:
+    figures = summarise(outcome.succeeded, outcome.figures)
+    kept = {key: value for key, value in outcome.about.items() if key not in _OF_THE_PAIR}
+    entry = {**kept, **figures}
+    entry["success_interval"] = wilson(figures["success_rate"], figures["episodes"])
+    if "goals_bound" in outcome.figures:
+        entry["share_of_mean_bound"] = share_of_mean(
+            outcome.figures["goals_reached"], outcome.figures["goals_bound"]
+        )
+    return entry
+
+
+_OF_THE_PAIR = ("key", "robot", "task", "controller", "through", "same_at_64_worlds", "goals")
+
+
+def _value(outcome: Judged, figure: str, episodes: int | None = None) -> float:
+    values = outcome.succeeded if figure == "success_rate" else outcome.figures[figure]
+    return float(np.nanmean(values[:episodes]))
+
+
+def _on_mujocos_episodes(judged: dict[str, Judged], figure: str) -> float | None:
+    """The judged figure of the batch on the very episodes that MuJoCo ran."""
+    if not {"batch", "mujoco"} <= set(judged):
+        return None
+    return _value(judged["batch"], figure, len(judged["mujoco"].succeeded))
+
+
+def _seconds(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None

@@ -1,0 +1,106 @@
+"""Units of work done by several processes at once, with their progress told and their faults kept apart."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import TYPE_CHECKING
+
+from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.pools import begin_worker, counted, ended_with_us, one_thread_each
+from fulmar_benchmarks.unit import Unit, judge
+from fulmar_core.errors import RunFailed
+
+if TYPE_CHECKING:
+    from fulmar_evaluation.ros_evaluation import RosPool
+
+Outcome = Judged | str  # a sentence where a unit failed
+Done = Callable[[Unit, Outcome], None]
+
+
+def do_all(
+    units: list[Unit], *, jobs: int, progress: Callable[[float], None], on_done: Done
+) -> dict[Unit, Outcome]:
+    """Do units, the costliest first; those through ros, which use all cores themselves, after the others.
+
+    Args:
+        units: What to do.
+        jobs: Processes at once.
+        progress: Told how much is done, of the sum of their costs.
+        on_done: Called as each unit ends.
+
+    Returns:
+        The outcome of each.
+
+    Raises:
+        RunFailed: A process was ended from outside.
+    """
+    outcomes: dict[Unit, Outcome] = {}
+
+    def note(unit: Unit, outcome: Outcome) -> None:
+        outcomes[unit] = outcome
+        on_done(unit, outcome)
+
+    ordered = sorted(units, key=lambda unit: -unit.cost)
+    ros = [unit for unit in ordered if unit.trial.through == "ros"]
+    pooled = [unit for unit in ordered if unit not in ros]
+    if pooled:
+        _in_a_pool(pooled, min(jobs, len(pooled)), progress, note)
+    if ros:
+        _through_ros(ros, jobs, sum(unit.cost for unit in pooled), progress, note)
+    return outcomes
+
+
+def _beyond(done: float, progress: Callable[[float], None]) -> Callable[[float], None]:
+    """Progress of one unit, told as that of all, of which some is done."""
+    return lambda steps: progress(done + steps)
+
+
+def _through_ros(
+    units: list[Unit], jobs: int, done: float, progress: Callable[[float], None], note: Done
+) -> None:
+    """One after another, each on all workers: these are the deployed nodes, started once for all."""
+    from fulmar_evaluation.ros_evaluation import ros_pool
+
+    with ros_pool(jobs) as pool:
+        for unit in units:
+            note(unit, _outcome_of(unit, _beyond(done, progress), pool))
+            done += unit.cost
+
+
+def _in_a_pool(units: list[Unit], jobs: int, progress: Callable[[float], None], note: Done) -> None:
+    spawn = multiprocessing.get_context("spawn")
+    counts = spawn.Array("q", len(units), lock=False)
+    with (
+        one_thread_each(),
+        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts, os.getpid()))) as pool,
+    ):
+        futures: dict[Future[Outcome], Unit] = {
+            pool.submit(_work, unit, index): unit for index, unit in enumerate(units)
+        }
+        pending = set(futures)
+        while pending:
+            done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+            progress(float(sum(counts)))
+            for future in done:
+                try:
+                    note(futures[future], future.result())
+                except BrokenProcessPool as error:
+                    raise RunFailed("a process of the benchmark was ended from outside") from error
+
+
+def _work(unit: Unit, index: int) -> Outcome:
+    progress = counted(index)
+    outcome = _outcome_of(unit, progress)
+    progress(int(unit.cost))
+    return outcome
+
+
+def _outcome_of(unit: Unit, progress: Callable[[int], None], pool: RosPool | None = None) -> Outcome:
+    try:
+        return judge(unit, progress, pool=pool)
+    except Exception as error:  # noqa: BLE001 - the fault of one pair must not cost the others their figures
+        return f"{type(error).__name__}: {error}"

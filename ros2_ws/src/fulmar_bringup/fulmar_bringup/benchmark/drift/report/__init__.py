@@ -1,5 +1,0 @@
-"""The findings of DRIFT's benchmark as a page with pictures."""
-
-from fulmar_bringup.benchmark.drift.report.writer import write_report
-
-__all__ = ["write_report"]

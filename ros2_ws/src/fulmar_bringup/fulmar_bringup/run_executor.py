@@ -1,0 +1,271 @@
+"""One run from start to finish: start the nodes, give the goal, watch the run, stop the nodes."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import signal
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fulmar_bringup.bag_origin import attachments, run_info
+from fulmar_bringup.domains import claimed_domain
+from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
+from fulmar_bringup.goal_plan import is_endless, shown_path
+from fulmar_bringup.node_table import NodeSpec, RunPlan
+from fulmar_bringup.planning import RunRequest
+from fulmar_bringup.processes import Ended, ProcessGroup
+from fulmar_bringup.progress import state_words, time_bar
+from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
+from fulmar_bringup.supervisor import Report, Supervisor, supervisor
+from fulmar_bringup.system_events import distance_of, mode_of
+from fulmar_bringup.system_rows import system_rows
+from fulmar_core.errors import ConfigError, RunFailed
+from fulmar_core.exit_codes import BAD_USAGE
+from fulmar_core.goal_files import load_goals
+from fulmar_core.robot import load_robot
+from fulmar_core.safety.estop import HOLDS
+from fulmar_core.safety.watchdog import NO_COMMAND
+from fulmar_core.topics import SIMULATION_START_NS
+from hardware_drivers.presence import check_presence
+from hardware_drivers.settings import load_hardware
+from policy_server.controllers import controller_entry
+
+STOPPED = "stopped by the user"
+LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
+SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
+PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
+LOCKSTEP_SILENT_S = 10.0  # in lock step both are busy, and a plant itself waits 5 s for an answer
+
+
+@dataclass(frozen=True)
+class Execution:
+    """How the processes of a run ended."""
+
+    failure: str  # why it did not come to its planned end; empty if it did
+    plant_steps: int  # commands that the plant received in lock step
+
+
+def execute(request: RunRequest) -> Execution:
+    """Run once; the bag then lies at `request.record`.
+
+    Raises:
+        ConfigError: Another run goes on in this ROS domain, a plant of this name lives in it, or the plant refused its
+            configuration.
+        DeviceError: The device is not there.
+    """
+    return run_nodes(request, _watch)
+
+
+Watch = Callable[[RunRequest, RunPlan, Supervisor, ProcessGroup], str]
+
+
+def run_nodes(request: RunRequest, watch: Watch) -> Execution:
+    """Start every node of a request, watch them, and stop them in order.
+
+    Args:
+        request: What to run.
+        watch: Called once the processes are started; gets them ready, waits for the end, and returns why the run
+            failed, empty if it did not.
+
+    Raises:
+        ConfigError: As of `execute`.
+        DeviceError: The device is not there.
+    """
+    if request.plan.hardware and not request.plan.emulated:
+        check_presence(load_hardware(request.plan.hardware).driver)
+    with claimed_domain(request.plan.robot_name):
+        return _run(request, watch)
+
+
+def _run(request: RunRequest, watch: Watch) -> Execution:
+    plan = replace(request.plan, supervised=True)
+    group = ProcessGroup()
+    failure, plant, ends = "", Report(), list[Ended]()
+    folders = contextlib.ExitStack()
+    try:
+        wires_folder = Path(folders.enter_context(_wires_folder()))
+        specs = list(system_rows(plan, record=_recording(request), wires_folder=wires_folder).values())
+        for spec in specs:
+            group.start(spec)
+        with supervisor(plan) as overseer:
+            if overseer.sees_living_plant():
+                _withdraw(group, specs, request.record)
+                overseer.refuse_living_plant()
+                for spec in specs:
+                    group.start(spec)
+            plant = overseer.plant
+            try:
+                failure = watch(request, plan, overseer, group)
+            except KeyboardInterrupt as stop:
+                failure = str(stop) or STOPPED
+                overseer.stop_plant()  # a plant that goes on would miss the commands of a controller that ends
+            # The controller first: the plant then shows that its actuators are safe, and the recorder sees it.
+            ends += group.stop("controller")
+            ends += group.stop("plant")
+    except KeyboardInterrupt as stop:
+        failure = str(stop) or STOPPED
+    finally:
+        ends += group.stop_all()
+        folders.close()
+    if any(end.name == "plant" and end.returncode == BAD_USAGE for end in ends):
+        shutil.rmtree(request.record, ignore_errors=True)  # nothing has run
+        raise ConfigError(failure)
+    return Execution(_with_ends(failure, ends), int(plant.values.get("steps", 0)))
+
+
+def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
+    """Stop nodes that have just been started, all at once, before they publish anything.
+
+    They start while discovery looks for others, so that the look costs no time. It ends before they are up.
+    """
+    group.stop(*(spec.name for spec in specs))
+    shutil.rmtree(
+        record, ignore_errors=True
+    )  # it did not exist before; a recorder that was quick has made it
+
+
+def _wires_folder() -> tempfile.TemporaryDirectory[str]:
+    """A folder for the wires of an emulator that are files."""
+    return tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
+
+
+def _with_ends(failure: str, ends: list[Ended]) -> str:
+    """Add the children that did not end well when they were asked to, unless the failure speaks of them already."""
+    # SIGTERM itself ends a child only before it can listen, and then nothing is lost.
+    bad = [end for end in ends if end.returncode not in (0, -signal.SIGTERM)]
+    if failure:
+        bad = [end for end in bad if end.name not in failure and not end.forced]
+    return "; ".join([*([failure] if failure else []), *(f"{end.text} when it was stopped" for end in bad)])
+
+
+def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
+    """Start the run and wait for its end; returns why it failed, or an empty text."""
+    external = controller_entry(plan.controller).is_external
+    try:
+        if external:
+            wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))
+        starting = while_starting(group, overseer)
+        now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
+        if not plan.goals and external:
+            overseer.publish_goal(request.mission, time_ns=now_ns, alive=starting)
+        elif not plan.goals:
+            overseer.give_goal(
+                request.mission, time_ns=now_ns, alive=starting, listeners=CONTROLLER_AND_RECORDER
+            )
+        elif not external:
+            overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
+        overseer.start_plant(starting, lambda: group.last_words("plant"))
+        if external:
+            wait_for_reader(plan, overseer, lambda: raise_if_ended(group))
+        with time_bar("running", plan.duration_s) as moved:
+            _wait_for_end(plan, overseer, group, moved, end_on_estop=request.end_on_estop)
+    except RunFailed as error:
+        time.sleep(LAST_WORDS_S)
+        return with_plant_reaction(str(error), overseer)
+    return ""
+
+
+def _wait_for_end(
+    plan: RunPlan,
+    overseer: Supervisor,
+    group: ProcessGroup,
+    moved: Callable[[float, str], None],
+    *,
+    end_on_estop: bool,
+) -> None:
+    """Watch a run until its time is over; an e-stop holds the robot meanwhile, and ends the run only if asked to."""
+    began = time.monotonic()
+    plant_limit_s, controller_limit_s = silence_limits_s(plan)
+    limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
+
+    def failed() -> bool:
+        said = overseer.plant.message
+        held = said.startswith(HOLDS) and not end_on_estop
+        # Before the controller acts, a late command changes nothing; one that hangs or dies is noticed all the same.
+        waits = said.startswith(NO_COMMAND) and overseer.controller.values.get("mode") == "armed"
+        return overseer.plant.level == "error" and not (held or waits)
+
+    def running() -> None:
+        raise_if_ended(group)
+        plant, controller = overseer.plant, overseer.controller
+        moved(passed_s(plan, plant), state_words(distance_of(controller.values), mode_of(plant, controller)))
+        if failed():
+            raise RunFailed(f"plant: {overseer.plant.message}")
+        if overseer.controller.level == "error":
+            raise RunFailed(f"controller: {overseer.controller.message}")
+        raise_if_silent("controller", overseer.controller, controller_limit_s)
+        raise_if_silent("plant", overseer.plant, plant_limit_s)
+        if time.monotonic() - began > limit_s:
+            raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
+
+    errors: list[str] = []
+
+    def finished() -> bool:
+        if failed():
+            errors.append(overseer.plant.message)  # kept: a command that comes now takes the error back
+        return bool(errors) or overseer.plant.values.get("mode") == "finished"
+
+    overseer.wait_until(finished, running)
+    if errors:
+        raise RunFailed(f"plant: {errors[0]}")
+    running()
+
+
+def passed_s(plan: RunPlan, plant: Report) -> float:
+    """How much of a run is over [s]."""
+    if plan.hardware:
+        return float(plant.values.get("ticks") or 0.0) * load_robot(plan.robot).timing.physics_dt
+    return max(0.0, float(plant.values.get("sim_time_s") or 0.0) - SIMULATION_START_NS / 1e9)
+
+
+def silence_limits_s(plan: RunPlan) -> tuple[float, float]:
+    """How long plant and controller may be silent, in wall-clock time [s]."""
+    if plan.lockstep:
+        return LOCKSTEP_SILENT_S, LOCKSTEP_SILENT_S
+    return PLANT_SILENT_S, max(SILENT_S, 3.0 / (plan.control_hz * plan.rate))
+
+
+def raise_if_silent(name: str, report: Report, limit_s: float) -> None:
+    """Give up on a node that has reported and then fell silent for longer than a limit [s].
+
+    Raises:
+        RunFailed: It has.
+    """
+    silent_s = time.monotonic() - report.heard
+    if report.heard and silent_s > limit_s:
+        raise RunFailed(f"{name}: has not reported for {silent_s:.1f} s; it hangs")
+
+
+def with_plant_reaction(reason: str, overseer: Supervisor) -> str:
+    """Why a run failed, and what the plant reported of it."""
+    reaction = overseer.plant.message
+    if overseer.plant.level == "error" and reaction not in reason:
+        return f"{reason}; plant: {reaction}"
+    return reason
+
+
+def _recording(request: RunRequest) -> dict[str, str]:
+    plan = request.plan
+    more = {
+        "goal": list(request.goal) if request.goal else None,
+        "command": request.command,
+        **_of_goals(plan),
+    }
+    return {
+        "directory": str(request.record),
+        "info": run_info(plan, more),
+        "files": attachments(plan),
+    }
+
+
+def _of_goals(plan: RunPlan) -> dict[str, Any]:
+    """What the evaluation of a run needs to know of its goal file."""
+    if not plan.goals:
+        return {}
+    file = load_goals(plan.goals)
+    return {"path": shown_path(file), "endless": is_endless(file)}

@@ -1,0 +1,1 @@
+"""The command `fulmar`: each command parses, calls one function, prints."""

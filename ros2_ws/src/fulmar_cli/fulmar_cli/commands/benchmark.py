@@ -1,0 +1,60 @@
+"""`fulmar benchmark`: what was measured, beside what was published."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+import typer
+
+from fulmar_cli.commands.benchmark_drift import drift
+from fulmar_cli.commands.benchmark_latency import endurance, latency
+from fulmar_cli.commands.benchmark_roboran import roboran
+from fulmar_cli.commands.benchmark_throughput import throughput
+from fulmar_cli.commands.benchmark_training import training
+from fulmar_core.errors import ConfigError
+
+# Of our own machinery, by module of `tests/benchmarks`: they come with a checkout, not with an installed Fulmar.
+OF_A_CHECKOUT = {
+    "estimator": ("estimator.command", "Compare the state estimator with the mean of 30 poses."),
+    "hardware": ("hardware", "Drive emulated devices to their goals, through driver and protocol."),
+    "identify": (
+        "identification.command",
+        "Drive random machines in MuJoCo, and identify them from their bags.",
+    ),
+    "network": ("network", "Drive a robot by a controller on another host, over a bad cable."),
+    "recorder": ("recorder.command", "Measure what recording costs the control loop and what it loses."),
+}
+CHECKOUT = Path(__file__).resolve().parents[5]
+
+benchmark = typer.Typer(
+    help="Measure policies, simulators, drivers, real time and training, beside what was published.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+for command in (drift, endurance, latency, roboran, throughput, training):
+    benchmark.command()(command)
+
+
+def _missing(name: str) -> Callable[[typer.Context], None]:
+    """A command that says where to run it."""
+
+    def refuse(_context: typer.Context) -> None:
+        raise ConfigError(
+            f"`fulmar benchmark {name}` measures Fulmar's own machinery and lies in tests/benchmarks of its sources. "
+            "Run it from a checkout, after `make dev`."
+        )
+
+    return refuse
+
+
+for name, (module, help_line) in OF_A_CHECKOUT.items():
+    if (CHECKOUT / "tests" / "benchmarks").is_dir():
+        benchmark.command(name)(getattr(import_module(f"tests.benchmarks.{module}"), name))
+    else:
+        benchmark.command(
+            name,
+            help=f"{help_line} Only from a checkout.",
+            context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+        )(_missing(name))

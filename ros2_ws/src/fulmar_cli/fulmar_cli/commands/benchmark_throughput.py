@@ -1,0 +1,152 @@
+"""`fulmar benchmark throughput`: how fast the batch simulates, beside MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.progress import step_bar
+from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, TaskOption
+from fulmar_core.errors import ConfigError, UnknownNameError
+
+DEVICES, LIBRARIES = ("cpu", "cuda"), ("compiled", "numpy", "torch")
+ROUNDS = 5
+
+
+def throughput(
+    robots: Annotated[
+        str | None,
+        typer.Option(metavar="R,...", help="Names with commas between; all by default."),
+    ] = None,
+    device: Annotated[
+        str, typer.Option(metavar="cpu|cuda", help="Where the batch is computed; cuda needs torch.")
+    ] = "cpu",
+    library: Annotated[
+        str | None,
+        typer.Option(
+            metavar="compiled|numpy|torch",
+            help="Who computes the batch: on cpu a compiled kernel (which takes torch and g++) or else numpy, on cuda "
+            "torch.",
+        ),
+    ] = None,
+    worlds: Annotated[int, typer.Option(metavar="N", min=1, help="Worlds of the batch.")] = 4096,
+    task: TaskOption = "go_to_pose",
+    scenario: ScenarioOption = "randomised",
+    cores: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Processes of the batch, and threads of MuJoCo's rollout.")
+    ] = 2,
+    seconds: Annotated[
+        float, typer.Option(metavar="S", min=0.05, help="Time of each of the measurements [s].")
+    ] = 1.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
+
+    A step of the batch has all that training asks for: disturbances, odometry, observation, reward and new episodes.
+    MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
+    the medians are printed. Robots on water are also rolled out by MuJoCo in the water of the plant ("in water").
+    Before that a step of each robot is compiled, which takes 10 to 30 s.
+
+    Try:
+
+    fulmar benchmark throughput --robots kingfisher,turtlebot2 --json
+    """
+    from fulmar_cli.extras import require
+    from fulmar_core.disturbances.scenario import load_scenario
+    from fulmar_core.paths import config_names
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+
+    library = library or _fastest(device)
+    for kind, name, known in (("device", device, DEVICES), ("library", library, LIBRARIES)):
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    names = config_names("robots") if robots is None else [name.strip() for name in robots.split(",")]
+    chosen = [load_robot(name) for name in names]
+    the_task, the_scenario = load_task(task), load_scenario(scenario)
+    require("mujoco", *([] if library == "numpy" else ["torch"]))
+    _check_device(device, library)
+    from fulmar_benchmarks.throughput import Library, measure
+
+    with step_bar("measuring", len(chosen) * ROUNDS) as progress:
+        done = iter(range(1, len(chosen) * ROUNDS + 1))
+        found = measure(
+            chosen,
+            the_task,
+            the_scenario,
+            worlds=worlds,
+            library=Library(library, device),
+            cores=cores,
+            seconds=seconds,
+            rounds=ROUNDS,
+            progress=lambda: progress(next(done)),
+        )
+    figures: dict[str, Any] = {
+        "robots": found,
+        "worlds": worlds,
+        "library": library,
+        "device": device,
+        "task": task,
+        "scenario": scenario,
+        "cores": cores,
+    }
+    if as_json:
+        print_json(figures)
+    else:
+        _print(figures)
+
+
+def _fastest(device: str) -> str:
+    """The library that makes most steps here."""
+    from importlib.util import find_spec
+
+    if device != "cpu":
+        return "torch"
+    if find_spec("torch") is not None:
+        from training.kernel import compiler_found
+
+        if compiler_found():
+            return "compiled"
+    console.print("note: without torch and g++ nothing is compiled; NumPy computes the batch.")
+    return "numpy"
+
+
+def _check_device(device: str, library: str) -> None:
+    """Refuse devices that the library or the machine does not have."""
+    if device != "cuda":
+        return
+    if library != "torch":
+        raise ConfigError("--device cuda needs --library torch.")
+    import torch
+
+    if not torch.cuda.is_available():
+        raise ConfigError("--device cuda: torch sees no graphics card here.")
+
+
+def _print(figures: dict[str, Any]) -> None:
+    table = Table(
+        title=f"steps/s · {figures['worlds']:,} worlds · {figures['task']} · {figures['scenario']} · "
+        f"{figures['library']} on {figures['device']} · {figures['cores']} cores"
+    )
+    table.add_column("robot")
+    for column in ("batch", "MuJoCo", "ratio", "in water", "ratio there"):
+        table.add_column(column, justify="right")
+    for name, found in figures["robots"].items():
+        table.add_row(
+            name,
+            f"{found['batch_steps_per_s']:,.0f}",
+            f"{found['mujoco_steps_per_s']:,.0f}",
+            f"{found['ratio']:.1f}",
+            *_afloat(found),
+        )
+    output.print(table)
+
+
+def _afloat(found: dict[str, float]) -> tuple[str, ...]:
+    """What is measured of robots on water alone."""
+    if "ratio_with_water" not in found:
+        return ()
+    return f"{found['mujoco_with_water_steps_per_s']:,.0f}", f"{found['ratio_with_water']:.1f}"

@@ -1,0 +1,125 @@
+"""`fulmar commission`: find the nozzle, wheel or propeller that each wire of a robot drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fulmar_bringup.console import console, output, print_json
+from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.exit_codes import DONE, FAILED
+
+
+def commission(
+    hardware: Annotated[
+        str,
+        typer.Argument(metavar="HARDWARE", help="A name from `fulmar list hardware`, or a .yaml file."),
+    ],
+    yes: Annotated[
+        bool, typer.Option("--yes", help="The robot may move: the air is open and 0.5 m around it are free.")
+    ] = False,
+    arm: ArmOption = False,
+    port: Annotated[str, typer.Option(metavar="P", help="Takes the place of the hardware file's port.")] = "",
+    write: Annotated[
+        bool, typer.Option("--write", help="Write what was found into the hardware file.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the corrected hardware file here instead.")
+    ] = None,
+    emulate: Annotated[bool, typer.Option("--emulate", help="An emulator speaks for the device.")] = False,
+    wiring: Annotated[
+        str,
+        typer.Option(
+            metavar="W", help="With --emulate: as_written, shuffled, inverted or dead (one wire, by --seed)."
+        ),
+    ] = "as_written",
+    seed: SeedOption = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Find out on the robot which nozzle, wheel or propeller each wire drives.
+
+    Without --yes nothing moves: with the air closed, each valve clicks once in the order of the wires. With --yes and
+    open air, each wire is pulsed for at most 0.3 s (propellers and wheels come up to their level before), the motion is
+    read from odometry or motion capture, and the order is printed as the hardware file needs it. The e-stop, 0.5 m of
+    travel, 0.5 s without a pose and Ctrl-C end in the safe state. A boat with an autopilot needs --arm, too.
+
+    The exit code is 0 if every wire was identified, 1 if one did not answer or anything else is wrong.
+
+    Try:
+
+    fulmar commission zero_g_lab
+
+    fulmar commission zero_g_lab --yes --write
+
+    fulmar commission turtlebot2 --emulate --wiring shuffled --seed 3 --yes
+    """
+    from fulmar_bringup.commissioning.commission import WIRINGS, Request
+    from fulmar_bringup.commissioning.commission import commission as conduct
+    from fulmar_bringup.commissioning.hardware_file import line_of, write_line
+    from fulmar_bringup.emulation import check_emulated
+    from fulmar_bringup.planning import check_arming
+    from fulmar_cli.extras import require
+    from hardware_drivers.own_driver import check_own_driver
+    from hardware_drivers.presence import check_presence
+    from hardware_drivers.settings import hardware_path, load_hardware
+
+    file = load_hardware(hardware)
+    if wiring not in WIRINGS:
+        raise UnknownNameError("wiring", wiring, WIRINGS)
+    if not emulate and wiring != "as_written":
+        raise ConfigError("--wiring goes with --emulate: a real robot has the wiring that it has.")
+    if not file.opens_valves and not yes:
+        raise ConfigError(
+            f"'{file.robot}' has no valves to click: each pulse moves it. Give --yes once 0.5 m around it are free."
+        )
+    if (write or out) and not yes:
+        raise ConfigError("clicks find no order to write: --write and --out need --yes.")
+    check_arming(hardware, arm=arm)
+    if emulate:
+        check_emulated(file.driver)
+    check_own_driver(file.driver)
+    require(*(("mujoco",) if emulate else ()), *file.needs)
+    if not emulate:
+        check_presence(file.driver, port)
+    say = (lambda text: None) if as_json else lambda text: output.print(f"  {text}", markup=False)
+    if not as_json:
+        output.print(
+            "each wire is pulsed; keep a hand on the e-stop (`fulmar estop`)" if yes
+            else "AIR CLOSED? Each valve clicks once; note which one you hear:", markup=False,
+        )  # fmt: skip
+    found = conduct(Request(hardware, yes, emulate, wiring, seed, arm, port), say)
+    value = found.get(found.get("key", ""))
+    target = out or (hardware_path(hardware) if write else None)
+    found["written"] = None
+    if target is not None and value is not None and found["success"]:
+        write_line(hardware_path(hardware), target, found["key"], value)
+        found["written"] = str(target)
+    if as_json:
+        print_json(found)
+    elif yes:
+        _print(found, line_of(found["key"], value) if value is not None else "")
+        if target is not None and found["written"] is None:
+            console.print("nothing was written: correct what is named above first", markup=False)
+    else:
+        output.print("heard each? Open the air, free 0.5 m around the robot, and add --yes", markup=False)
+    raise typer.Exit(DONE if found["success"] else FAILED)
+
+
+def _print(found: dict[str, Any], line: str) -> None:
+    for wire in found["wires"]:
+        drives = wire["drives"] or "DOES NOT ANSWER"
+        same = "as the file says" if drives == wire["file_says"] else f"the file says {wire['file_says']}"
+        output.print(f"{wire['name']}: {drives} ({same})", markup=False)
+    for group in found["indistinguishable"]:
+        output.print(f"no motion distinguishes: {', '.join(group)}", markup=False)
+    for problem in found["problems"]:
+        output.print(f"WRONG: {problem}", markup=False, soft_wrap=True)
+    if line:
+        output.print(
+            ("the file is right: " if found["as_written"] else "write into the file: ") + line, markup=False
+        )
+    if found["written"]:
+        output.print(f"written: {found['written']}", markup=False)

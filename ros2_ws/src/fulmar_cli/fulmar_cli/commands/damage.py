@@ -1,0 +1,39 @@
+"""One rule for all that read bags: damage is named, and the exit code tells of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from fulmar_bringup.console import console
+from fulmar_core.exit_codes import DONE, FAILED
+
+if TYPE_CHECKING:
+    from fulmar_bags.contents import Bag
+
+
+def open_and_warn(path: Path) -> Bag:
+    """Open a bag, and name what of it could not be read.
+
+    Raises:
+        BagError: As `open_bag`.
+    """
+    from fulmar_bags.contents import open_bag
+
+    bag = open_bag(path)
+    warn(bag.warnings)
+    return bag
+
+
+def warn(lines: Iterable[str]) -> None:
+    """Say what is wrong, beside the answer."""
+    for line in lines:
+        console.print(f"warning: {line}", markup=False, soft_wrap=True)
+
+
+def finish(*bags: Bag, good: bool = True) -> typer.Exit:
+    """The end of a command: done only if it found nothing wrong, and every bag was read whole."""
+    return typer.Exit(DONE if good and not any(bag.warnings for bag in bags) else FAILED)

@@ -1,0 +1,101 @@
+"""`fulmar demo`: the whole thing in a minute."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fulmar_bringup.console import console, output
+
+START, GOAL, DURATION_S, RATE = (2.5, 1.5, 120.0), (0.0, 0.0, 0.0), 30.0, 2.0
+
+
+def demo(
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of bags and report; runs/demo_<time> by default."),
+    ] = None,
+) -> None:
+    """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
+    from fulmar_bags.run_reader import read_run
+    from fulmar_bringup.planning import plan_run
+    from fulmar_cli.extras import require
+    from fulmar_evaluation.report import write_report
+    from fulmar_evaluation.run_outcome import run_and_evaluate
+
+    require("mujoco", "onnxruntime", "matplotlib")
+    out = out or Path("runs") / f"demo_{time.strftime('%Y%m%d_%H%M%S')}"
+    outcomes = []
+    for controller in ("policy", "lqr"):
+        console.print(
+            f"{controller}: a simulated platform, the {controller} node and a recorder, each a process of its own, "
+            f"{DURATION_S:g} s at {RATE:g} times real time",
+            markup=False,
+        )
+        request = plan_run(
+            robot="floating_platform",
+            task="go_to_pose",
+            controller=controller,
+            backend="mujoco",
+            policy=None,
+            goal=GOAL,
+            start=START,
+            duration_s=DURATION_S,
+            lockstep=False,
+            rate=RATE,
+            control_hz=None,
+            scenario="nominal",
+            seed=1,
+            record=out / controller,
+            command="fulmar " + " ".join(sys.argv[1:]),
+        )
+        outcome = run_and_evaluate(request)
+        if outcome.failure:  # Ctrl-C among them: there is nothing to compare
+            console.print(f"{controller}: {outcome.failure}", markup=False, soft_wrap=True)
+            raise typer.Exit(outcome.exit_code)
+        outcomes.append(outcome)
+    output.print(_table([outcome.summary for outcome in outcomes]))
+    page = write_report([read_run(out / name) for name in ("policy", "lqr")], out / "report.html")
+    output.print(f"report: {page}", markup=False, soft_wrap=True)
+    output.print(f"bags:   {out / 'policy'}  {out / 'lqr'}", markup=False, soft_wrap=True)
+    raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
+
+
+def _table(summaries: list[dict[str, Any]]) -> Table:
+    table = Table(title="floating platform, go to pose, over ROS 2")
+    columns = (
+        "controller",
+        "goal",
+        "time to goal",
+        "position",
+        "heading",
+        "valves",
+        "rate",
+        "latency p99",
+        "trips",
+    )
+    for column in columns:
+        left = column in ("controller", "goal")
+        table.add_column(column, justify="left" if left else "right", no_wrap=left)
+    for s in summaries:
+        table.add_row(
+            str(s["controller"]),
+            "met" if s["success"] else "missed",
+            _number(s["time_to_target_s"] if s["success"] else None, 1.0, "s", 1),
+            _number(s["final_position_error_m"], 100.0, "cm", 1),
+            _number(s["final_heading_error_deg"], 1.0, "°", 1),
+            _number(s["actuator_use"], 100.0, "%", 0),
+            _number(s["control_rate_hz"], 1.0, "Hz", 1),
+            _number(s["latency_ms"]["p99"], 1.0, "ms", 1),
+            str(s["watchdog_trips"]),
+        )
+    return table
+
+
+def _number(value: float | None, factor: float, unit: str, digits: int) -> str:
+    return "–" if value is None else f"{value * factor:.{digits}f} {unit}"

@@ -1,0 +1,107 @@
+"""`fulmar goals`: send a running robot goals, from a file or one from the command line."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from fulmar_cli.commands.arguments import NameOption, read_goal
+from fulmar_cli.commands.list import list_names
+from fulmar_core.errors import ConfigError
+from fulmar_core.robot_name import checked_name
+
+GIVE_UP_S = 5.0  # without odometry or without a subscriber of the goals
+
+
+def goals(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME",
+            help="A name from `fulmar list goals`, or a path that ends in .yaml; without it they are listed.",
+        ),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R", help="Type of the robot that is to do it: a name from `fulmar list robots`."
+        ),
+    ] = None,
+    robot_name: NameOption = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            "--pose",
+            metavar="X,Y,DEG",
+            help="One goal instead of a file: x [m], y [m], heading [deg]; or x,y for a position.",
+        ),
+    ] = None,
+    as_path: Annotated[
+        bool,
+        typer.Option(
+            "--as-path", help="Tell all positions or poses at once, for tasks that pass through them."
+        ),
+    ] = False,
+    control_hz: Annotated[
+        float, typer.Option(metavar="HZ", min=0.01, help="Velocities come so often along a path.")
+    ] = 10.0,
+    wait: Annotated[
+        bool,
+        typer.Option("--wait", help=f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default."),
+    ] = False,
+) -> None:
+    """Tell a running robot its goals, one after the other, until they are done or Ctrl-C.
+
+    Positions, poses, velocities by the clock, or a path to follow: a file in configs/goals says which; or one pose or
+    position from the command line. The robot must be up, with a controller whose task takes such goals; velocities end
+    in standstill.
+
+    Try, in one terminal:
+
+    fulmar run floating_platform --task track_velocities --duration 120
+
+    and in another:
+
+    fulmar goals lab_circle --robot floating_platform
+
+    or, where the robot's task is go_to_pose:
+
+    fulmar goals --robot floating_platform --pose 1,-0.5,90
+
+    Exit code: 0 done, or stopped by Ctrl-C, 1 there is no robot or no controller that takes such goals.
+    """
+    if name is None and pose is None:
+        list_names("goals")
+        return
+    if name is not None and pose is not None:
+        raise ConfigError(f"'{name}' and --pose are two goals: give one of them.")
+    place = read_goal(pose, "--pose")
+    if robot is None:
+        example = name if place is None else f"--pose {pose}"
+        raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
+    from fulmar_bringup.goal_plan import check_pace
+    from fulmar_bringup.node_table import goals_spec
+    from fulmar_bringup.processes import command_line
+    from fulmar_core.goal_files import load_goals, single_goal
+    from fulmar_core.goal_sequence import goal_sequence
+    from fulmar_core.robot import load_robot
+
+    the_robot = load_robot(robot)
+    given = None if place is None else single_goal(place)
+    file = given or load_goals(name or "")
+    goal_sequence(file, the_robot, as_path=as_path)  # whatever is wrong is said in one line
+    check_pace(file, name or "", the_robot)
+    spec = goals_spec(
+        robot,
+        name or "",
+        name="" if robot_name is None else checked_name(robot_name),
+        as_path=as_path,
+        control_hz=control_hz,
+        give_up_s=0.0 if wait else GIVE_UP_S,
+    )
+    from fulmar_ros.goal_node import GoalNode
+    from fulmar_ros.runtime import run_node
+
+    _, _, _, *arguments = command_line(spec)  # python -m module
+    raise typer.Exit(run_node(lambda request_exit: GoalNode(request_exit, goals=given), arguments))

@@ -1,0 +1,145 @@
+"""`fulmar identify`: from driven runs to the numbers of the machine that drove them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fulmar_bringup.console import console, output, print_json
+from fulmar_cli.commands.arguments import JsonOption
+from fulmar_cli.commands.damage import warn
+from fulmar_core.errors import ConfigError
+
+_NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
+_QUANTITY = re.compile(rf"(?P<value>{_NUMBER})(?:(?:\+-|±)(?P<error>{_NUMBER}))?(?:\s*(?:kg|N|s|m|kg·m²))?")
+
+
+def identify(
+    bags: Annotated[list[Path], typer.Argument(metavar="BAG...", help="Driven runs of one robot.")],
+    known: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE+-ERROR", help="A quantity that was measured, such as mass=5.32+-0.02."
+        ),
+    ] = None,
+    ballast: Annotated[
+        list[str] | None,
+        typer.Option(metavar="BAG=KG+-KG", help="A weight that was aboard during one of the runs, anywhere."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a calibration for --calibration of run, evaluate, train."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Estimate mass, inertia, thrust, drag, wheel scale and delay from runs, with intervals of 95 % confidence.
+
+    Motion shows forces only in proportion to mass. For a platform with thrusters, say one thing more: its mass, or the
+    mass of a ballast that was aboard during one of two runs. ERROR is half of a 95 % interval; without it VALUE counts
+    as exact. A boat takes the thrust curve of its YAML for true.
+
+    Try:
+
+    fulmar run floating_platform --controller excite --duration 120 --record runs/bare
+
+    fulmar identify runs/bare --known mass=5.32+-0.02 --out calibration.yaml
+
+    fulmar identify runs/bare runs/heavy --ballast runs/heavy=2.000+-0.005
+    """
+    from fulmar_core.calibration import save_calibration
+    from fulmar_core.identification.identify import SIGMAS, Weight, calibration_of
+    from fulmar_core.identification.identify import identify as estimate
+    from fulmar_core.identification.model import Known
+    from fulmar_evaluation.driven_run import driven_run
+
+    known_values = []
+    for text in known or []:
+        name, value, error = _read(text, "--known", "mass=5.32+-0.02")
+        known_values.append(Known(name, value, max(error / SIGMAS, 1e-6 * value)))
+    loads, ballasts = _loads(bags, ballast or [])
+    runs = [driven_run(bag, load=load) for bag, load in zip(bags, loads, strict=True)]
+    warn(f"{bag}: {line}" for bag, (_, _, lines) in zip(bags, runs, strict=True) for line in lines)
+    names = sorted({robot.name for robot, _, _ in runs})
+    if len(names) > 1:
+        raise ConfigError(f"the bags are of {', '.join(names)}. Identify one robot at a time.")
+    robot = runs[0][0]
+    weights = {load: Weight(value, error) for load, (value, error) in ballasts.items()}
+    found = estimate(robot, [drive for _, drive, _ in runs], known=known_values, ballasts=weights)
+    calibration = calibration_of(robot, found, [str(bag) for bag in bags])
+    if out is not None:
+        save_calibration(calibration, out)
+    document: dict[str, Any] = {
+        "robot": robot.name,
+        "bags": [str(bag) for bag in bags],
+        "driven_s": round(sum(drive.duration_s for _, drive, _ in runs), 3),
+        "scale": found.scale,
+        "estimates": {
+            name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit}
+            for name, e in found.fit.estimates.items()
+        },
+        "untold": list(found.untold),
+        "residuals": dict(zip(("x_m", "y_m", "heading_rad"), found.fit.noise, strict=True)),
+        "windows": found.fit.windows,
+        "calibration": None if out is None else str(out),
+    }
+    if found.untold:
+        warn(
+            [
+                f"the runs tell nothing of {', '.join(found.untold)}: left out of the calibration. Drive more briskly."
+            ]
+        )
+    if not found.trusted:
+        console.print(f"note: {found.scale}.", markup=False, soft_wrap=True)
+    if as_json:
+        print_json(document)
+        return
+    _print(document)
+
+
+def _read(text: str, option: str, example: str) -> tuple[str, float, float]:
+    """Read `NAME=VALUE` or `NAME=VALUE+-ERROR`; a name may hold anything, as paths do."""
+    name, _, quantity = text.rpartition("=")
+    match = _QUANTITY.fullmatch(quantity.strip())
+    if not name or match is None or float(match["value"]) <= 0.0:
+        raise ConfigError(
+            f"{option} {text}: must be a name, '=', a number greater than 0 and, if known, its error. "
+            f"Example: {option} {example}"
+        )
+    return name.strip(), float(match["value"]), float(match["error"] or 0.0)
+
+
+def _loads(bags: list[Path], ballast: list[str]) -> tuple[list[int], dict[int, tuple[float, float]]]:
+    """Number of the ballast of each bag, 0 for none; and mass and error of each ballast."""
+    loads, ballasts = [0] * len(bags), {}
+    places = {bag.resolve(): i for i, bag in enumerate(bags)}
+    for number, text in enumerate(ballast, start=1):
+        name, mass, error = _read(text, "--ballast", "runs/heavy=2.0+-0.005")
+        place = places.get(Path(name).resolve())
+        if place is None:
+            raise ConfigError(f"--ballast {text}: '{name}' is none of the bags: {', '.join(map(str, bags))}.")
+        if loads[place]:
+            raise ConfigError(f"--ballast: '{name}' is named twice; add the masses up.")
+        loads[place], ballasts[number] = number, (mass, error)
+    if ballasts and all(loads):
+        raise ConfigError("--ballast: one run without ballast is needed to compare with.")
+    return loads, ballasts
+
+
+def _print(document: dict[str, Any]) -> None:
+    table = Table(title=f"{document['robot']}, {document['driven_s']:g} s in {document['windows']} windows")
+    for column in ("", "value", "95 % from", "to", "unit"):
+        table.add_column(column, justify="left" if column in ("", "unit") else "right")
+    for name, e in document["estimates"].items():
+        table.add_row(name, *(f"{e[part]:.5g}" for part in ("value", "low", "high")), e["unit"])
+    output.print(table)
+    output.print(f"{document['scale']}", markup=False, soft_wrap=True)
+    if document["calibration"]:
+        output.print(
+            f"written: {document['calibration']}; use it with --calibration {document['calibration']}",
+            markup=False,
+            soft_wrap=True,
+        )

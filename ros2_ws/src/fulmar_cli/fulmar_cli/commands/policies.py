@@ -1,0 +1,93 @@
+"""`fulmar policies`: make the policies that come with Fulmar."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fulmar_bringup.console import console, output, print_json
+from fulmar_cli.commands.arguments import JsonOption
+from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.exit_codes import FAILED
+
+
+def policies(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Bundles such as kingfisher_go_to_pose; all."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the bundles; the shipped ones by default.")
+    ] = None,
+    runs: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run folders.")] = Path(
+        "runs/policies"
+    ),
+    anew: Annotated[
+        bool,
+        typer.Option("--anew", help="From the beginning, also what is made; it is kept beside its run."),
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make the shipped policies of configs/policies.yaml: train, judge in MuJoCo, export.
+
+    A bundle that was made from the same robot, task, scenario, settings, seed and updates is left as it is; a run that
+    was broken off is resumed. So the command can be repeated until everything is there. The same seed and updates make
+    the same weights on the same kind of processor.
+
+    Try:
+
+    fulmar policies
+
+    fulmar policies kingfisher_go_to_pose --anew
+    """
+    from fulmar_core.provenance import git_revision
+    from policy_server.shipped import policies_directory
+    from training.executors import LocalExecutor
+    from training.job_bars import JobBars
+    from training.policies import expected_s, is_made, load_policy_table, make_policies, policy_job, set_aside
+
+    table = load_policy_table()
+    known = [policy.name for policy in table.policies]
+    for name in names or []:
+        if name not in known:
+            raise ConfigError(f"configs/policies.yaml has no policy '{name}'.{did_you_mean(name, known)}")
+    jobs = [
+        policy_job(
+            policy,
+            episodes=table.episodes,
+            runs=runs,
+            bundles=out or policies_directory(),
+            command="fulmar " + " ".join(sys.argv[1:]),
+            git_revision=git_revision(),
+        )
+        for policy in table.policies
+        if not names or policy.name in names
+    ]
+    missing = jobs if anew else [job for job in jobs if not is_made(job)]
+    minutes = expected_s(missing, table.at_once) / 60.0
+    for job in jobs if anew else []:
+        if aside := set_aside(job):
+            console.print(f"{job.name}: the old one is in {aside}", markup=False, soft_wrap=True)
+    console.print(f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the judging")
+    with JobBars(missing) as bars:
+        lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
+    if as_json:
+        print_json({"policies": lines})
+    else:
+        _print_lines(lines)
+    if not all(line["good"] for line in lines):
+        raise typer.Exit(FAILED)
+
+
+def _print_lines(lines: list[dict[str, Any]]) -> None:
+    width = max(len(line["policy"]) for line in lines)
+    output.print(f"{'policy':<{width}}  success  needed", markup=False)
+    for line in lines:
+        success = "   -   " if line["success"] is None else f"{line['success']:7.3f}"
+        note = "" if line["good"] else f"  {line.get('error', 'too low')}"
+        output.print(
+            f"{line['policy']:<{width}}  {success}  {line['needed']:6.2f}{note}", markup=False, soft_wrap=True
+        )

@@ -1,0 +1,49 @@
+"""`fulmar swap`: go on with another policy, while a robot is driven by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fulmar_bringup.console import output, print_json
+from fulmar_cli.commands.arguments import JsonOption
+from fulmar_core.exit_codes import FAILED
+from fulmar_core.paths import config_names
+from fulmar_core.robot_name import checked_name
+
+FIND_S, LOAD_S = 5.0, 20.0
+
+
+def swap(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="Name of the running robot: its type, or its --name.")
+    ],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A policy bundle, on the robot's own disk.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Let a running robot go on with another policy.
+
+    It is loaded and warmed up beside the one that runs, and takes over between two commands. A bundle that is damaged,
+    for another robot, task or rate, or not signed where that is asked for, is refused, and the policy that runs goes
+    on. Exit code 1 then.
+
+    Try:
+
+    fulmar swap floating_platform runs/bundles/go_to_pose
+    """
+    from fulmar_bringup.robot_operator import operator
+
+    if robot not in config_names("robots"):
+        checked_name(robot)
+    with operator() as person:
+        sent = str(folder.absolute())
+        said = person.say_swap(robot, sent, find_s=FIND_S, answer_s=LOAD_S)
+    done = said.startswith("done")
+    if as_json:
+        print_json({"robot": robot, "policy": sent, "done": done, "said": said})
+    else:
+        output.print(said, markup=False)
+    if not done:
+        raise typer.Exit(FAILED)

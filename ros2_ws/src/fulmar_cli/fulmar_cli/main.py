@@ -1,0 +1,150 @@
+"""`fulmar`: the front door. Each command lives in a module of its own below `commands/`."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections import namedtuple
+from types import FrameType
+
+import typer
+
+from fulmar_bringup.console import console, showing_warnings
+from fulmar_cli.commands.bag import bag
+from fulmar_cli.commands.benchmark import benchmark
+from fulmar_cli.commands.bundle import bundle
+from fulmar_cli.commands.commission import commission
+from fulmar_cli.commands.demo import demo
+from fulmar_cli.commands.doctor import doctor
+from fulmar_cli.commands.estop import estop
+from fulmar_cli.commands.evaluate import EPILOG as MEANINGS
+from fulmar_cli.commands.evaluate import evaluate
+from fulmar_cli.commands.export import export
+from fulmar_cli.commands.faults import faults
+from fulmar_cli.commands.goals import goals
+from fulmar_cli.commands.identify import identify
+from fulmar_cli.commands.import_policy import import_policy
+from fulmar_cli.commands.list import list_names
+from fulmar_cli.commands.policies import policies
+from fulmar_cli.commands.report import report
+from fulmar_cli.commands.run import run
+from fulmar_cli.commands.swap import swap
+from fulmar_cli.commands.teleop import teleop
+from fulmar_cli.commands.train import train
+from fulmar_cli.commands.up import up
+from fulmar_cli.extras import advice_for
+from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
+from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
+
+INTERRUPTED = 130  # what typer makes of Ctrl-C
+
+app = typer.Typer(
+    name="fulmar",
+    help="Robots driven by learned and classical controllers over ROS 2: simulate, run, record, train, judge.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("list")(list_names)
+app.command()(run)
+app.command()(up)
+app.command()(goals)
+app.command()(teleop)
+app.command()(estop)
+app.command()(swap)
+app.command()(commission)
+app.command()(faults)
+app.command()(train)
+app.command()(policies)
+app.command()(export)
+app.command("import")(import_policy)
+app.command(epilog=MEANINGS)(evaluate)
+app.add_typer(benchmark, name="benchmark")
+app.add_typer(bundle, name="bundle")
+app.add_typer(bag, name="bag")
+app.command()(report)
+app.command()(identify)
+app.command()(demo)
+app.command()(doctor)
+
+
+def main() -> None:
+    """Run the command line; mistakes end with one line and exit code 2, failures with 1."""
+    told: list[str] = []
+
+    def on_terminate(number: int, _frame: FrameType | None) -> None:
+        """These stop a command as Ctrl-C does, in order; once, though `timeout` sends SIGTERM twice."""
+        for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+            signal.signal(each, signal.SIG_IGN)
+        told.append(f"stopped by {signal.Signals(number).name}")
+        raise KeyboardInterrupt(*told)
+
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` leaves SIGHUP
+            signal.signal(number, on_terminate)
+    # A shell starts its background jobs with Ctrl-C ignored, and so would everything that we start.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with showing_warnings():
+            _run_and_exit(told)
+    finally:
+        # Python ends by SIGINT, whatever the exit code, once Ctrl-C has come while text was run as code, as it is for
+        # each named tuple or dataclass that is imported, even if it was caught; running text again takes that back
+        # (CPython's pythonrun.c, `run_eval_code_obj`).
+        namedtuple("Answered", ())
+
+
+def _run_and_exit(told: list[str]) -> None:
+    try:
+        code = app(prog_name="fulmar", standalone_mode=False)
+        sys.stdout.flush()  # here, where it is known what to do if nobody reads it
+    except (ConfigError, BundleError, BagError) as error:
+        sys.exit(_complain(str(error), BAD_USAGE))
+    except FulmarError as error:
+        sys.exit(_complain(str(error), FAILED))
+    except typer.Exit as exit_request:
+        code = exit_request.exit_code
+    except (typer.Abort, KeyboardInterrupt):
+        code = INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has had enough, as in `fulmar list | head -1`
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())  # what is left over is flushed again at Python's own end
+        sys.exit(FAILED)
+    except OSError as error:  # a folder that cannot be written, a full disk
+        sys.exit(_complain(f"{error.filename or 'the system'}: {error.strerror or error}.", FAILED))
+    except ModuleNotFoundError as error:
+        advice = advice_for(error)
+        if advice is None:
+            raise
+        sys.exit(_complain(advice, BAD_USAGE))
+    except Exception as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # its message is the whole help
+            console.print(error.format_message(), markup=False)  # type: ignore[attr-defined]
+            sys.exit(BAD_USAGE)
+        if hasattr(error, "format_message"):  # what typer raises for bad usage, whichever click is behind it
+            sys.exit(_complain(f"{error.format_message()}{_hint(error)}", BAD_USAGE))
+        raise
+    if code == INTERRUPTED:
+        sys.exit(_complain(told[0] if told else "stopped by the user", FAILED))
+    sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _complain(message: str, code: int) -> int:
+    console.print(f"fulmar: {message}", markup=False, soft_wrap=True)
+    return code
+
+
+def _hint(error: Exception) -> str:
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return ""
+    commands = getattr(context.command, "commands", None)
+    if commands and context.args:
+        return did_you_mean(context.args[0], commands)
+    return f" Try `{context.command_path} --help`."
+
+
+if __name__ == "__main__":
+    main()

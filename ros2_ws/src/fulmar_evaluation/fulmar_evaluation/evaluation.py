@@ -1,0 +1,180 @@
+"""One controller judged over many episodes, in one of three ways; what `evaluate` and `benchmark` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fulmar_bringup.node_table import RunPlan
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import Episode, draw_episodes
+from fulmar_core.geofence import check_starts
+from fulmar_core.metrics import Trajectories, episode_metrics, successes, summarise
+from fulmar_core.path_task import judged_task
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.rollout import WORLDS, batches, roll_out_in_backends
+from fulmar_core.tasks import Task
+from fulmar_evaluation.waypoint_score import bound_figures, has_bound, waypoint_bound
+
+if TYPE_CHECKING:
+    from fulmar_evaluation.ros_evaluation import RosPool
+
+WAYS = ("batch", "mujoco", "ros")
+EPISODES, BATCH_EPISODES = 256, 4096  # that are judged where nobody says how many; the second in the batch
+BOUNDED_EPISODES = 256  # whose bound `evaluate` computes by default: a boat's takes 40 ms each
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What to judge, and how."""
+
+    plan: RunPlan  # robot, task, controller, rate, scenario, seed; its duration is the length of an episode
+    through: str  # one of WAYS
+    episodes: int
+    worlds: int = WORLDS  # of a batch at once
+    jobs: int = 1  # pairs of processes, through ros
+    bounded: int = BOUNDED_EPISODES  # episodes whose bound is computed
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return load_robot(self.plan.robot)
+
+    @property
+    def task(self) -> Task:
+        """The task, with the length of its episodes."""
+        return judged_task(self.plan.task, episode_s=self.plan.duration_s, goals=self.plan.goals)
+
+    def controller(self) -> Controller:
+        """The controller, made anew."""
+        from policy_server.controllers import Choice, load_controller
+
+        plan = self.plan
+        choice = Choice(plan.control_hz, plan.policy)
+        return load_controller(plan.controller, self.robot, self.task, choice)
+
+    def drawn(self, numbers: np.ndarray) -> Episode:
+        """What the episodes of some numbers begin with."""
+        scenario = load_scenario(self.plan.scenario)
+        return draw_episodes(self.robot, self.task, scenario, seed=self.plan.seed, numbers=numbers)
+
+
+def runs_of(
+    trial: Trial,
+    progress: Progress = lambda steps: None,
+    *,
+    pool: RosPool | None = None,
+) -> Iterator[Trajectories]:
+    """Run the episodes of a trial, in their order.
+
+    Args:
+        trial: What to run.
+        progress: Told how many control steps have been done.
+        pool: Processes that stay for one trial after another, through ros; by default it has its own.
+
+    Yields:
+        What happened, for the next so many episodes.
+
+    Raises:
+        ConfigError: An episode is shorter than one control step, or may start beyond the robot's geofence.
+        RunFailed: Through ros, the controller ended or refused to start.
+        LockstepError: Through ros, it did not answer in time.
+    """
+    plan = trial.plan
+    check_starts(trial.robot, trial.task)
+    if trial.through == "ros":
+        from fulmar_evaluation.ros_evaluation import roll_out_through_ros
+
+        if pool is not None:
+            yield pool.roll_out(plan, episodes=trial.episodes, progress=progress)
+        else:
+            yield roll_out_through_ros(plan, episodes=trial.episodes, jobs=trial.jobs, progress=progress)
+        return
+    robot, task, scenario = trial.robot, trial.task, load_scenario(plan.scenario)
+    if trial.through == "batch":
+        yield from batches(
+            trial.controller(),
+            robot,
+            task,
+            scenario,
+            episodes=trial.episodes,
+            seed=plan.seed,
+            worlds=trial.worlds,
+            progress=progress,
+        )
+        return
+    from sim_nodes.mujoco_backend import MujocoBackend
+
+    yield roll_out_in_backends(
+        trial.controller(),
+        lambda: MujocoBackend.of(robot, task, scenario),
+        task,
+        scenario,
+        episodes=trial.episodes,
+        seed=plan.seed,
+        progress=progress,
+    )
+
+
+class Tally:
+    """Figures of episodes, gathered run by run: of a step nothing is kept."""
+
+    def __init__(self, task: Task) -> None:
+        """Begin empty."""
+        self._task = task
+        self._succeeded: list[np.ndarray] = []
+        self._figures: list[dict[str, np.ndarray]] = []
+        self.steps = 0
+
+    def add(self, run: Trajectories) -> None:
+        """Judge some more episodes."""
+        self._succeeded.append(successes(run, self._task))
+        self._figures.append(episode_metrics(run, self._task))
+        self.steps += run.x.size
+
+    @property
+    def succeeded(self) -> np.ndarray:
+        """Which episodes succeeded, shape (episodes,)."""
+        return np.concatenate(self._succeeded)
+
+    @property
+    def figures(self) -> dict[str, np.ndarray]:
+        """Every figure of every episode, shapes (episodes,)."""
+        return {
+            name: np.concatenate([figures[name] for figures in self._figures]) for name in self._figures[0]
+        }
+
+
+def evaluate_trial(trial: Trial, progress: Progress = lambda steps: None) -> dict[str, Any]:
+    """Run and judge a trial; arguments and errors as in `runs_of`.
+
+    Returns:
+        Success rate and every figure, JSON-ready. Where waypoints are counted, also what physics allows in the first
+        `bounded`: `bound`, the rule in words, and the shares of it.
+    """
+    tally = Tally(trial.task)
+    for run in runs_of(trial, progress):
+        tally.add(run)
+    figures, more = tally.figures, {}
+    if has_bound(trial.task):
+        numbers = np.arange(min(trial.episodes, trial.bounded))
+        bound = waypoint_bound(trial.robot, trial.task, trial.drawn(numbers), trial.task.episode_s)
+        goals = figures["goals_reached"]
+        figures |= bound_figures(goals, bound)
+        more = {
+            "bound": bound.rule,
+            "bound_episodes": len(numbers),
+            "share_of_mean_bound": share_of_mean(goals[: len(numbers)], bound.goals),
+        }
+    return {**summarise(tally.succeeded, figures), **more, "control_steps": tally.steps}
+
+
+def share_of_mean(goals: np.ndarray, bound: np.ndarray) -> float | None:
+    """Mean of the goals over the mean of their bounds; None where nothing can be reached."""
+    most = float(np.mean(bound))
+    return float(np.mean(goals)) / most if most > 0.0 else None

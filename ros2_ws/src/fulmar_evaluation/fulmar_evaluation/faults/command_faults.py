@@ -1,0 +1,107 @@
+"""Commands that must not be carried out: invalid, late, or from a second node."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import replace
+
+import rclpy
+from geometry_msgs.msg import TwistStamped
+from sensor_msgs.msg import JointState
+
+from fulmar_core.robot import Robot
+from fulmar_core.topics import VELOCITY_COMMAND, command_wire
+from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.fault_environment import Surroundings
+from fulmar_evaluation.faults.fault_injector import delayed
+from fulmar_evaluation.faults.fault_result import STAYS_S, Outcome, stopped
+from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_ros.qos import publisher_qos
+
+STRANGER_S = 0.02  # between its commands
+# Until nodes on one computer know of a new publisher, and for the look of a tenth of a second
+DISCOVERY_S = 0.3
+COMMANDS = Surroundings(spoilt=None)
+
+
+def commands_not_a_number(live: LiveSystem) -> Outcome:
+    """As many values as it should be, each NaN."""
+    names = list(live.robot.actuators.names)
+    return _nonsense(live, names, [math.nan] * len(names))
+
+
+def commands_of_wrong_length(live: LiveSystem) -> Outcome:
+    """One value too many."""
+    names = [*live.robot.actuators.names, "another"]
+    return _nonsense(live, names, [1.0] * len(names))
+
+
+def commands_with_wrong_names(live: LiveSystem) -> Outcome:
+    """Actuators of another robot."""
+    names = [f"other_{name}" for name in live.robot.actuators.names]
+    return _nonsense(live, names, [1.0] * len(names))
+
+
+def commands_late(live: LiveSystem) -> Outcome:
+    """Each command comes long after its observation: nobody knows any more whether it would still be right."""
+    since_s = live.until_it_moves()
+    limit_s = live.silenced_s
+    live.spoiler.spoil = delayed(math.ceil((limit_s + STAYS_S / 4.0) / live.beat_s))
+    return stopped(live, since_s, limit_s)
+
+
+def commands_from_another_node(live: LiveSystem) -> Outcome:
+    """A second node publishes good commands while the controller goes on: the plant obeys neither, and names both."""
+    wire, robot = command_wire(live.robot), live.robot
+    message = _message(live, list(robot.actuators.names), [1.0] * len(robot.actuators.names))
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
+    over = threading.Event()
+    try:
+        since_s = live.until_it_moves()
+        publisher = node.create_publisher(type(message), wire.name, publisher_qos(wire))
+
+        def talk() -> None:
+            while not over.wait(STRANGER_S):
+                publisher.publish(message)
+
+        thread = threading.Thread(target=talk, name="stranger", daemon=True)
+        thread.start()
+        try:
+            outcome = stopped(live, since_s, DISCOVERY_S + live.tick_s + live.ramp_s)
+        finally:
+            over.set()
+            thread.join()
+    finally:
+        node.destroy_node()
+    names = ", ".join(f"{live.plan.namespace}/{node}" for node in ("controller", "stranger"))
+    return replace(outcome, passed=outcome.passed and names in outcome.reaction)
+
+
+def _nonsense(live: LiveSystem, names: list[str], values: list[float]) -> Outcome:
+    """Nonsense must not feed the watchdog, nor reach an actuator."""
+    message = _message(live, names, values)
+    since_s = live.until_it_moves()
+    live.spoiler.spoil = lambda _good: message
+    return stopped(live, since_s, live.silenced_s)
+
+
+def _message(live: LiveSystem, names: list[str], values: list[float]) -> TwistStamped | JointState:
+    if command_wire(live.robot) is not VELOCITY_COMMAND:
+        return JointState(name=names, effort=values)
+    twist = TwistStamped()
+    twist.twist.linear.x, twist.twist.angular.z = values
+    return twist
+
+
+def _without_names(robot: Robot) -> str:
+    return "a Twist has neither names nor a length" if command_wire(robot) is VELOCITY_COMMAND else ""
+
+
+COMMAND_FAULTS = (
+    Fault(commands_not_a_number, COMMANDS),
+    Fault(commands_of_wrong_length, COMMANDS, _without_names),
+    Fault(commands_with_wrong_names, COMMANDS, _without_names),
+    Fault(commands_late, COMMANDS),
+    Fault(commands_from_another_node),
+)

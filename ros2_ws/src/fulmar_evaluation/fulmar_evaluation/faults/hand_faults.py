@@ -1,0 +1,74 @@
+"""What becomes of a robot that a person drives when the node between them dies."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sensor_msgs.msg import Joy
+
+from fulmar_core.errors import RunFailed
+from fulmar_core.teleop import JoyLayout
+from fulmar_core.topics import JOY
+from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.fault_environment import Surroundings
+from fulmar_evaluation.faults.fault_result import Outcome, stopped
+from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.observer import wait_for
+from fulmar_ros.qos import publisher_qos
+
+GAMEPAD_S = 0.05  # between its messages
+TAKES_S = 10.0  # for a hand to be heard, on a busy machine
+LAYOUT = JoyLayout()
+
+
+def teleop_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that carries a hand, while it drives."""
+    return _hand(live, signal.SIGKILL)
+
+
+def teleop_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the same."""
+    return _hand(live, signal.SIGSTOP)
+
+
+def _hand(live: LiveSystem, number: signal.Signals) -> Outcome:
+    """The robot stops, and the controller, which goes on commanding, does not get it back by that."""
+    live.until_it_moves()
+    with _held_gamepad(live):
+        if not wait_for(lambda: _commanded_by(live) == "person", TAKES_S):
+            raise RunFailed(f"the hand did not get the robot within {TAKES_S:g} s")
+        since_s = live.until_it_moves()
+        live.send("teleop", number)
+        return stopped(live, since_s, live.silenced_s)
+
+
+def _commanded_by(live: LiveSystem) -> str:
+    words = [word for word in live.witness.words_since(0.0) if word.who == "plant"]
+    return words[-1].values.get("commanded_by", "") if words else ""
+
+
+@contextmanager
+def _held_gamepad(live: LiveSystem) -> Iterator[None]:
+    """A gamepad whose switch is held and whose stick is pushed ahead."""
+    axes, buttons = [0.0] * (max(LAYOUT.axes) + 1), [0] * (LAYOUT.give_back_button + 1)
+    axes[LAYOUT.ahead_axis], buttons[LAYOUT.deadman_button] = 1.0, 1
+    publisher = live.bystander.create_publisher(Joy, JOY.name, publisher_qos(JOY))
+    over = threading.Event()
+
+    def hold() -> None:
+        while not over.wait(GAMEPAD_S):
+            publisher.publish(Joy(axes=axes, buttons=buttons))
+
+    thread = threading.Thread(target=hold, name="gamepad", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+HAND_FAULTS = tuple(Fault(do, Surroundings(by_hand=True)) for do in (teleop_killed, teleop_hangs))

@@ -1,0 +1,113 @@
+"""What a robot does and what its nodes say of it, with the times at which a bystander hears it."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from fulmar_bags.message_reader import stamp_ns
+from fulmar_core.robot import Robot
+from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire
+from fulmar_ros.qos import subscriber_qos
+
+DEPTH = 100  # messages that may wait while this process does something else
+NUMBER = re.compile(r"\d+(\.\d+)?")
+
+
+@dataclass(frozen=True)
+class Word:
+    """Something that a node said of itself."""
+
+    heard_s: float  # monotonic clock [s]
+    who: str  # plant, controller, estimator, estop
+    level: str  # ok, warn or error
+    text: str
+    values: dict[str, str]
+
+    @property
+    def complaint(self) -> tuple[str, str] | None:
+        """Who says that what is wrong, whatever its figures; None if nothing is."""
+        return None if self.level == "ok" else (self.who, NUMBER.sub("#", self.text))
+
+
+class Witness:
+    """Listens, from a node that spins in a thread of its own."""
+
+    def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
+        """Listen to what actuators do, on the wire that tells it, and to the health of every node."""
+        self.wire = wire
+        self._safe = robot.actuators.safe_command
+        self._lock = threading.Lock()
+        self._applied: list[tuple[float, int, bool]] = []  # heard [s], stamp [ns], whether it moves
+        self._words: list[Word] = []
+        listen = node.create_subscription
+        listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))
+        for health in (DIAGNOSTICS, STATUS):
+            qos = subscriber_qos(health, reliable=True, depth=DEPTH)
+            listen(DiagnosticArray, health.name, self._on_health, qos)
+
+    def _on_applied(self, message: JointState) -> None:
+        moves = bool(np.any(np.asarray(message.effort) != self._safe))
+        with self._lock:
+            self._applied.append((time.monotonic(), stamp_ns(message.header.stamp), moves))
+
+    def _on_health(self, message: DiagnosticArray) -> None:
+        levels = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn"}
+        now_s = time.monotonic()
+        with self._lock:
+            for status in message.status:
+                values = {pair.key: pair.value for pair in status.values}
+                who = status.name.partition(": ")[2]
+                self._words.append(
+                    Word(now_s, who, levels.get(status.level, "error"), status.message, values)
+                )
+
+    def moves(self) -> bool:
+        """Whether the newest applied command is another than the safe one."""
+        with self._lock:
+            return bool(self._applied) and self._applied[-1][2]
+
+    def applied_since(self, since_s: float) -> list[tuple[float, bool]]:
+        """When something was applied, and whether it moved the robot."""
+        with self._lock:
+            return [(heard_s, moves) for heard_s, _, moves in self._applied if heard_s >= since_s]
+
+    def heard(self) -> tuple[np.ndarray, np.ndarray]:
+        """When something was applied, and its stamps, shapes (n,) [s] and int64 [ns]."""
+        with self._lock:
+            times = np.array([heard_s for heard_s, _, _ in self._applied], dtype=float)
+            return times, np.array([stamp for _, stamp, _ in self._applied], dtype=np.int64)
+
+    def words_since(self, since_s: float) -> list[Word]:
+        """What was said from then on."""
+        with self._lock:
+            return [word for word in self._words if word.heard_s >= since_s]
+
+    def complaint_since(self, since_s: float) -> Word | None:
+        """The first thing that a node said from then on which was wrong, and not its last word before."""
+        return first_complaint(self.words_since(0.0), since_s)
+
+
+def first_complaint(words: list[Word], since_s: float) -> Word | None:
+    """The first thing that is wrong from a time on, and was not some node's last word before it."""
+    standing = {word.who: word.complaint for word in words if word.heard_s < since_s}.values()
+    new = (word for word in words if word.heard_s >= since_s and word.complaint is not None)
+    return next((word for word in new if word.complaint not in standing), None)
+
+
+def wait_for(condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Whether something happened in time."""
+    end_s = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(0.005)
+    return True

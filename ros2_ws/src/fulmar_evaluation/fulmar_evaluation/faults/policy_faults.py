@@ -1,0 +1,141 @@
+"""Policies that are not what they say, at the start of a controller, or offered to one that acts."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import rclpy
+from std_msgs.msg import String
+
+from fulmar_core.errors import RunFailed
+from fulmar_core.policy_bundle import NETWORK, Passport, read_golden, read_passport, write_bundle
+from fulmar_core.topics import SWAP
+from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.fault_environment import Surroundings
+from fulmar_evaluation.faults.fault_result import STAYS_S, Outcome, went_on
+from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.observer import wait_for
+from fulmar_ros.qos import publisher_qos
+
+ANSWER_S = 15.0  # to load a network on a busy machine
+GOES_ON_S = 1.0
+
+
+def flip_a_byte(bundle: Path) -> None:
+    """A byte of the network is another than its hash says."""
+    path = bundle / NETWORK
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(bytes(data))
+
+
+def swap_to_the_same_policy(live: LiveSystem) -> Outcome:
+    """A copy of the bundle that runs takes over, without a pause."""
+    return _offer(live, _copy(live), wanted="done")
+
+
+def swap_to_a_wrong_hash(live: LiveSystem) -> Outcome:
+    """A byte of the network is another."""
+    folder = _copy(live)
+    flip_a_byte(folder)
+    return _offer(live, folder, wanted="refused")
+
+
+def swap_to_another_robot(live: LiveSystem) -> Outcome:
+    """The passport names another robot, with hashes that fit."""
+    other = "jetbot" if live.plan.robot != "jetbot" else "turtlebot2"
+    return _offer(live, _resealed(live, robot=other), wanted="refused")
+
+
+def swap_to_another_rate(live: LiveSystem) -> Outcome:
+    """Trained at twice the rate."""
+    return _offer(live, _resealed(live, control_hz=2.0 * live.plan.control_hz), wanted="refused")
+
+
+def swap_to_another_shape(live: LiveSystem) -> Outcome:
+    """It sees one thing less than its network takes."""
+    names = _passport(live).observation_names[:-1]
+    return _offer(live, _resealed(live, observation_names=names), wanted="refused")
+
+
+def bundle_refused(live: LiveSystem) -> Outcome:
+    """The bundle is damaged and nothing stands in for it: its node ends, and nothing ever moves."""
+    began_s = time.monotonic()
+    try:
+        live.begin()
+    except RunFailed as error:
+        ended = str(error).startswith("controller ended with")
+        live.start_plant_alone()
+        time.sleep(STAYS_S)
+        applied = live.witness.applied_since(began_s)
+        stands = bool(applied) and not any(moves for _, moves in applied)
+        said = live.group.last_words("controller").replace(live.plan.policy, "the bundle")
+        who = "controller" if ended else ""
+        return Outcome(who, said, ended and stands, 0.0 if stands else None, limit_s=0.0)
+    return Outcome("", "the controller took the bundle", False)
+
+
+def bundle_refused_with_fallback(live: LiveSystem) -> Outcome:
+    """The bundle is damaged and a classical controller stands in for it: it drives, and says why."""
+    since_s = live.until_it_moves()
+    time.sleep(STAYS_S)
+    words = [word for word in live.witness.words_since(since_s) if word.who == "controller"]
+    why = words[-1].values.get("fell_back", "") if words else ""
+    said = why.replace(live.plan.policy, "the bundle")
+    return went_on(live, since_s, detected_by="controller" if why else "", reaction=said, told=bool(why))
+
+
+POLICY_FAULTS = (
+    Fault(bundle_refused, Surroundings(bundle=flip_a_byte), begins=False),
+    Fault(bundle_refused_with_fallback, Surroundings({"fallback": "classical"}, bundle=flip_a_byte)),
+    Fault(swap_to_the_same_policy),
+    Fault(swap_to_a_wrong_hash),
+    Fault(swap_to_another_robot),
+    Fault(swap_to_another_rate),
+    Fault(swap_to_another_shape),
+)
+
+
+def _passport(live: LiveSystem) -> Passport:
+    return read_passport(Path(live.plan.policy))
+
+
+def _copy(live: LiveSystem) -> Path:
+    return Path(shutil.copytree(live.plan.policy, live.record.parent / "offered"))
+
+
+def _resealed(live: LiveSystem, **changes: object) -> Path:
+    """A copy whose passport says something else, and whose hashes fit."""
+    folder, old = _copy(live), Path(live.plan.policy)
+    passport = replace(_passport(live), **changes)  # type: ignore[arg-type]
+    write_bundle(folder, (old / NETWORK).read_bytes(), read_golden(old), passport)
+    return folder
+
+
+def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
+    try:
+        publisher = node.create_publisher(String, SWAP.name, publisher_qos(SWAP))
+        wait_for(lambda: publisher.get_subscription_count() > 0, ANSWER_S)
+        since_s = live.until_it_moves()
+        publisher.publish(String(data=str(folder)))
+
+        def said() -> str:
+            answers = [word.values.get("swap", "") for word in live.witness.words_since(since_s)]
+            return next((text for text in reversed(answers) if str(folder) in text), "")
+
+        told = wait_for(lambda: said().startswith(("done", "refused")), ANSWER_S)
+        time.sleep(GOES_ON_S)
+    finally:
+        node.destroy_node()
+    answer = said().replace(str(folder), "the bundle")
+    return went_on(
+        live,
+        since_s,
+        detected_by="controller" if told else "",
+        reaction=answer,
+        told=answer.startswith(wanted),
+    )

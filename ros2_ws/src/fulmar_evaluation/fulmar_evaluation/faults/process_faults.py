@@ -1,0 +1,180 @@
+"""Nodes that die or hang while the robot moves."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Callable
+
+import psutil
+
+from fulmar_bringup.system import DEFAULT_ESTIMATOR
+from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.safety.estop import TIMEOUT_NS
+from fulmar_core.topics import MOCAP
+from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.fault_environment import Surroundings
+from fulmar_evaluation.faults.fault_injector import lost
+from fulmar_evaluation.faults.fault_result import STAYS_S, WORDS_S, Outcome, stopped, went_on
+from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.observer import Word, wait_for
+
+ESTOP_S = TIMEOUT_NS / 1e9
+PAUSE_S = 2.0
+COMPLAINT_S = 10.0  # a recorder looks at its disk now and then
+
+
+def controller_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that commands."""
+    return signalled(live, "controller", signal.SIGKILL, live.silenced_s)
+
+
+def controller_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the node that commands."""
+    return signalled(live, "controller", signal.SIGSTOP, live.silenced_s)
+
+
+def estop_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the e-stop: its silence counts as pressed."""
+    return signalled(live, "estop", signal.SIGKILL, ESTOP_S + live.tick_s + live.ramp_s)
+
+
+def estop_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the e-stop."""
+    return signalled(live, "estop", signal.SIGSTOP, ESTOP_S + live.tick_s + live.ramp_s)
+
+
+def estimator_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that says where the robot is."""
+    return signalled(live, "estimator", signal.SIGKILL, live.watchdog_s + live.corrected_s)
+
+
+def estimator_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the node that says where the robot is."""
+    return signalled(live, "estimator", signal.SIGSTOP, live.watchdog_s + live.corrected_s)
+
+
+def mocap_lost(live: LiveSystem) -> Outcome:
+    """No pose comes any more: the estimator bridges a gap of moments, and then says what it lacks."""
+    bridge_s = load_estimator(DEFAULT_ESTIMATOR).bridge_s
+    since_s = live.until_it_moves()
+    live.spoiler.spoil = lost
+    return stopped(live, since_s, bridge_s + live.watchdog_s + live.corrected_s)
+
+
+def signalled(live: LiveSystem, name: str, number: signal.Signals, limit_s: float) -> Outcome:
+    """Send a signal to one process while the robot moves; the robot has to stop within the limit [s]."""
+    since_s = live.until_it_moves()
+    live.send(name, number)
+    return stopped(live, since_s, limit_s)
+
+
+def plant_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the plant: no actuator is told anything any more, and the controller commands what is safe."""
+    return _plant(live, signal.SIGKILL)
+
+
+def plant_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the plant."""
+    return _plant(live, signal.SIGSTOP)
+
+
+def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
+    """Nothing is applied from then on; what a device then does by itself is another matter."""
+    since_s = live.until_it_moves()
+    live.send("plant", number)
+    limit_s = live.watchdog_s + live.beat_s + live.tick_s
+    time.sleep(limit_s + STAYS_S)
+    wait_for(lambda: live.witness.complaint_since(since_s) is not None, WORDS_S)
+    word = live.witness.complaint_since(since_s)
+    last_s = max((heard_s for heard_s, _ in live.witness.applied_since(since_s)), default=since_s) - since_s
+    passed = word is not None and last_s <= limit_s
+    return Outcome(word.who if word else "", word.text if word else "", passed, last_s, limit_s)
+
+
+def goals_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that tells goals: the robot goes to the place that it was told last."""
+    since_s = live.until_it_moves()
+    live.send("goals", signal.SIGKILL)
+    time.sleep(PAUSE_S)
+    who, said = _launcher_on(live, "goals")
+    return went_on(live, since_s, detected_by=who, reaction=said, told=bool(who))
+
+
+def recorder_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the recorder, which is a power cut to the bag: control goes on, and the bag opens."""
+    since_s = live.until_it_moves()
+    time.sleep(PAUSE_S)  # the bag gets something to lose
+    live.send("recorder", signal.SIGKILL)
+    away_s = time.monotonic()
+    time.sleep(PAUSE_S)
+    who, said = _launcher_on(live, "recorder")
+    return went_on(
+        live, since_s, detected_by=who, reaction=said, told=bool(who), recorder_away=(away_s, math.inf)
+    )
+
+
+def recorder_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the recorder for a while: nobody waits for it. It misses what streams do not keep for so long."""
+    since_s = live.until_it_moves()
+    live.send("recorder", signal.SIGSTOP)
+    time.sleep(PAUSE_S)
+    live.send("recorder", signal.SIGCONT)
+    away = since_s, time.monotonic()
+    time.sleep(PAUSE_S)
+    return went_on(live, since_s, detected_by="", reaction="control goes on", told=True, recorder_away=away)
+
+
+def disk_full(live: LiveSystem) -> Outcome:
+    """The recorder cannot write a byte more, as on a full disk: control goes on, and what was written opens."""
+    since_s = live.until_it_moves()
+    time.sleep(PAUSE_S)
+    recorder = live.group.process("recorder")
+    recorder.rlimit(psutil.RLIMIT_FSIZE, (0, recorder.rlimit(psutil.RLIMIT_FSIZE)[1]))
+    away_s = time.monotonic()
+    wait_for(lambda: _complaint(live, since_s) is not None, COMPLAINT_S)
+    word = _complaint(live, since_s)
+    said = f"{word.text}; control goes on" if word else "control goes on"
+    return went_on(
+        live,
+        since_s,
+        detected_by=word.who if word else "",
+        reaction=said,
+        told=word is not None,
+        recorder_away=(away_s, math.inf),
+    )
+
+
+def _launcher_on(live: LiveSystem, name: str) -> tuple[str, str]:
+    """Who noticed that a process has ended, and the words."""
+    ended = live.group.ended()
+    if ended is None or ended.name != name:
+        return "", f"nobody noticed that {name} has ended"
+    return "launcher", f"{ended.text}; control goes on"
+
+
+def _complaint(live: LiveSystem, since_s: float) -> Word | None:
+    words = [word for word in live.witness.words_since(since_s) if word.who == "recorder"]
+    return next((word for word in words if word.level != "ok"), None)
+
+
+PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
+    controller_killed,
+    controller_hangs,
+    plant_killed,
+    plant_hangs,
+    estop_killed,
+    estop_hangs,
+    recorder_killed,
+    recorder_hangs,
+    disk_full,
+)
+ESTIMATED = {"estimator": DEFAULT_ESTIMATOR}
+PROCESS_FAULTS = (
+    *map(Fault, PLAIN),
+    Fault(goals_killed, Surroundings(by_goal_node=True)),
+    Fault(estimator_killed, Surroundings(ESTIMATED)),
+    Fault(estimator_hangs, Surroundings(ESTIMATED)),
+    Fault(mocap_lost, Surroundings(ESTIMATED, spoilt=MOCAP)),
+)

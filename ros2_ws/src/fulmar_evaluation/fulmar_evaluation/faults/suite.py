@@ -1,0 +1,171 @@
+"""Every fault, each to a system of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from fulmar_bringup.domains import reserved_domains
+from fulmar_bringup.environment import environment
+from fulmar_bringup.system import Guards, default_hardware, modules_of
+from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
+from fulmar_core.robot import load_robot
+from fulmar_evaluation.faults.bag_evidence import Kept, kept_of
+from fulmar_evaluation.faults.bearing_faults import BEARING_FAULTS
+from fulmar_evaluation.faults.command_faults import COMMAND_FAULTS
+from fulmar_evaluation.faults.driver_faults import DRIVER_FAULTS
+from fulmar_evaluation.faults.estop_faults import ESTOP_FAULTS
+from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.fault_environment import request_of
+from fulmar_evaluation.faults.fault_result import Finding, Outcome
+from fulmar_evaluation.faults.hand_faults import HAND_FAULTS
+from fulmar_evaluation.faults.input_faults import INPUT_FAULTS
+from fulmar_evaluation.faults.live_system import NothingShown, live_system
+from fulmar_evaluation.faults.network_faults import NETWORK_FAULTS
+from fulmar_evaluation.faults.policy_faults import POLICY_FAULTS
+from fulmar_evaluation.faults.process_faults import PROCESS_FAULTS
+from fulmar_evaluation.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
+
+EVERY = (
+    *PROCESS_FAULTS,
+    *ESTOP_FAULTS,
+    *HAND_FAULTS,
+    *DRIVER_FAULTS,
+    *BEARING_FAULTS,
+    *INPUT_FAULTS,
+    *COMMAND_FAULTS,
+    *POLICY_FAULTS,
+    *NETWORK_FAULTS,
+)
+ATTEMPTS = 3  # a robot may stand still just when something is done to it
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A fault that is left out."""
+
+    name: str
+    reason: str
+
+
+def faults_of(robot: str, names: list[str] | None = None) -> tuple[list[Fault], list[Skipped]]:
+    """The faults that a robot can have, or some of them by name.
+
+    Args:
+        robot: Its name.
+        names: Which; None for all.
+
+    Returns:
+        Those to do, and those of all that this robot or this machine cannot have.
+
+    Raises:
+        UnknownNameError: There is no such fault.
+        ConfigError: No name was given, or this robot or this machine cannot have the fault.
+    """
+    known = {fault.name: fault for fault in EVERY}
+    the_robot = load_robot(robot)
+    if names is None:
+        reasons = {fault.name: fault.why_not(the_robot) for fault in EVERY}
+        skipped = [Skipped(name, reason) for name, reason in reasons.items() if reason]
+        return [fault for fault in EVERY if not reasons[fault.name]], skipped
+    if not names:
+        raise ConfigError(f"no fault is named. Leave it out for all, or name some of: {', '.join(known)}.")
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("fault", name, known)
+        reason = known[name].why_not(the_robot)
+        if reason:
+            raise ConfigError(f"{name}: {reason}.")
+    return [known[name] for name in dict.fromkeys(names)], []
+
+
+def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
+    """Modules of extras that the systems of some faults import."""
+    needed: dict[str, None] = {}
+    for about in (fault.about for fault in faults):
+        backend, hardware = ("hardware", default_hardware(robot)) if about.emulated else ("mujoco", "")
+        guards = Guards(**about.guards)
+        modules = modules_of("policy", backend, guards=guards, hardware=hardware, emulated=about.emulated)
+        needed |= dict.fromkeys(modules)
+    return tuple(needed)
+
+
+def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[Finding]:
+    """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
+
+    Args:
+        robot: Whose system.
+        faults: From `faults_of`.
+        progress: Told how many are over.
+
+    Raises:
+        FulmarError: The robot has no policy to run.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        request_of(
+            robot, Path(folder) / "bag"
+        )  # a robot without a policy is refused once, not by every fault
+    findings = []
+    with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
+        for count, fault in enumerate(faults, 1):
+            findings.append(_found(robot, fault))
+            progress(count)
+    return findings
+
+
+def _found(robot: str, fault: Fault) -> Finding:
+    """What came of a fault; whatever prevents it is told, and the others go on."""
+    problem = ""
+    for _ in range(ATTEMPTS):
+        with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
+            try:
+                return _finding(fault, *_done(robot, fault, Path(folder)))
+            except NothingShown as error:
+                problem = str(error)
+            except FulmarError as error:
+                problem = str(error)
+                break
+            except Exception as error:  # noqa: BLE001 - one fault that cannot be done must not lose the others
+                problem = f"{type(error).__name__}: {error}"
+                break
+    return Finding(fault.name, "", problem, None, None, None, None, passed=False)
+
+
+def _finding(fault: Fault, outcome: Outcome, kept: Kept) -> Finding:
+    words = "; ".join(text for text in (outcome.reaction, kept.words and f"bag: {kept.words}") if text)
+    return Finding(
+        fault.name,
+        outcome.detected_by,
+        words,
+        outcome.time_to_safe_s,
+        outcome.limit_s,
+        kept.lost,
+        kept.intact,
+        outcome.passed and kept.intact,
+    )
+
+
+def _done(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, Kept]:
+    if not fault.about.two_hosts:
+        return _do(robot, fault, folder, None)
+    # In a process of its own: the middleware asks once in a process which networks there are.
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(_do_on_two_hosts, robot, fault, folder).result()
+
+
+def _do_on_two_hosts(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, Kept]:
+    with environment(ACROSS), two_hosts() as hosts, inside(hosts.robot):
+        return _do(robot, fault, folder, hosts)
+
+
+def _do(robot: str, fault: Fault, folder: Path, hosts: TwoHosts | None) -> tuple[Outcome, Kept]:
+    request = request_of(robot, folder / "bag", fault.about)
+    with live_system(request, fault.about, hosts) as live:
+        if fault.begins:
+            live.begin()
+        outcome = fault.do(live)
+    return outcome, kept_of(request.record, live.witness, outcome.recorder_away)

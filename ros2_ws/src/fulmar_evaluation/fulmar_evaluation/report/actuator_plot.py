@@ -1,0 +1,108 @@
+"""What the actuators really did, and when the watchdog made them safe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from fulmar_bags.run_record import RunRecord
+from fulmar_evaluation.report.style import ALARM, FAINT, INK
+from fulmar_evaluation.report.view import View, judged
+from fulmar_evaluation.run_evaluation import Judgement
+
+Span = tuple[float, float]  # begin and end, in simulated time since the first state [s]
+
+
+def open_spans(record: RunRecord, actuator: int) -> list[Span]:
+    """When one actuator was in use.
+
+    Args:
+        record: The run.
+        actuator: Column of `record.actuation.effort`.
+    """
+    return _spans(record, record.actuation.effort[:, actuator] != 0.0)
+
+
+def watchdog_spans(record: RunRecord) -> list[Span]:
+    """When everything was shut although the newest command said otherwise and had grown old."""
+    applied, commanded = record.applied, record.commanded
+    if not len(applied) or not len(commanded) or record.info.get("lockstep"):
+        return []
+    newest = np.searchsorted(commanded.log_s, applied.log_s, side="right") - 1
+    hz = float(record.info.get("control_hz") or 1.0) * float(record.info.get("rate") or 1.0)
+    age_s = applied.log_s - commanded.log_s[newest.clip(0)]
+    wanted = np.any(commanded.effort[newest.clip(0)] != 0.0, axis=1)
+    shut = ~np.any(applied.effort != 0.0, axis=1)
+    return _spans(record, shut & wanted & (newest >= 0) & (age_s > 1.5 / hz))
+
+
+def _spans(record: RunRecord, flags: np.ndarray) -> list[Span]:
+    """Times between which a flag of each sample of `record.applied` is set."""
+    stamp_s = record.actuation.stamp_s
+    if not len(stamp_s):
+        return []
+    begin_s = record.motion.stamp_s[0] if len(record.motion) else stamp_s[0]
+    ends = np.append(stamp_s[1:], stamp_s[-1]) - begin_s  # a sample counts until the next one
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
+    return [
+        (float(stamp_s[first] - begin_s), float(ends[last - 1]))
+        for first, last in zip(edges[::2], edges[1::2], strict=True)
+    ]
+
+
+def draw_actuators(axes: Axes, run: View) -> None:
+    """One row for each actuator: a bar wherever a valve was open, else the share of full command."""
+    names = run.record.actuation.names
+    if run.binary:
+        _bars(axes, run, len(names))
+    elif run.judgement is not None:
+        _shares(axes, run, run.judgement)
+    for begin, end in watchdog_spans(run.record):
+        axes.axvspan(begin, end, facecolor=ALARM, alpha=0.14, linewidth=0)
+        axes.text(
+            0.5 * (begin + end), 1.02, "closed by the watchdog" if run.binary else "stopped by the watchdog",
+            ha="center", va="bottom", fontsize=8.5, color=ALARM,
+            transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
+    axes.set_ylim(len(names) + 0.7, 0.3)
+    axes.set_yticks(range(1, len(names) + 1))
+    if not run.binary:
+        axes.set_yticklabels([name.replace("_", " ") for name in names])
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylabel("valve" if run.binary else "")
+    axes.set_title(run.label, loc="left", color=INK)
+    axes.spines["left"].set_visible(False)
+    for row in range(1, len(names)):
+        axes.axhline(row + 0.5, color=FAINT, alpha=0.25, linewidth=0.6)
+    for _, judgement in judged([run]):
+        axes.set_xlim(0.0, judgement.duration_s)
+
+
+def _bars(axes: Axes, run: View, count: int) -> None:
+    for row in range(count):
+        bars = [(begin, end - begin) for begin, end in open_spans(run.record, row)]
+        axes.broken_barh(bars, (row + 0.6, 0.8), facecolors=run.colour, linewidth=0)
+
+
+def _shares(axes: Axes, run: View, judgement: Judgement) -> None:
+    for row, share in enumerate(judgement.run.shares[0].T, start=1):
+        height = row - 0.42 * np.clip(share, -1.0, 1.0)  # rows count downwards
+        axes.axhline(row, color=FAINT, linewidth=0.6)
+        axes.fill_between(
+            judgement.time_s, row, height, step="pre", color=run.colour, alpha=0.25, linewidth=0
+        )
+        axes.step(judgement.time_s, height, where="pre", color=run.colour, linewidth=0.9)
+
+
+def draw_use(axes: Axes, runs: Sequence[View]) -> None:
+    """Open-valve time, or time at full command, added up over the run."""
+    for run, judgement in judged(runs):
+        count = len(run.record.actuation.names)
+        spent = np.cumsum(judgement.run.effort[0]) * count * judgement.run.control_dt
+        axes.plot(judgement.time_s, spent, color=run.colour, label=run.label)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlim(0.0, max((judgement.duration_s for _, judgement in judged(runs)), default=1.0))
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("open-valve time [s]" if all(run.binary for run in runs) else "time at full command [s]")

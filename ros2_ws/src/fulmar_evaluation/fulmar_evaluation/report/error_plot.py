@@ -1,0 +1,157 @@
+"""How a run went over time, by what its task asks: errors of place, heading and motion, or targets reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+
+from fulmar_core.tasks.terms import Tolerance
+from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
+from fulmar_evaluation.report.view import View, judged
+from fulmar_evaluation.run_evaluation import Judgement
+
+LENGTHS = {0.001: "1 mm", 0.01: "1 cm", 0.1: "10 cm", 1.0: "1 m", 10.0: "10 m"}
+ANGLES = {0.01: "0.01°", 0.1: "0.1°", 1.0: "1°", 10.0: "10°", 100.0: "100°"}
+SPEEDS = {0.001: "1 mm/s", 0.01: "1 cm/s", 0.1: "10 cm/s", 1.0: "1 m/s", 10.0: "10 m/s"}
+TURN_RATES = {0.01: "0.01°/s", 0.1: "0.1°/s", 1.0: "1°/s", 10.0: "10°/s", 100.0: "100°/s"}
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One quantity over time, on a logarithmic scale."""
+
+    label: str
+    marks: dict[float, str]  # of the scale
+    lowest: float
+    values: Callable[[Judgement], np.ndarray]
+    tolerance: Callable[[Tolerance], float]  # 0: there is none
+    limit: str  # what stands beside the line of the tolerance
+
+
+STRIPS = (
+    Strip(
+        "distance to goal",
+        LENGTHS,
+        2e-3,
+        lambda j: j.run.position_error[0],
+        lambda t: t.position,
+        "{:g} m",
+    ),
+    Strip(
+        "heading error",
+        ANGLES,
+        2e-2,
+        lambda j: np.abs(np.rad2deg(j.run.heading_error[0])),
+        lambda t: t.heading_deg,
+        "{:g}°",
+    ),
+    Strip(
+        "velocity error",
+        SPEEDS,
+        2e-3,
+        lambda j: j.run.velocity_error[0],
+        lambda t: t.velocity,
+        "{:g} m/s",
+    ),
+    Strip(
+        "turn rate error",
+        TURN_RATES,
+        2e-2,
+        lambda j: np.abs(np.rad2deg(j.run.yaw_rate_error[0])),
+        lambda t: t.yaw_rate_deg,
+        "{:g}°/s",
+    ),
+)
+
+
+def strips(runs: Sequence[View]) -> list[Strip]:
+    """The quantities that the task of the runs asks for."""
+    return [
+        strip
+        for strip in STRIPS
+        if any(not np.isnan(strip.values(judgement)).all() for _, judgement in judged(runs))
+    ] or list(STRIPS[:2])
+
+
+def draw_progress(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
+    """Targets reached where the task counts them, in the first row; then each of `strips`."""
+    chosen = strips(runs)
+    if counting(runs):
+        _reached(rows[0], runs)
+    for axes, strip in zip(rows[-len(chosen) :], chosen, strict=True):
+        _errors(axes, runs, strip)
+    for axes in rows[:-1]:
+        axes.tick_params(labelbottom=False)
+    rows[-1].set_xlabel("time [s]")
+    for _, judgement in judged(runs)[:1]:
+        hold_s = judgement.task.tolerance.hold_s
+        if hold_s > 0.0 and not judgement.counts:
+            rows[0].text(
+                0.5 * (judgement.window_start_s + judgement.duration_s),
+                1.02,
+                f"last {hold_s:g} s",
+                transform=rows[0].get_xaxis_transform(),
+                ha="center",
+                va="bottom",
+                fontsize=8.5,
+                color=FAINT,
+            )
+
+
+def counting(runs: Sequence[View]) -> bool:
+    """Whether the task of the runs counts targets."""
+    return any(judgement.counts for _, judgement in judged(runs))
+
+
+def _reached(axes: Axes, runs: Sequence[View]) -> None:
+    for run, judgement in judged(runs):
+        axes.step(judgement.time_s, judgement.run.goals[0], where="post", color=run.colour, label=run.label)
+        required = judgement.task.required
+        if required is not None:
+            _limit(axes, required, f"{required} make a success")
+    quiet_grid(axes)
+    _span(axes, runs)
+    axes.set_ylim(bottom=0.0)
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_ylabel("targets reached")
+
+
+def _top(axes: Axes, strip: Strip, limits: list[float]) -> float:
+    """Above everything that is drawn, and above a mark that is near, so that the scale can be read off."""
+    drawn = max([float(axes.dataLim.y1), *limits])
+    if not strip.lowest < drawn < np.inf:  # nothing is drawn, or nothing that would be seen
+        return max(strip.marks)
+    return 1.1 * min((mark for mark in strip.marks if drawn <= mark < 2.0 * drawn), default=drawn)
+
+
+def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
+    for run, judgement in judged(runs):
+        axes.plot(judgement.time_s, strip.values(judgement), color=run.colour, linewidth=1.2, label=run.label)
+    quiet_grid(axes)
+    _span(axes, runs)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(FixedLocator(list(strip.marks)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: strip.marks.get(value, "")))
+    axes.yaxis.set_minor_locator(NullLocator())
+    limits = [strip.tolerance(judgement.task.tolerance) for _, judgement in judged(runs)[:1]]
+    axes.set_ylim(strip.lowest, _top(axes, strip, limits))
+    axes.set_ylabel(strip.label)
+    for _, judgement in judged(runs):
+        if not judgement.counts:
+            axes.axvspan(judgement.window_start_s, judgement.duration_s, color=FAINT, alpha=0.12, linewidth=0)
+    for limit in limits:
+        if limit > 0.0:
+            _limit(axes, limit, f"tolerance {strip.limit.format(limit)}")
+
+
+def _span(axes: Axes, runs: Sequence[View]) -> None:
+    axes.set_xlim(0.0, max((judgement.duration_s for _, judgement in judged(runs)), default=1.0))
+
+
+def _limit(axes: Axes, value: float, label: str) -> None:
+    axes.axhline(value, color=INK, linestyle=DASHED, linewidth=1.0)
+    axes.text(0.005, value, label, transform=axes.get_yaxis_transform(), va="bottom", fontsize=8.5, color=INK)

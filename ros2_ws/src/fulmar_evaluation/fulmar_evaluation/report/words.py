@@ -1,0 +1,126 @@
+"""What a report says about a run, in plain language and in figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fulmar_evaluation.report.view import View
+
+Row = tuple[str, str, list[str]]  # what, an explanation, and the cell of each run
+
+
+def verdict(run: View) -> tuple[str, str]:
+    """One word and one or two sentences on how a run went."""
+    judgement = run.judgement
+    if judgement is None:
+        return "No result", "The bag holds fewer than two states, so there is nothing to judge."
+    if not judgement.long_enough:
+        return "Missed", f"The run ended after {judgement.duration_s:.1f} s, too early to judge."
+    touched = " It touched an obstacle." if judgement.figures["collided"] else ""
+    if judgement.progress is not None:
+        path = run.summary["path_error_m"]
+        way = "" if path is None else f" On average the robot was {_length(path)} from the path."
+        end = (
+            "there it stayed to the end" if judgement.success else "it was not where it should be at the end"
+        )
+        return ("Done" if judgement.success else "Missed"), (
+            f"Of the goal file: {judgement.progress} in {judgement.duration_s:.0f} s; {end}.{way}{touched}"
+        )
+    if judgement.counts:
+        reached, required = run.summary["goals_reached"] or 0, judgement.task.required
+        word = "Reached" if judgement.success else "Missed"
+        return word, (
+            f"The robot reached {reached:.0f} targets in {judgement.duration_s:.0f} s; "
+            f"{required} make a success.{touched}"
+        )
+    if run.summary["velocity_error_m_s"] is not None:
+        return ("Kept" if judgement.success else "Missed"), (
+            f"Over {judgement.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off "
+            f"and the turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, "
+            "changes of the target included."
+        )
+    what, error = f"the {judgement.task.subject}", _length(run.summary["final_position_error_m"])
+    if run.summary["final_heading_error_deg"] is not None:
+        error += f" and {_value(run.summary['final_heading_error_deg'], '°', 1)}"
+    if judgement.success:
+        return "Reached", (
+            f"The goal was reached after {judgement.figure('time_to_target_s'):.1f} s and held to the end. "
+            f"At the end of {judgement.duration_s:.0f} s {what} was {error} away."
+        )
+    return "Missed", (
+        f"{what.capitalize()} was not within the tolerance for all of the last {judgement.task.tolerance.hold_s:g} s. "
+        f"At the end of {judgement.duration_s:.0f} s it was {error} away.{touched}"
+    )
+
+
+def rule(runs: Sequence[View]) -> str:
+    """What counts as success, for the first run that can be judged."""
+    for run in runs:
+        if run.judgement is not None:
+            task, tolerance = run.judgement.task, run.judgement.task.tolerance
+            heading = f" and {tolerance.heading_deg:g}°" if tolerance.heading_deg > 0.0 else ""
+            if run.judgement.progress is not None:
+                return "A run counts as done if the goals of its file came to their end and the last one was kept."
+            if run.judgement.counts:
+                return (
+                    f"A target counts as reached within {100 * tolerance.position:g} cm{heading}, and a run that "
+                    f"reaches {task.required} of them as a success."
+                )
+            if tolerance.velocity > 0.0:
+                return (
+                    f"A run counts as kept if the velocity stays within {tolerance.velocity:g} m/s and the turn rate "
+                    f"within {tolerance.yaw_rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
+                )
+            return (
+                f"A run counts as reached if the {task.subject} stays within {100 * tolerance.position:g} cm"
+                f"{heading} of the goal for all of the last {tolerance.hold_s:g} s."
+            )
+    return ""
+
+
+def table(runs: Sequence[View]) -> list[Row]:
+    """The figures of every run, one row each."""
+
+    def row(what: str, why: str, cell: Callable[[dict[str, Any]], str]) -> Row:
+        return what, why, [cell(run.summary) for run in runs]
+
+    def spread(key: str) -> Callable[[dict[str, Any]], str]:
+        return lambda s: " / ".join(_value(s[key][name], "", 2) for name in ("p50", "p99", "max"))
+
+    asked = [
+        row("Final position error", "", lambda s: _length(s["final_position_error_m"])),
+        row("Final heading error", "", lambda s: _value(s["final_heading_error_deg"], "°", 1)),
+        row("Time to goal", "from when on it stayed", lambda s: _value(s["time_to_target_s"], " s", 1)),
+        row("Targets reached", "", lambda s: _value(s["goals_reached"], "", 0)),
+        row("Goals of the file", "", lambda s: s["goals_progress"] or "–"),
+        row("Distance from the path", "mean", lambda s: _length(s["path_error_m"])),
+        row("Velocity error", "mean", lambda s: _value(s["velocity_error_m_s"], " m/s", 3)),
+        row("Turn rate error", "mean", lambda s: _value(s["yaw_rate_error_deg_s"], "°/s", 1)),
+    ]
+    return [
+        *(line for line in asked if any(cell != "–" for cell in line[2])),
+        row("Length of the run", "simulated time", lambda s: _value(s["duration_s"], " s", 1)),
+        row("Actuators in use", "average share of them", lambda s: _percent(s["actuator_use"])),
+        row("Commands", "answered measurements", lambda s: f"{s['steps']}"),
+        row("Control rate", "in the robot's own time", lambda s: _value(s["control_rate_hz"], " Hz", 2)),
+        row("Command rate", "wall-clock", lambda s: _value(s["wall_control_rate_hz"], " Hz", 2)),
+        row("Latency [ms]", "median / p99 / longest", spread("latency_ms")),
+        row("Period error [ms]", "median / p99 / largest", spread("period_error_ms")),
+        row("Inference [ms]", "median / p99 / longest", spread("inference_ms")),
+        row("Overruns", "deadlines missed", lambda s: _value(s["overruns"], "", 0)),
+        row("Believed dead", "valves, by the estimator", lambda s: ", ".join(s["believed_dead"]) or "none"),
+        row("Watchdog trips", "no fresh command", lambda s: _value(s["watchdog_trips"], "", 0)),
+    ]
+
+
+def _length(metres: float | None) -> str:
+    return "–" if metres is None else f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.1f} cm"
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.0f} %"
+
+
+def _value(value: float | None, unit: str, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}{unit}"

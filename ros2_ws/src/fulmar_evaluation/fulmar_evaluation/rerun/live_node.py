@@ -1,0 +1,353 @@
+"""A recorded run once more through the deployed controller node, in lock step: we are the plant."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
+from visualization_msgs.msg import MarkerArray
+
+from fulmar_bags.contents import Bag, json_object
+from fulmar_bags.control_steps import Course
+from fulmar_bags.message_reader import stamp_ns
+from fulmar_bags.received import ABSENT, Told
+from fulmar_bringup.domains import own_domain
+from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.system import Guards
+from fulmar_bringup.system_rows import system_rows
+from fulmar_core.errors import BagError, RunFailed
+from fulmar_core.topics import (
+    ACTION,
+    ACTUATORS_STATE,
+    AIR_BEARING,
+    GOAL_POSES,
+    GOAL_WIRES,
+    METADATA,
+    OBSERVATION,
+    OBSTACLES,
+    ODOMETRY,
+    STATUS,
+    VELOCITY_COMMAND,
+    command_wire,
+)
+from fulmar_evaluation.rerun.rerun import Answers
+from fulmar_ros.convert import VectorWriter
+from fulmar_ros.goal_messages import TYPES
+from fulmar_ros.middleware import set_up_middleware
+from fulmar_ros.patience import FLUSH_S, flush
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.runtime import spinning
+
+START_TIMEOUT_S, ANSWER_TIMEOUT_S = 30.0, 10.0
+RESEND_S = 0.5
+SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
+REASONING_S = 2.0  # for observation and action, which come after the command
+DEPTH = 50
+
+
+def without_repeats(course: Course) -> Course:
+    """The same course with each measurement once: in lock step a node answers one only once."""
+    kept = np.concatenate(([True], np.diff(course.stamp_ns) != 0))
+    rows = ("stamp_ns", "log_ns", "observations", "actions", "commands", "acted", "sample")
+    return replace(course, **{name: getattr(course, name)[kept] for name in rows})
+
+
+def rerun_through_node(
+    bag: Bag, course: Course, controller: str, policy: str, odometry: str | None = None
+) -> tuple[Answers, str | None]:
+    """Feed a recorded run to a controller node of its own, in a ROS domain of its own.
+
+    Unlike `rerun`, the node goes on from its own answers: terms that hold the previous command may differ after the
+    first difference.
+
+    Args:
+        bag: Where the messages themselves are.
+        course: Of that bag, from `without_repeats`.
+        controller: Name of the controller.
+        policy: Folder of a bundle; empty where there is none.
+        odometry: Topic that the course is made of, where it is not the robot's.
+
+    Returns:
+        Its answers and the SHA-256 that it reports.
+
+    Raises:
+        BagError: The bag lacks odometry that was answered, or its run cannot be led from outside.
+        RunFailed: The node refuses to start, ends, or does not answer.
+    """
+    missing = int(np.sum(course.sample == ABSENT))
+    if missing:
+        raise BagError(
+            f"{bag.path}: lacks the odometry of {missing} steps, which a node must have. Use --through direct."
+        )
+    if not course.own:
+        raise BagError(
+            f"{bag.path}: others recorded it, and a node takes odometry in its own frames only. Use --through direct."
+        )
+    if any(goal.index == ABSENT for goal in course.goals):
+        raise BagError("a node is told the recorded goals, and takes no --goal. Use --through direct.")
+    if course.presses or course.settings.estop:
+        raise BagError(
+            f"{bag.path}: its e-stop goes by the clock on the wall, not by steps. Use --through direct."
+        )
+    if len(bag.of(GOAL_POSES)):
+        raise BagError(f"{bag.path}: has goals on {GOAL_POSES.name}. Use --through direct.")
+    if course.changes:
+        raise BagError(f"{bag.path}: its policy was changed on the way. Use --through direct.")
+    settings = course.settings
+    plan = RunPlan(
+        robot=course.robot.name,
+        task=course.task.name,
+        controller=controller,
+        backend="mock",
+        name=bag.name,
+        control_hz=course.settings.control_rate(course.robot),
+        policy=os.path.abspath(policy) if policy else "",
+        lockstep=True,
+        goals="streamed" if settings.goals_streamed else "",
+        guards=Guards(
+            fallback=settings.fallback or None, max_run_time_s=settings.max_run_time_s, area=settings.area
+        ),
+    )
+    with own_domain() as environment:
+        group = ProcessGroup(environment)
+        try:
+            group.start(system_rows(plan)["controller"])
+            return _exchange(_raw_messages(bag, course, odometry), course, plan.namespace, group)
+        finally:
+            group.stop_all()
+
+
+@dataclass
+class _Heard:
+    """What the node has said, by stamp [ns]."""
+
+    changed: threading.Condition = field(default_factory=threading.Condition)
+    commands: dict[int, np.ndarray] = field(default_factory=dict)
+    observations: dict[int, np.ndarray] = field(default_factory=dict)
+    actions: dict[int, np.ndarray] = field(default_factory=dict)
+    names: tuple[str, ...] = ()
+    status: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, Any] = field(default_factory=dict)
+    error: Exception | None = None
+
+    def command_to(self, stamp_ns: int) -> Callable[[], bool]:
+        """Whether there is a command to the odometry of a time."""
+        return lambda: stamp_ns in self.commands
+
+    def reasons_for(self, stamp_ns: int) -> Callable[[], bool]:
+        """Whether there are the observation and the action behind that command."""
+        return lambda: stamp_ns in self.observations and stamp_ns in self.actions
+
+    def echo_of(self, name: str, stamp_ns: int) -> Callable[[], bool]:
+        """Whether the status names a time."""
+        return lambda: self.status.get(name) == str(stamp_ns)
+
+
+def _exchange(
+    raw: dict[str, list[bytes]], course: Course, namespace: str, group: ProcessGroup
+) -> tuple[Answers, str | None]:
+    set_up_middleware()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node("plant", namespace=namespace)
+        heard = _Heard()
+        wires = _Wires(node, course, heard)
+
+        def fail(error: Exception) -> None:
+            heard.error = error
+
+        with spinning(node, fail):
+            return _feed(raw, course, group, wires, heard)
+    finally:
+        rclpy.try_shutdown()
+
+
+class _Wires:
+    """Our endpoints: those of a plant and of an operator."""
+
+    def __init__(self, node: Node, course: Course, heard: _Heard) -> None:
+        self._node, self._heard = node, heard
+        goal = GOAL_WIRES[course.task.goal_topic]
+        self.odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+        self.goal = node.create_publisher(TYPES[goal.name], goal.name, publisher_qos(goal))
+        self.obstacles = node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
+        self.things = {
+            thing.wire.name: node.create_publisher(PoseStamped, thing.wire.name, publisher_qos(thing.wire))
+            for thing in course.task.things
+        }
+        self.bearing = node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
+        self.applied = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
+        wire = command_wire(course.robot)
+        by_velocity = wire is VELOCITY_COMMAND
+        self._listen(TwistStamped if by_velocity else JointState, wire, self._hear_command)
+        self._listen(JointState, OBSERVATION, self._hear_observation)
+        self._listen(JointState, ACTION, self._hear_action)
+        self._listen(DiagnosticArray, STATUS, self._hear_status)
+        self._listen(String, METADATA, self._hear_metadata)
+
+    def _listen(self, kind: type, wire: Any, callback: Callable[[Any], None]) -> None:
+        qos = subscriber_qos(wire, reliable=True, depth=DEPTH)
+
+        def locked(message: Any) -> None:
+            with self._heard.changed:
+                callback(message)
+                self._heard.changed.notify_all()
+
+        self._node.create_subscription(kind, wire.name, locked, qos)
+
+    def _hear_command(self, message: Any) -> None:
+        if isinstance(message, TwistStamped):
+            values = [message.twist.linear.x, message.twist.angular.z]
+        else:
+            values = list(message.effort)
+        self._heard.commands.setdefault(stamp_ns(message.header.stamp), np.array(values))
+
+    def _hear_observation(self, message: Any) -> None:
+        self._heard.names = tuple(message.name)
+        self._heard.observations[stamp_ns(message.header.stamp)] = np.array(message.position)
+
+    def _hear_action(self, message: Any) -> None:
+        self._heard.actions[stamp_ns(message.header.stamp)] = np.array(message.effort)
+
+    def _hear_status(self, message: Any) -> None:
+        for status in message.status:
+            self._heard.status = {pair.key: pair.value for pair in status.values}
+
+    def _hear_metadata(self, message: Any) -> None:
+        self._heard.metadata = json_object(message.data) or {}
+
+    @property
+    def matched(self) -> bool:
+        """Whether the node hears our odometry, and we hear all that it says of a step."""
+        said = (OBSERVATION.name, ACTION.name)
+        return bool(self.odometry.get_subscription_count()) and all(
+            self._node.count_publishers(name) for name in said
+        )
+
+
+def _feed(
+    raw: dict[str, list[bytes]], course: Course, group: ProcessGroup, wires: _Wires, heard: _Heard
+) -> tuple[Answers, str | None]:
+    def wait(condition: Callable[[], bool], limit_s: float, what: str) -> None:
+        until = time.monotonic() + limit_s
+        with heard.changed:
+            while not heard.changed.wait_for(condition, 0.05):
+                if heard.error is not None:
+                    raise RunFailed(f"the replay failed: {heard.error!r}") from heard.error
+                end = group.ended()
+                if end is not None:
+                    raise RunFailed(f"{end.text}; its own words are above")
+                if time.monotonic() > until:
+                    raise RunFailed(f"the controller node {what} within {limit_s:g} s")
+
+    wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
+    time.sleep(SETTLE_S)
+    wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].what)))
+    every = {name: getattr(course, name) for name in ("goals", "obstacles", "bearing")}
+    every |= {thing.wire.name: course.things[thing.name] for thing in course.task.things}
+    told = {name: course.before(each) for name, each in every.items()}
+    applied_at = np.searchsorted(
+        course.applied.stamp_ns, course.stamp_ns
+    )  # the first state of each step or after it
+    count, width = len(course), len(course.robot.actuators.names)
+    actions, commands = np.full((count, width), np.nan), np.full((count, width), np.nan)
+    shown: list[np.ndarray | None] = [None] * count
+    acted = np.zeros(count, dtype=bool)
+    for step in range(count):
+        stamp = int(course.stamp_ns[step])
+        _tell(step, told, raw, wires, wait, heard, streamed=course.settings.goals_streamed)
+        data = raw["odometry"][int(course.sample[step])]
+        answered = _answered(heard, stamp)
+        until = time.monotonic() + ANSWER_TIMEOUT_S
+        while not answered:
+            if time.monotonic() > until:
+                raise RunFailed(
+                    f"the controller node did not answer step {step} within {ANSWER_TIMEOUT_S:g} s"
+                )
+            wires.odometry.publish(data)
+            with heard.changed:
+                answered = heard.changed.wait_for(heard.command_to(stamp), RESEND_S)
+            if not answered and group.ended() is not None:
+                wait(lambda: False, 0.0, "ended")
+        expects = bool(course.acted[step])
+        with heard.changed:
+            both = heard.changed.wait_for(heard.reasons_for(stamp), REASONING_S if expects else 0.0)
+        commands[step] = heard.commands[stamp]
+        _tell_applied(course, step, applied_at, commands[step], wires)
+        if both:
+            acted[step] = True
+            shown[step], actions[step] = heard.observations[stamp], heard.actions[stamp]
+    terms = len(heard.names)
+    observations = np.array([np.full(terms, np.nan) if row is None else row for row in shown])
+    answers = Answers(
+        observations.reshape(count, terms), heard.names, actions, commands, acted, tuple([""] * count)
+    )
+    return answers, heard.metadata.get("sha256")
+
+
+def _tell_applied(
+    course: Course, step: int, applied_at: np.ndarray, answer: np.ndarray, wires: _Wires
+) -> None:
+    """Publish what the actuators did from a step to the next as recorded; the answer where that is not known."""
+    write = VectorWriter(course.robot.actuators.names)
+    end = int(applied_at[step + 1]) if step + 1 < len(course) else len(course.applied)
+    for index in range(int(applied_at[step]), end):
+        wires.applied.publish(write.write(course.applied.values[index], int(course.applied.stamp_ns[index])))
+    if not len(course.applied):
+        wires.applied.publish(write.write(answer, int(course.stamp_ns[step])))
+
+
+def _answered(heard: _Heard, stamp: int) -> bool:
+    with heard.changed:
+        return stamp in heard.commands
+
+
+def _raw_messages(bag: Bag, course: Course, odometry: str | None) -> dict[str, list[bytes]]:
+    return {
+        "odometry": bag.odometry(odometry).data,
+        "goals": bag.of(GOAL_WIRES[course.task.goal_topic]).data,
+        "obstacles": bag.of(OBSTACLES).data,
+        "bearing": bag.of(AIR_BEARING).data,
+        **{thing.wire.name: bag.of(thing.wire).data for thing in course.task.things},
+    }
+
+
+def _tell(
+    step: int,
+    told: dict[str, dict[int, list[Told]]],
+    raw: dict[str, list[bytes]],
+    wires: _Wires,
+    wait: Callable[[Callable[[], bool], float, str], None],
+    heard: _Heard,
+    *,
+    streamed: bool,
+) -> None:
+    """Publish what was told before a step, as the very bytes that were recorded, and wait until it is known."""
+    publishers = {
+        "bearing": wires.bearing,
+        "obstacles": wires.obstacles,
+        "goals": wires.goal,
+        **wires.things,
+    }
+    echoes = {"obstacles": "obstacles_stamp_ns", "goals": "goal_stamp_ns"}
+    for name, publisher in publishers.items():
+        for each in told[name].get(step, ()):
+            publisher.publish(raw[name][each.index])
+            if name == "bearing":
+                flush([publisher], FLUSH_S)  # its state has no stamp: it must come before the odometry
+            if name in echoes and not (streamed and name == "goals"):
+                wait(heard.echo_of(echoes[name], each.stamp_ns), START_TIMEOUT_S, f"did not take its {name}")

@@ -1,0 +1,287 @@
+"""A controller goes through a recorded run again, without ROS, in the guarded loop of the controller node.
+
+What it is shown is what was recorded: each answer is compared with the recorded one, and the next step goes on from the
+record, not from the new answer. So one different command does not make everything after it different.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fulmar_bags.control_steps import Course
+from fulmar_bags.guarded import RecordedEstop
+from fulmar_bags.received import ABSENT
+from fulmar_core.control_loop import unknown_inputs
+from fulmar_core.controllers.controller import Controller, Inputs
+from fulmar_core.controllers.law import Law
+from fulmar_core.errors import BagError, FulmarError, RunFailed, TaskError
+from fulmar_core.guarded_loop import GuardedLoop
+from fulmar_core.health.applied import AppliedHistory
+from fulmar_core.observation import Observer
+from fulmar_core.rotation import rotate
+from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.safety.succession import Succession
+from fulmar_core.standby import Standby, ready
+from fulmar_core.state import RigidBodyState
+
+FROM = ("observations", "odometry")
+NEVER_S = 1e9  # input timeout of a record, which has no steady clock [s]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What a controller said to each step of a course; NaN where it was not asked."""
+
+    observations: np.ndarray  # (n, k) what it was shown
+    observation_names: tuple[str, ...]
+    actions: np.ndarray  # (n, m) before limits
+    commands: np.ndarray  # (n, m) after limits; the safe one where it was not asked
+    acted: np.ndarray  # (n,)
+    reasons: tuple[str, ...]  # why it was not asked, by step; empty where it was
+
+
+def rerun(
+    course: Course,
+    controller: Controller,
+    *,
+    source: str = "observations",
+    fallback: Controller | None = None,
+    load: Callable[[str], Controller] | None = None,
+) -> Answers:
+    """Let a controller answer a recorded run, under the guards that the run had.
+
+    Args:
+        course: The run.
+        controller: Made anew; warmed up or not.
+        source: `observations` shows what was recorded; `odometry` makes observations anew, with the node's gates. Laws
+            read the measured state, which is that of the odometry either way.
+        fallback: Takes over where the node would have let it; warmed up here.
+        load: Loads the bundle of a folder, to follow the recorded changes of policy; None follows none.
+
+    Returns:
+        Its answers.
+
+    Raises:
+        BagError: The bag lacks what the source or a guard needs, its observations are another controller's, or a
+            policy that took over is another one by now.
+        RunFailed: The controller raises and nobody takes over; with the step.
+    """
+    if source == "observations":
+        _check_observations(course, controller)
+        if isinstance(controller, Law) and not len(course.odometry):
+            raise BagError(f"the bag holds no odometry, which '{controller.name}' reads.")
+    elif not len(course.odometry):
+        raise BagError("the bag holds no odometry to make observations from. Use --from observations.")
+    return _Rerun(course, controller, source, fallback, load).run()
+
+
+def _check_observations(course: Course, controller: Controller) -> None:
+    if not course.observation_names:
+        raise BagError("the bag holds no observations. Use --from odometry to make them anew.")
+    names = Observer(course.robot, course.task).names
+    if course.observation_names != names:
+        gone = [name for name in course.observation_names if name not in names]
+        new = [name for name in names if name not in course.observation_names]
+        what = (
+            f"lacks {', '.join(new)}"
+            if new
+            else f"has {', '.join(gone)} too"
+            if gone
+            else "has another order"
+        )
+        raise BagError(
+            f"the recorded observation {what}, so '{controller.name}' cannot read it. Use --from odometry."
+        )
+
+
+class _Rerun:
+    """One pass: feeds the record to the loop that a controller node runs."""
+
+    def __init__(
+        self,
+        course: Course,
+        controller: Controller,
+        source: str,
+        fallback: Controller | None,
+        load: Callable[[str], Controller] | None,
+    ) -> None:
+        self._course, self._source, self._load = course, source, load
+        self._robot, self._states = course.robot, _States(course)
+        # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
+        self._gated = source == "odometry" and (course.settings.lockstep or not course.own)
+        self._estop = RecordedEstop(course.presses, required=self._gated and course.settings.estop)
+        self._history = AppliedHistory(course.settings.hold_ns(course.robot))
+        self._states_fed = 0  # states of the actuators that the history has taken
+        settings = replace(course.settings, input_timeout_s=NEVER_S)
+        self._guard = GuardedLoop(
+            course.robot,
+            course.task,
+            settings,
+            Succession(
+                Standby(controller, "", ""), ready(fallback, course.robot, course.task) if fallback else None
+            ),
+            self._estop,
+            gate=InputGate(course.robot.limits, frozen_after=0),
+            applied=self._history if len(course.applied) else None,
+        )
+        # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
+        self._guard.take_bearing(not course.bearing or bool(course.bearing[0].what))
+        self._guard.activate()
+        self._fed = 0
+
+    def run(self) -> Answers:
+        course, count, guard = self._course, len(self._course), self._guard
+        actuators = len(self._robot.actuators.names)
+        names = guard.loop.observer.names
+        shown = np.full((count, len(names)), np.nan)
+        safe = self._robot.actuators.safe_command
+        actions, commands = np.full((count, actuators), np.nan), np.tile(safe, (count, 1)).astype(float)
+        acted, reasons = np.zeros(count, dtype=bool), [""] * count
+        goals = course.before(course.goals)
+        bearing = course.before(course.bearing)
+        obstacles = course.before(course.obstacles)
+        things = {name: course.before(poses) for name, poses in course.things.items()}
+        changes = course.before(course.changes) if self._load else {}
+        guard.loop.controller.reset()
+        for step in range(count):
+            for told in obstacles.get(step, ()):
+                guard.take_obstacles(told.what, told.stamp_ns)
+            for name, poses in things.items():
+                for told in poses.get(step, ()):
+                    guard.take_thing(name, told.what, told.stamp_ns)
+            for told in bearing.get(step, ()):
+                guard.take_bearing(bool(told.what))
+            for told in goals.get(step, ()):
+                guard.take_goal(told.what, told.stamp_ns, told.log_ns)
+            for told in changes.get(step, ()):
+                guard.succession.propose(self._successor(*told.what))
+            guard.turn()
+            reasons[step], inputs = self._inputs(step)
+            if inputs is not None:
+                try:
+                    done = guard.act(inputs)
+                except Exception as error:  # noqa: BLE001 - whatever a controller raises, as in the node
+                    reasons[step] = self._give_up(step, error)
+                else:
+                    acted[step], shown[step], commands[step] = True, inputs.observation[0], done.command[0]
+                    if done.action.shape == done.command.shape:
+                        actions[step] = done.action[0]
+                    guard.note(done.refusal)
+            recorded = course.commands[step]
+            if not np.isnan(recorded).any():
+                guard.loop.previous = recorded[None]
+        if not course.own and guard.mission.lacking:  # in a bag of our own, it belongs to the run
+            raise self._goalless()
+        return Answers(shown, names, actions, commands, acted, tuple(reasons))
+
+    def _inputs(self, step: int) -> tuple[str, Inputs | None]:
+        """Why the controller is not asked at a step, and else what it acts on."""
+        course, guard = self._course, self._guard
+        log_ns, stamp, recorded = (
+            int(course.log_ns[step]),
+            int(course.stamp_ns[step]),
+            bool(course.acted[step]),
+        )
+        self._feed_odometry(step)
+        self._feed_applied(stamp)
+        self._estop.recorded = recorded
+        sample = int(course.sample[step])
+        state = self._states[sample] if sample != ABSENT else None
+        measurement = None if state is None else Measurement(stamp, "odom", "base_link", state)
+        if self._gated:
+            if measurement is None:
+                guard.loop.rest(stamp)
+                return "no odom yet. Is the plant running?", None
+            decision, inputs = guard.begin_step(measurement, log_ns)
+            return decision.reason, inputs
+        if self._estop.heard and not recorded:
+            guard.mission.drop()
+        if not recorded or (self._source == "odometry" and measurement is None):
+            guard.loop.rest(stamp)
+            return "not asked in the record", None
+        return "", self._inputs_as_recorded(step, measurement)
+
+    def _inputs_as_recorded(self, step: int, measurement: Measurement | None) -> Inputs:
+        """What a controller acts on that was asked in the record, whatever its guards would say now."""
+        loop, stamp = self._guard.loop, int(self._course.stamp_ns[step])
+        if measurement is not None and loop.goal is not None:
+            inputs = self._guard.observe(measurement)
+        elif self._source == "odometry":
+            raise self._goalless()
+        else:
+            inputs = unknown_inputs(loop, stamp)
+        if self._source == "observations":
+            inputs = replace(
+                inputs, observation=np.asarray(self._course.observations[step], dtype=float)[None]
+            )
+        return inputs
+
+    def _feed_odometry(self, step: int) -> None:
+        """Take all odometry up to that of a step, as the node's subscription does."""
+        course, last = self._course, int(self._course.sample[step])
+        while self._fed <= last:
+            index = self._fed
+            self._fed += 1
+            frame, child = course.odometry.frame[index], course.odometry.child_frame[index]
+            if not course.own:  # others name their frames as they please
+                frame, child = "odom", "base_link"
+            stamp = int(course.odometry.stamp_ns[index])
+            if course.settings.lockstep and index and stamp == int(course.odometry.stamp_ns[index - 1]):
+                continue  # the plant asked again, and had the same answer
+            measurement = Measurement(stamp, frame, child, self._states[index])
+            self._guard.take(measurement, int(course.log_ns[step]))
+
+    def _feed_applied(self, stamp_ns: int) -> None:
+        """Take all states of the actuators up to a measurement [ns]."""
+        states = self._course.applied
+        while self._states_fed < len(states) and states.stamp_ns[self._states_fed] < stamp_ns:
+            index = self._states_fed
+            self._states_fed += 1
+            self._history.add(int(states.stamp_ns[index]), states.values[index])
+
+    def _goalless(self) -> BagError:
+        what, task = self._guard.mission.lacking, self._course.task.name
+        return BagError(f"the bag holds no {what} for '{task}'. Give --goal x,y,deg.")
+
+    def _give_up(self, step: int, error: Exception) -> str:
+        """Let the fallback take over from a controller that raised, and say why the step has no answer."""
+        if isinstance(error, TaskError):
+            raise error
+        name = self._guard.loop.controller.name
+        reason = f"'{name}' raised {type(error).__name__} at step {step}: {error}"
+        if not self._guard.fall_back(reason):
+            raise RunFailed(reason) from error
+        return reason
+
+    def _successor(self, folder: str, sha256: str) -> Standby:
+        """The policy that took over in the record."""
+        assert self._load is not None
+        where = f"the run went on with the policy of {folder}"
+        try:
+            found = ready(self._load(folder), self._robot, self._course.task)
+        except FulmarError as error:
+            raise BagError(f"{where}, which cannot be loaded: {error}") from error
+        if found.sha256 != sha256:
+            raise BagError(f"{where}, which is another one by now. Ask one policy: --policy DIR.")
+        return found
+
+
+class _States:
+    """The state of each odometry message, made when it is asked for."""
+
+    def __init__(self, course: Course) -> None:
+        seen = course.odometry
+        self._pose, self._turn = seen.pose, seen.twist[:, 3:]
+        # The arithmetic of `message_reader.measurement_of`, for all messages at once: equal to the last bit.
+        self._velocity = rotate(seen.pose[:, 3:], seen.twist[:, :3])
+        self._last: tuple[int, RigidBodyState] | None = None
+
+    def __getitem__(self, index: int) -> RigidBodyState:
+        if self._last is None or self._last[0] != index:  # one step asks for its own several times
+            pose = self._pose[index]
+            state = RigidBodyState(pose[:3], pose[3:], self._velocity[index], self._turn[index])
+            self._last = index, state
+        return self._last[1]

@@ -1,0 +1,105 @@
+"""What differs between a recorded run and the answers of a controller to it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulmar_bags.comparison import Field, compare
+from fulmar_bags.control_steps import Course
+from fulmar_evaluation.rerun.rerun import Answers
+
+FIELDS = ("decision", "observation", "action", "command")
+NUMBER = re.compile(r"-?[0-9]+([.][0-9]+)?")
+
+
+def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
+    """Compare every field that the bag has.
+
+    Args:
+        course: What was recorded.
+        answers: What a controller says now.
+        tolerances: By field, see `FIELDS`.
+
+    Returns:
+        `decision` (1: the controller was asked), `observation`, `action` (before limits) and `command` (after them), as
+        far as they were recorded.
+    """
+    actuators = course.robot.actuators.names
+    kept = ~_lost(course)  # what the record has lost, cannot be compared
+    parts: list[tuple[str, Sequence[str], np.ndarray, np.ndarray]] = []
+    if course.own:
+        parts.append(("decision", ("acted",), course.acted[:, None], answers.acted[:, None]))
+    if course.observation_names == answers.observation_names:
+        parts.append(("observation", course.observation_names, course.observations, answers.observations))
+    if np.isfinite(course.actions).any():
+        parts.append(("action", actuators, course.actions, answers.actions))
+    if np.isfinite(course.commands).any():
+        there = np.isnan(course.commands)
+        parts.append(("command", actuators, course.commands, np.where(there, np.nan, answers.commands)))
+    return [
+        line
+        for field, names, recorded, found in parts
+        for line in compare(
+            field,
+            names,
+            recorded.astype(float),
+            found.astype(float) if field == "command" else np.where(kept[:, None], found, recorded),
+            course.stamp_ns,
+            tolerances[field],
+        )
+    ]
+
+
+def _lost(course: Course) -> np.ndarray:
+    """Steps whose observation is not in the bag, though a command that is not the safe one shows that there was one."""
+    driven = np.isfinite(course.commands).all(axis=1) & (
+        course.commands != course.robot.actuators.safe_command
+    ).any(axis=1)
+    return ~course.acted & driven
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Steps at which the controller was not asked, for one reason."""
+
+    reason: str  # as it was first given; numbers in it change from step to step
+    steps: int
+    first_step: int
+
+
+def pauses(answers: Answers) -> list[Pause]:
+    """Why the controller was not asked, the most frequent reason first."""
+    steps: dict[str, list[int]] = {}
+    for step, reason in enumerate(answers.reasons):
+        if reason:
+            steps.setdefault(NUMBER.sub("#", reason), []).append(step)
+    found = [Pause(answers.reasons[each[0]], len(each), each[0]) for each in steps.values()]
+    return sorted(found, key=lambda pause: -pause.steps)
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What came of one kind of vector, over all its entries."""
+
+    field: str
+    steps: int
+    differing: int  # numbers that differ
+    largest: float  # difference
+
+
+def sums(fields: Sequence[Field]) -> list[Sums]:
+    """One line for each kind of vector."""
+    kinds = dict.fromkeys(each.field for each in fields)
+    return [
+        Sums(
+            kind,
+            max(each.compared for each in fields if each.field == kind),
+            sum(each.differing for each in fields if each.field == kind),
+            max(each.difference["max"] if each.difference else 0.0 for each in fields if each.field == kind),
+        )
+        for kind in kinds
+    ]

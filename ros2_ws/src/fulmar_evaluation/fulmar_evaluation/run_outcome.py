@@ -1,0 +1,90 @@
+"""Run once, and say from the bag how it went."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import Actuation, Motion, RunRecord
+from fulmar_bringup.external_ready import command_input
+from fulmar_bringup.planning import RunRequest
+from fulmar_bringup.run_executor import Execution, execute
+from fulmar_core.errors import FulmarError
+from fulmar_evaluation.run_summary import summarise
+from policy_server.controllers import controller_entry
+
+# A ring buffer that no fault wrote holds no evidence of success.
+_NOT_EVALUATED: dict[str, Any] = {"success": None, "bag": None, "failure": None}
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """Result of a run."""
+
+    summary: dict[str, Any]
+    failure: str  # why it did not come to its planned end; empty if it did
+
+    @property
+    def exit_code(self) -> int:
+        """0: ran to its end and met the goal, or recorded nothing to evaluate; 1: otherwise."""
+        return 0 if self.summary.get("success") is not False and not self.failure else 1
+
+
+def run_and_evaluate(request: RunRequest) -> RunOutcome:
+    """Run once and evaluate the bag.
+
+    Args:
+        request: What to run.
+
+    Returns:
+        The outcome; a failed run has one too, with whatever was recorded.
+
+    Raises:
+        ConfigError: Another run goes on in this ROS domain, a plant of this name lives in it, or the plant refused its
+            configuration.
+        DeviceError: The device is not there.
+    """
+    return evaluate_execution(request, execute(request))
+
+
+def evaluate_execution(request: RunRequest, execution: Execution) -> RunOutcome:
+    """Evaluate a run that has ended, from its bag."""
+    failure, ring = execution.failure, request.plan.recording.mode == "ring"
+    if ring and not failure and not request.record.exists():
+        return RunOutcome({**summarise(_nothing_recorded(request)), **_NOT_EVALUATED}, "")
+    try:
+        summary = summarise(read_run(request.record))
+    except FulmarError as error:
+        failure, summary = failure or str(error), summarise(_nothing_recorded(request))
+        summary["bag"] = str(request.record) if request.record.exists() else None
+    external = controller_entry(request.plan.controller).is_external
+    if not failure and not ring and external and not summary["steps"]:
+        failure = f"no command came on {command_input(request.plan).topic}: your controller published none"
+    lost = execution.plant_steps - summary["steps"]
+    if not failure and not ring and lost > 0:
+        failure = f"the bag lacks {lost} of {execution.plant_steps} commands"
+    return RunOutcome({**summary, "failure": failure or None}, failure)
+
+
+def _nothing_recorded(request: RunRequest) -> RunRecord:
+    """The record of a run without a bag: its plan, and nothing else."""
+    none, vectors = np.empty(0), np.empty((0, 3))
+    motion = Motion(none, none, vectors, np.empty((0, 4)), vectors, none)
+    actuation = Actuation(none, none, (), np.empty((0, 0)))
+    return RunRecord(
+        path=request.record,
+        info=asdict(request.plan),
+        truth=motion,
+        odom=motion,
+        applied=actuation,
+        commanded=actuation,
+        goals=(),
+        obstacles=np.empty((0, 3)),
+        things={},
+        controller={},
+        health=(),
+        warnings=(),
+    )

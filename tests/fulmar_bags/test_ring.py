@@ -1,0 +1,199 @@
+"""A ring keeps the last seconds in memory and writes them, and what follows, when a fault shows."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import resource
+import signal
+
+import pytest
+import yaml
+from rosbags.rosbag2 import Reader
+
+from fulmar_bags.records import bag_files
+from fulmar_bags.ring import BagRing
+from fulmar_bags.writer import BagWriter
+from fulmar_bags.writer_thread import BagThread
+from fulmar_core.errors import BagError
+from tests.fulmar_bags.bags import INFO, START_NS, TOPIC, TYPE, word, words_by_mcap, words_by_rosbags
+
+GOAL, S = "/robot/goal", 1_000_000_000
+
+
+def new_bag(folder):
+    bag = BagWriter(folder, run_info=INFO)
+    bag.add_topic(TOPIC, TYPE, "stream")
+    bag.add_topic(GOAL, TYPE, "latched")
+    return bag
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "bag"
+
+
+@pytest.fixture
+def ring(folder):
+    return make_ring(folder)
+
+
+def make_ring(folder, **options):
+    """Three seconds before a word that says fault, two after it."""
+    return BagRing(
+        lambda: new_bag(folder),
+        before_s=3.0,
+        after_s=2.0,
+        latched={GOAL: 1},
+        fault_in=lambda _topic, data: "it broke" if b"fault" in data else "",
+        **options,
+    )
+
+
+def hear(ring, seconds, topic=TOPIC, text="word"):
+    """One word a second, and a tick after each."""
+    for second in seconds:
+        ring.write(topic, word(f"{text} {second}"), log_ns=START_NS + second * S)
+        with contextlib.suppress(BagError):
+            ring.tick(second)
+
+
+def test_without_a_fault_nothing_reaches_the_disk(ring, folder):
+    hear(ring, range(100))
+    ring.close()
+    assert not folder.exists()
+    assert ring.messages == 0
+    assert ring.kept_s == 3.0
+
+
+def test_a_fault_writes_what_came_before_and_after_it(ring, folder):
+    hear(ring, range(10))
+    hear(ring, [10], text="fault")
+    hear(ring, range(11, 20))
+    ring.close()
+    expected = ["word 7", "word 8", "word 9", "fault 10", "word 11", "word 12"]
+    assert words_by_rosbags(folder) == words_by_mcap(folder) == expected
+    with Reader(folder) as reader:
+        assert reader.message_count == 6
+
+
+def test_a_fault_that_lasts_is_written_once_and_to_its_end(ring, folder):
+    hear(ring, range(5))
+    hear(ring, range(5, 9), text="fault")
+    hear(ring, range(9, 20))
+    ring.close()
+    expected = ["word 2", "word 3", "word 4", *(f"fault {n}" for n in range(5, 9)), "word 9", "word 10"]
+    assert words_by_rosbags(folder) == expected
+    assert len(ring.faults) == 1
+
+
+def test_each_fault_has_a_file_of_its_own_and_no_message_is_in_two(ring, folder):
+    hear(ring, [0], text="fault")
+    hear(ring, range(1, 30))
+    hear(ring, [30], text="fault")
+    hear(ring, range(31, 40))
+    ring.close()
+    assert len(bag_files(folder)) == 2
+    words = words_by_mcap(folder)
+    assert words == [
+        *("fault 0", "word 1", "word 2"),
+        *("word 27", "word 28", "word 29", "fault 30", "word 31", "word 32"),
+    ]
+
+
+def test_a_second_fault_soon_after_the_first_overlaps_nothing(ring, folder):
+    hear(ring, [0], text="fault")
+    hear(ring, range(1, 4))
+    hear(ring, [4], text="fault")
+    ring.close()
+    assert words_by_mcap(folder) == ["fault 0", "word 1", "word 2", "word 3", "fault 4"]
+
+
+def test_the_goal_is_written_however_old_it_is(ring, folder):
+    hear(ring, [0, 1], topic=GOAL, text="goal")
+    hear(ring, range(2, 100))
+    hear(ring, [100], text="fault")
+    ring.close()
+    assert words_by_mcap(folder) == ["goal 1", "word 97", "word 98", "word 99", "fault 100"]
+    with Reader(folder) as reader:
+        assert reader.start_time == START_NS + 97 * S
+
+
+def test_the_goal_is_in_the_file_of_every_fault(ring, folder):
+    hear(ring, [0], topic=GOAL, text="goal")
+    hear(ring, [1], text="fault")
+    hear(ring, range(2, 30))
+    hear(ring, [30], text="fault")
+    ring.close()
+    assert words_by_mcap(folder).count("goal 0") == 2
+
+
+def test_the_bag_tells_when_and_why_it_was_written(ring, folder):
+    hear(ring, range(3))
+    hear(ring, [3], text="fault")
+    ring.close()
+    told = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert json.loads(told["custom_data"]["fulmar_faults"]) == [
+        {"time_ns": START_NS + 3 * S, "reason": "it broke"}
+    ]
+
+
+def test_a_memory_that_is_too_small_keeps_the_newest_and_says_so(folder):
+    ring = make_ring(folder, max_bytes=2 * len(word("word 0")))
+    assert not ring.cut_short
+    hear(ring, range(3))
+    assert ring.cut_short
+    hear(ring, [3], text="fault")
+    ring.close()
+    assert words_by_mcap(folder) == ["word 1", "word 2", "fault 3"]
+
+
+@pytest.fixture
+def full_disk():
+    """No file may hold a byte; gives what makes room."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    old = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    make_room = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, before)  # noqa: E731
+    yield make_room
+    make_room()
+    signal.signal(signal.SIGXFSZ, old)
+
+
+def test_a_fault_on_a_full_disk_is_written_as_soon_as_there_is_room(ring, folder, full_disk):
+    hear(ring, range(10))
+    hear(ring, [10], text="fault")
+    hear(ring, range(11, 13))
+    assert list(folder.iterdir()) == []
+    assert (ring.messages, ring.messages_on_disk) == (6, 0)
+    full_disk()
+    hear(ring, range(13, 20))
+    hear(ring, [20], text="fault")
+    ring.close()
+    first = ["word 7", "word 8", "word 9", "fault 10", "word 11", "word 12", "word 13"]
+    assert words_by_mcap(folder) == [*first, "word 17", "word 18", "word 19", "fault 20"]
+    assert [fault["time_ns"] for fault in ring.faults] == [START_NS + 10 * S, START_NS + 20 * S]
+
+
+def test_a_second_fault_on_a_full_disk_waits_for_room_too(ring, folder, tmp_path):
+    hear(ring, [0], text="fault")
+    hear(ring, range(1, 10))
+    blocked = folder / "bag_1.mcap.begun"
+    blocked.touch()  # the next file cannot be created
+    with pytest.raises(OSError, match="exists"):
+        hear(ring, [10], text="fault")
+    blocked.unlink()
+    hear(ring, [11])
+    ring.close()
+    assert words_by_mcap(folder)[-5:] == ["word 7", "word 8", "word 9", "fault 10", "word 11"]
+
+
+def test_a_fault_that_was_never_written_counts_as_lost(ring, folder, full_disk):
+    told = []
+    thread = BagThread(ring, on_error=told.append)
+    thread.put(TOPIC, word("word 0"), START_NS)
+    thread.put(TOPIC, word("fault 1"), START_NS + S)
+    account = thread.stop()
+    assert (account.received, account.recorded, account.lost) == (2, 0, 2)
+    assert "cannot write a bag here" in account.problem
+    assert len(told) == 1

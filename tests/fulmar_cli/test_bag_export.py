@@ -1,0 +1,124 @@
+"""`fulmar bag export`: what a table cannot hold is named, and nothing is written of nothing."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from rosbags.rosbag2.enums import StoragePlugin
+from typer.testing import CliRunner
+
+from fulmar_bags.contents import open_bag
+from fulmar_bags.decode import joint_vectors, odometries
+from fulmar_bags.writer import BagWriter
+from fulmar_cli.main import app
+from fulmar_core.errors import BagError
+from fulmar_core.topics import ACTION, COMMAND, OBSERVATION, ODOMETRY
+from tests.foreign_bag import write_foreign
+from tests.fulmar_cli.bag_commands import BAGS, POLICY, answer, ask
+from tests.fulmar_cli.test_bag_diff import SCAN, bag_of, scan
+
+
+def export(bag, *words):
+    return CliRunner().invoke(app, ["bag", "export", str(bag), *map(str, words)])
+
+
+@pytest.mark.parametrize("form", ["csv", "npz"])
+def test_a_bag_without_messages_is_not_exported(tmp_path, form):
+    bag = bag_of(tmp_path / "bag", SCAN)
+    done = export(bag, "--to", form, "--out", tmp_path / "out")
+    assert isinstance(done.exception, BagError)
+    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "out.npz").exists()
+
+
+def test_a_long_array_is_named_where_a_table_leaves_it_out_and_is_kept_in_numpy(tmp_path):
+    ranges = np.linspace(1.0, 2.0, 360)
+    bag = bag_of(tmp_path / "bag", SCAN, scan(ranges), scan(ranges + 1.0))
+    table = export(bag, "--to", "csv", "--out", tmp_path / "csv")
+    assert "left out: /floating_platform/it: ranges" in table.output
+    assert "ranges" not in (tmp_path / "csv" / "floating_platform.it.csv").read_text().splitlines()[0]
+    arrays = export(bag, "--to", "npz", "--out", tmp_path / "bag.npz")
+    assert "left out" not in arrays.output
+    kept = np.load(tmp_path / "bag.npz")["floating_platform/it/ranges"]
+    np.testing.assert_array_equal(kept, np.stack([ranges, ranges + 1.0]).astype(np.float32))
+
+
+def test_an_array_whose_length_changes_is_named(tmp_path):
+    bag = bag_of(tmp_path / "bag", SCAN, scan(np.zeros(100)), scan(np.zeros(101)))
+    assert "its length changes" in export(bag, "--to", "npz", "--out", tmp_path / "bag.npz").output
+
+
+def test_messages_that_cannot_be_read_are_counted(tmp_path):
+    bag = bag_of(tmp_path / "bag", SCAN, scan(np.zeros(3)), scan(np.zeros(3))[:20])
+    done = export(bag, "--out", tmp_path / "csv")
+    assert "1 messages cannot be read as sensor_msgs/msg/LaserScan" in done.output
+
+
+def test_a_bag_with_a_hole_gives_two_episodes(tmp_path):
+    pytest.importorskip("pyarrow")
+    source = open_bag(POLICY)
+    bag = BagWriter(tmp_path / "bag", run_info=source.info)
+    for topic in source.topics.values():
+        bag.add_topic(topic.name, topic.type, "stream")
+    hole = source.of(OBSERVATION).name, source.of(ACTION).name, source.of(COMMAND).name
+    every = sorted(
+        (log, topic.name, i) for topic in source.topics.values() for i, log in enumerate(topic.log_ns)
+    )
+    for log, name, index in every:
+        if name not in hole or not 30 <= index < 40:
+            bag.write(name, source.topics[name].data[index], log_ns=log)
+    bag.close()
+    done = export(tmp_path / "bag", "--to", "lerobot", "--out", tmp_path / "set")
+    assert "its 2 parts are episodes of their own" in done.output
+    lines = (tmp_path / "set/meta/episodes.jsonl").read_text().splitlines()
+    assert [json.loads(line)["length"] for line in lines] == [30, 60]
+
+
+def test_a_bag_of_others_is_no_dataset_and_no_option_is_named_that_there_is_not(tmp_path):
+    pytest.importorskip("pyarrow")
+    bag = write_foreign(tmp_path / "bag", StoragePlugin.MCAP, count=5)
+    told = str(export(bag, "--to", "lerobot", "--out", tmp_path / "set").exception)
+    assert "others recorded it" in told
+    assert "--robot" not in told
+
+
+def test_tables_hold_every_number(tmp_path):
+    answer("export", POLICY, "--to", "csv", "--out", tmp_path / "csv")
+    with (tmp_path / "csv" / "floating_platform.odom.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    seen = odometries(open_bag(POLICY).of(ODOMETRY))
+    assert [float(row["pose.pose.position.x"]) for row in rows] == seen.pose[:, 0].tolist()
+    answer("export", POLICY, "--to", "npz", "--out", tmp_path / "bag.npz")
+    arrays = np.load(tmp_path / "bag.npz", allow_pickle=False)
+    np.testing.assert_array_equal(arrays["floating_platform/odom/pose.pose.position.x"], seen.pose[:, 0])
+    np.testing.assert_array_equal(arrays["floating_platform/odom/stamp_ns"], seen.stamp_ns)
+
+
+def test_a_dataset_holds_an_episode_for_each_bag_and_a_frame_for_each_step(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    answer("export", POLICY, POLICY, "--to", "lerobot", "--out", tmp_path / "set")
+    info = json.loads((tmp_path / "set/meta/info.json").read_text())
+    assert info["codebase_version"] == "v2.1"
+    assert (info["total_episodes"], info["total_frames"], info["fps"]) == (2, 200, 5)
+    path = info["data_path"].format(episode_chunk=0, episode_index=1)
+    table = parquet.read_table(tmp_path / "set" / path)
+    assert set(table.column_names) == set(info["features"])
+    recorded = joint_vectors(open_bag(POLICY).of(ACTION), "effort").values
+    np.testing.assert_array_equal(np.array(table["action"].to_pylist()), recorded)
+    assert table["index"].to_pylist() == list(range(100, 200))
+    assert table["next.done"].to_pylist() == [False] * 99 + [True]
+    lines = (tmp_path / "set/meta/episodes.jsonl").read_text().splitlines()
+    assert [json.loads(line)["length"] for line in lines] == [100, 100]
+    refused = ask(
+        "export",
+        POLICY,
+        BAGS / "turtlebot2_go_to_position_policy",
+        "--to",
+        "lerobot",
+        "--out",
+        tmp_path / "mixed",
+    )
+    assert "another kind" in str(refused.exception)

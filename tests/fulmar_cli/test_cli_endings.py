@@ -1,0 +1,90 @@
+"""How the command ends as a process: exit codes, signals, readers that go away, and what it never loads."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tests.fulmar_cli.command_line import EVALUATE, SHIPPED
+
+
+@pytest.mark.parametrize(
+    ("number", "told"), [(signal.SIGTERM, "stopped by SIGTERM"), (signal.SIGINT, "stopped by the user")]
+)
+def test_a_command_that_is_told_to_stop_says_so_and_ends_with_1(fulmar, monkeypatch, number, told):
+    monkeypatch.setattr("fulmar_evaluation.evaluation.batches", lambda *_a, **_k: signal.raise_signal(number))
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        code, out, err = fulmar(*EVALUATE)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert (code, out, err) == (1, "", f"fulmar: {told}\n")
+
+
+def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(fulmar, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    code, out, err = fulmar("train", "floating_platform", "go_to_pose", "--out", str(blocked))
+    assert (code, out) == (1, "")
+    assert err == f"fulmar: {blocked}: File exists.\n"
+
+
+def test_the_installed_command_does_the_same_in_a_process_of_its_own():
+    command = [sys.executable, "-m", "fulmar_cli.main"]
+    done = subprocess.run(
+        [*command, "list", "--json"], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "floating_platform" in json.loads(done.stdout)["robots"]
+    done = subprocess.run([*command, "run", "boat"], capture_output=True, text=True, timeout=30, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [f"bundle show {SHIPPED} --json", "list"], ids=["a lot", "a little"])
+def test_a_reader_that_has_had_enough_gets_no_traceback(words):
+    piped = f"{sys.executable} -m fulmar_cli.main {words} | true; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", piped], capture_output=True, text=True, timeout=30, check=False)
+    assert done.stderr == ""
+    assert done.returncode in (0, 1)  # 0 where all was written before the reader went
+
+
+def test_looking_around_loads_neither_ros_nor_torch_nor_a_simulator():
+    program = (
+        "import sys; sys.argv = ['fulmar', 'list', '--json']\n"
+        "from fulmar_bringup import cli\n"
+        "try: cli.main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'rclpy', 'torch', 'mujoco', 'onnxruntime', 'matplotlib', 'scipy'} & set(sys.modules)\n"
+        "sys.exit(f'loaded {heavy}' if heavy else 0)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+CATCHES_AN_INTERRUPT_OF_TEXT_THAT_RUNS_AS_CODE = """
+import os, signal
+from fulmar_cli import main as cli
+
+def app(**_):
+    try:
+        exec("os.kill(os.getpid(), signal.SIGINT)\\nwhile True: pass")
+    except KeyboardInterrupt:
+        return 1
+
+cli.app = app
+cli.main()
+"""
+
+
+def test_a_ctrl_c_that_was_answered_does_not_end_the_process_by_a_signal_afterwards(tmp_path):
+    (tmp_path / "interrupted.py").write_text(CATCHES_AN_INTERRUPT_OF_TEXT_THAT_RUNS_AS_CODE)
+    ended = subprocess.run([sys.executable, "-m", "interrupted"], cwd=tmp_path, timeout=30.0, check=False)
+    assert ended.returncode == 1

@@ -1,0 +1,76 @@
+"""`fulmar goals` before any node is up: what there is, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+
+import pytest
+
+from fulmar_bringup.node_table import goals_spec
+from fulmar_cli.commands.goals import goals
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.goal_files import Poses, Positions, load_goals, single_goal
+from fulmar_core.paths import config_names
+from fulmar_ros.goal_node import GoalSettings
+
+
+def call(name=None, robot=None, as_path=False, pose=None):
+    return goals(name, robot=robot, as_path=as_path, control_hz=10.0, pose=pose)
+
+
+def test_without_a_name_every_file_is_listed_with_its_title(capsys):
+    call()
+    told = capsys.readouterr().out
+    for name in config_names("goals"):
+        assert name in told and load_goals(name).title in told
+
+
+def test_goals_are_somebody_s():
+    with pytest.raises(ConfigError, match="--robot floating_platform"):
+        call("circle")
+
+
+@pytest.mark.parametrize(("name", "robot"), [("circel", "turtlebot2"), ("circle", "turtelbot2")])
+def test_a_misspelt_name_gets_the_nearest(name, robot):
+    with pytest.raises(UnknownNameError, match="Did you mean"):
+        call(name, robot)
+
+
+def test_a_file_that_is_not_there_is_named():
+    with pytest.raises(ConfigError, match=r"nowhere/mine\.yaml"):
+        call("nowhere/mine.yaml", "turtlebot2")
+
+
+def test_a_path_to_follow_is_no_list_of_waypoints():
+    with pytest.raises(ConfigError, match="only positions and poses"):
+        call("circle", "turtlebot2", as_path=True)
+
+
+@pytest.mark.parametrize("pose", ["1", "1,2,3,4", "1,two,3", "1,nan", ""])
+def test_a_pose_on_the_command_line_has_two_or_three_finite_numbers(pose):
+    with pytest.raises(ConfigError, match=r"--pose = .* must be two or three finite numbers"):
+        call(robot="turtlebot2", pose=pose)
+
+
+def test_a_pose_is_somebody_s_too():
+    with pytest.raises(ConfigError, match="--pose 1,2,90 --robot floating_platform"):
+        call(pose="1,2,90")
+
+
+def test_a_file_and_a_pose_are_one_too_many():
+    with pytest.raises(ConfigError, match="give one of them"):
+        call("circle", "turtlebot2", pose="1,2")
+
+
+def test_a_single_goal_is_a_position_without_a_heading_and_a_pose_with_one():
+    position, pose = single_goal((1.0, -0.5)), single_goal((1.0, -0.5, 90.0))
+    assert isinstance(position, Positions) and position.targets().tolist() == [[1.0, -0.5, 0.0]]
+    assert isinstance(pose, Poses) and pose.targets().tolist() == [[1.0, -0.5, pytest.approx(math.pi / 2)]]
+    assert "heading = 90 deg" in pose.title
+
+
+def test_the_node_knows_every_parameter_it_is_given():
+    spec = goals_spec("turtlebot2", "circle")
+    assert spec.namespace == "/turtlebot2"
+    assert set(spec.parameters) <= {field.name for field in fields(GoalSettings)}

@@ -1,0 +1,313 @@
+"""`fulmar train`, `fulmar policies` and `fulmar benchmark training`: what is asked for, and what is told."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+
+import pytest
+import typer
+from rich.console import Console
+from typer.testing import CliRunner
+
+pytest.importorskip("stable_baselines3")
+
+from fulmar_cli.commands.benchmark_training import training
+from fulmar_cli.commands.policies import policies
+from fulmar_cli.commands.train import train
+from fulmar_core.calibration import Calibration, Measured, calibration_path, save_calibration
+from fulmar_core.errors import ConfigError
+from training.jobs import Outcome
+from training.progress import LearningBar
+from training.run_folder import read_start, write_start
+from training.run_lock import learning_in
+from training.settings import StopAtSuccess
+
+PLATFORM = ("floating_platform", "go_to_pose")
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Jobs that commands wanted to run; nothing is run, and seed 2 fails."""
+    jobs = []
+
+    def run(self, some, watch):
+        jobs.extend(some)
+        return [_outcome(job) for job in some]
+
+    monkeypatch.setattr("training.executors.LocalExecutor.run", run)
+    return jobs
+
+
+def _outcome(job):
+    if job.seed == 2:
+        return Outcome(job, None, "no memory left")
+    record = {
+        "seed": job.seed,
+        "best": {"success_rate": 0.9, "score": 1.0},
+        "mujoco": {"success_rate": 0.8 + job.seed / 100.0},
+        "steps": 1000,
+        "wall_s": 2.0,
+        "steps_per_s": 500,
+        "curve": [{"wall_s": 4.0, "success_rate": 0.95}],
+    }
+    return Outcome(job, record)
+
+
+def call(command, *words):
+    app = typer.Typer()
+    app.command()(command)
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout
+
+
+def test_a_campaign_is_one_job_for_each_seed_and_the_best_is_named(asked, tmp_path):
+    code, told = call(train, *PLATFORM, "--seeds", 2, "--seed", 3, "--out", tmp_path / "c", "--updates", 7)
+    assert code == 0
+    assert [(job.seed, job.updates, job.episodes) for job in asked] == [(3, 7, 256), (4, 7, 256)]
+    assert [job.out.name for job in asked] == ["seed_3", "seed_4"]
+    assert "best: seed 4" in told
+    assert f"fulmar export {tmp_path / 'c' / 'seed_4'}".replace(" ", "") in "".join(told.split())
+
+
+def test_a_seed_that_fails_is_told_and_the_command_fails(asked, tmp_path):
+    code, told = call(train, *PLATFORM, "--seeds", 3, "--out", tmp_path / "c")
+    assert code == 1
+    assert "2  failed: no memory left" in told
+    code, told = call(train, *PLATFORM, "--seeds", 2, "--out", tmp_path / "d", "--json")
+    assert code == 1
+    assert json.loads(told)["failed"] == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "ROBOT and TASK are needed, or --resume RUN"),
+        (("floating_platform",), "ROBOT and TASK are needed"),
+        ((*PLATFORM, "--executor", "slurm"), "--executor slurm: must be local or ray"),
+        ((*PLATFORM, "--settings", "sac"), "sac needs actuators that move by degrees"),
+        (("--resume", "/nowhere"), "/nowhere: no training run to resume"),
+        ((*PLATFORM, "--resume", "/nowhere"), "goes on with what the run began with; leave ROBOT"),
+        (("--resume", "/nowhere", "--seed", 9), "leave ROBOT, TASK, --seed"),
+        (("--resume", "/nowhere", "--out", "/elsewhere"), "leave ROBOT, TASK, --seed"),
+        ((*PLATFORM, "--executor", "ray"), "are for campaigns: give --seeds N"),
+        ((*PLATFORM, "--address", "nowhere:1"), "are for campaigns: give --seeds N"),
+        ((*PLATFORM, "--stop-at-success", 0), "must be greater than 0"),
+        ((*PLATFORM, "--seeds", 3, "--seed", 2025), "seed 2026 must not be negative, nor"),
+    ],
+)
+def test_what_cannot_be_trained_is_told(words, told):
+    with pytest.raises(ConfigError, match=told):
+        call(train, *words)
+
+
+@pytest.fixture
+def learned(monkeypatch):
+    """Jobs that were learned in this process; nothing is learned."""
+    jobs = []
+
+    def learn(job, watcher):
+        jobs.append(job)
+        return {"steps": 1000, "wall_s": 2.0}
+
+    monkeypatch.setattr("training.jobs.learn", learn)
+    monkeypatch.setattr("training.judge.judge_in_mujoco", lambda run, episodes: {"success_rate": 0.875})
+    return jobs
+
+
+def test_where_a_run_lies_is_said_once_when_it_begins(capsys, tmp_path):
+    bar = LearningBar(tmp_path / "run")
+    for _ in ("the specialist", "the rest"):
+        bar.begin()
+        bar.end()
+    assert capsys.readouterr().err.count(f"run folder: {tmp_path / 'run'}\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("left", "told"),
+    [
+        ((), set()),
+        (("checkpoint.pkl",), {"--resume"}),
+        (("checkpoint.pkl", "run.json", "network.pt"), {"--resume", "export"}),
+    ],
+    ids=["at once", "before anything was checked", "in order"],
+)
+def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_path, left, told):
+    run, said = tmp_path / "run", io.StringIO()
+
+    def broken_off(job, watcher):
+        for name in left:
+            (run / name).write_bytes(b"")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("training.jobs.learn", broken_off)
+    monkeypatch.setattr("fulmar_cli.commands.train.console", Console(file=said, width=500))
+    assert call(train, *PLATFORM, "--out", run)[0] != 0
+    offers = {"--resume": f"fulmar train --resume {run}", "export": f"fulmar export {run} --out"}
+    assert {word for word, offer in offers.items() if offer in said.getvalue()} == told
+
+
+def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):
+    words = (*PLATFORM, "--time-limit", 30, "--stop-at-success", 0.99, "--out", tmp_path / "run")
+    code, told = call(train, *words, "--episodes", 16)
+    assert code == 0
+    (job,) = learned
+    assert (job.time_limit_s, job.settings.stop_at_success) == (30.0, StopAtSuccess(0.99))
+    assert "success 0.875 of 16 episodes in MuJoCo" in told
+
+
+@pytest.mark.parametrize(
+    ("more", "line"),
+    [
+        ((), "to end it once the task is learned: --stop-at-success 0.99"),
+        (("--stop-at-success", 0.9), "ends early after 2 checks in a row with success 0.9 or more"),
+    ],
+    ids=["offered", "asked for"],
+)
+def test_training_says_when_it_ends_early(learned, monkeypatch, tmp_path, more, line):
+    printed = io.StringIO()
+    monkeypatch.setattr("fulmar_cli.commands.train.console", Console(file=printed, width=500))
+    assert call(train, *PLATFORM, *more, "--out", tmp_path / "run")[0] == 0
+    assert line in printed.getvalue()
+
+
+def test_the_rate_of_the_commands_may_be_another_than_the_robot_s(learned, tmp_path):
+    from fulmar_core.robot import load_robot
+
+    assert call(train, *PLATFORM, "--control-hz", 50, "--out", tmp_path / "run")[0] == 0
+    (job,) = learned
+    assert job.settings.learner_of(load_robot(job.robot)).timing.control_hz == 50.0
+    with pytest.raises(ConfigError, match="must divide the physics rate"):
+        call(train, *PLATFORM, "--control-hz", 7, "--out", tmp_path / "other")
+    with pytest.raises(ConfigError, match="--resume"):
+        call(train, "--resume", tmp_path / "run", "--control-hz", 50)
+
+
+def test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path):
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+    from training.settings import load_training_settings, write_training_settings
+
+    settings = load_training_settings(load_robot("turtlebot2"), load_task("go_to_pose"), "td3")
+    write_training_settings(settings, tmp_path / "settings.yaml")
+    start = {"robot": "turtlebot2", "task": "go_to_pose", "seed": 5, "time_limit_s": 90.0, "updates": None}
+    write_start(tmp_path, start)
+    assert call(train, "--resume", tmp_path)[0] == 0
+    assert call(train, "--resume", tmp_path, "--updates", 9)[0] == 0
+    same, longer = learned
+    assert (same.robot, same.seed, same.settings, same.out) == ("turtlebot2", 5, settings, tmp_path)
+    assert (same.time_limit_s, same.updates) == (90.0, None)
+    assert (longer.time_limit_s, longer.updates) == (None, 9)
+    assert read_start(tmp_path) == start | {
+        "time_limit_s": None,
+        "updates": 9,
+    }  # for who resumes it once more
+
+
+def test_two_trainings_do_not_learn_in_one_folder(learned, tmp_path):
+    test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    runs, files = len(learned), set(tmp_path.iterdir())
+    with (
+        learning_in(tmp_path),
+        pytest.raises(ConfigError, match="another `fulmar train` is learning there"),
+    ):
+        call(train, "--resume", tmp_path)
+    assert len(learned) == runs
+    assert set(tmp_path.iterdir()) == files
+
+
+def test_who_comes_second_to_a_folder_does_not_go_on_with_what_the_first_began(
+    learned, tmp_path, monkeypatch
+):
+    from training import run_lock
+
+    @contextlib.contextmanager
+    def late(run):
+        run.mkdir()
+        (run / "start.json").write_text("{}")
+        yield
+
+    monkeypatch.setattr(run_lock, "learning_in", late)
+    with pytest.raises(ConfigError, match="another training began there"):
+        call(train, *PLATFORM, "--out", tmp_path / "run")
+    assert not learned
+
+
+def test_a_run_is_resumed_with_the_calibration_it_began_with_and_no_other(learned, tmp_path, monkeypatch):
+    monkeypatch.setenv("FULMAR_CALIBRATION", "")
+    kept = tmp_path / "calibration.yaml"
+    save_calibration(Calibration("turtlebot2", lag=Measured(0.2, 0.1, 0.3)), kept)
+    test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    assert calibration_path() == kept
+    with pytest.raises(ConfigError, match="leave --calibration out"):
+        call(train, "--resume", tmp_path, "--calibration", kept)
+    with pytest.raises(ConfigError, match="--executor ray does not carry it"):
+        call(train, *PLATFORM, "--calibration", kept, "--executor", "ray")
+
+
+def test_a_run_cannot_be_resumed_as_a_campaign(tmp_path, learned):
+    test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    with pytest.raises(ConfigError, match="exclude one another"):
+        call(train, "--resume", tmp_path, "--seeds", 2)
+
+
+@pytest.fixture
+def passports(monkeypatch):
+    """Every bundle says that it succeeded in 0.96 of its episodes."""
+    from types import SimpleNamespace
+
+    told = SimpleNamespace(
+        training={"mujoco": {"success_rate": 0.96}, "wall_s": 2.0, "steps": 1000, "recipe": ""}
+    )
+    monkeypatch.setattr("training.policies.read_passport", lambda folder: told)
+
+
+def test_policies_that_reach_less_than_they_have_to_are_told_and_the_command_fails(
+    asked, passports, tmp_path
+):
+    code, told = call(policies, "turtlebot2_go_to_position", "kingfisher_go_to_pose", "--out", tmp_path)
+    assert code == 1
+    assert {job.bundle for job in asked} == {
+        tmp_path / "kingfisher_go_to_pose",
+        tmp_path / "turtlebot2_go_to_position",
+    }
+    lines = sorted(told.splitlines()[1:3])
+    assert lines[0].split() == ["kingfisher_go_to_pose", "0.960", "0.90"]
+    assert lines[1].split() == ["turtlebot2_go_to_position", "0.960", "0.99", "too", "low"]
+
+
+def test_policies_can_be_made_one_by_one_and_told_as_json(asked, passports, tmp_path):
+    code, told = call(policies, "kingfisher_go_to_pose", "--out", tmp_path, "--json")
+    assert code == 0
+    (line,) = json.loads(told)["policies"]
+    assert (line["policy"], line["made"], line["good"]) == ("kingfisher_go_to_pose", True, True)
+
+
+def test_anew_puts_the_asked_bundle_aside_and_leaves_the_others(asked, passports, tmp_path):
+    bundles, runs = tmp_path / "bundles", tmp_path / "runs"
+    for name in ("kingfisher_go_to_pose", "turtlebot2_go_to_pose"):
+        (bundles / name).mkdir(parents=True)
+        (bundles / name / "policy.onnx").write_text(name)
+    code, _ = call(policies, "kingfisher_go_to_pose", "--anew", "--out", bundles, "--runs", runs)
+    assert code == 0
+    (kept,) = runs.glob("*/bundle/policy.onnx")
+    assert kept.read_text() == "kingfisher_go_to_pose"
+    assert [folder.name for folder in bundles.iterdir()] == ["turtlebot2_go_to_pose"]
+
+
+def test_an_unknown_policy_is_told():
+    with pytest.raises(ConfigError, match="has no policy 'kingfisher_go_to_post'"):
+        call(policies, "kingfisher_go_to_post")
+
+
+def test_the_comparison_with_stock_ppo_prints_both_and_fails_if_a_run_does(asked, tmp_path):
+    code, told = call(training, "--seeds", 1, "--seconds", 8, "--out", tmp_path)
+    assert code == 0
+    assert "fast is 1.0 times as fast as stock" in told
+    assert told.count("0.950 – 0.950 – 0.950") == 4  # two kinds, two times
+    code, told = call(training, "--seeds", 2, "--seconds", 8, "--out", tmp_path / "again", "--json")
+    assert code == 1
+    assert json.loads(told)["failed"] == ["stock 2: no memory left", "fast 2: no memory left"]
