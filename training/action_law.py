@@ -10,7 +10,7 @@ from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch.nn.functional import log_softmax, one_hot, softplus
 
-from training.orders import KINDS
+from training.incremental_actions import KINDS
 
 
 class ActionLaw(Protocol):

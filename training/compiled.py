@@ -18,7 +18,7 @@ from fulmar_core.learning_step import observed_step
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from training.kernel import ASKED, EFFORT, TOLD, Kernel, check_compiler, kernel_of
-from training.leaves import leaves, moving_of, parts_of, rebuilt
+from training.pytree import leaves, moving_of, parts_of, rebuilt
 
 ObservedStep = Callable[..., tuple[Array, Array, Array]]  # `observed_step` of one batch
 Form = tuple[Any, ...]  # type, shape and strides of each leaf of a part

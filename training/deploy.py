@@ -15,8 +15,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
+from training.fallback_policy import Specialist
 from training.network import Decision, DeployedNetwork, NetworkPlan
-from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
 
 

@@ -20,7 +20,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
 from training.spaces import action_space, observation_space
-from training.stranded import asked_for
+from training.uncontrollable import asked_for
 
 Infos = dict[str, Any]
 # Observations, rewards, terminated and truncated of each world.

@@ -13,6 +13,7 @@ from fulmar_core.calibration import calibration_path
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
+from training.fallback_policy import Specialist, load_specialist, specialist_settings
 from training.progress import ProgressFile, Watcher
 from training.run_folder import (
     CALIBRATION_FILE,
@@ -23,7 +24,6 @@ from training.run_folder import (
     write_run_record,
 )
 from training.settings import TrainingSettings
-from training.specialist import Specialist, load_specialist, specialist_settings
 from training.train import begin_run, check_seed, train
 
 
@@ -76,7 +76,7 @@ def run_job(job: Job, watcher: Watcher | None = None) -> dict[str, Any]:
     """
     record = _finished(job) or learn(job, watcher or ProgressFile(job.out / PROGRESS_FILE))
     if job.episodes and record.get("mujoco", {}).get("episodes") != job.episodes:
-        from training.judge import judge_in_mujoco
+        from training.evaluator import judge_in_mujoco
 
         judge_in_mujoco(job.out, episodes=job.episodes)
     if job.bundle is not None:

@@ -14,7 +14,7 @@ from torch.fx.experimental.proxy_tensor import make_fx
 from fulmar_core.errors import ConfigError
 from fulmar_core.learning_step import observed_step
 from fulmar_core.simulation import BatchSimulation
-from training.leaves import Parts, leaves, moving_of, parts_of, rebuilt
+from training.pytree import Parts, leaves, moving_of, parts_of, rebuilt
 
 # Parts beside those that move: the command, and what the actuators' effort costs.
 ASKED, EFFORT = "asked", "effort"

@@ -10,7 +10,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
-from training.apprentice import Apprentice
+from training.behavior_cloning import Apprentice
 from training.fast_ppo import FastPPO
 from training.ppo import KlAdaptiveRate, KlFeedback, build_ppo
 from training.settings import Algorithm, OnPolicy, Ppo, RecurrentPpo, Td3

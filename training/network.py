@@ -21,7 +21,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.symmetry import Mirror
 from fulmar_core.tasks import Task
-from training.orders import KINDS, shares_asked
+from training.incremental_actions import KINDS, shares_asked
 
 Decision = Literal["threshold", "clamp", "squash", "choose", "order"]
 

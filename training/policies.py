@@ -19,9 +19,9 @@ from fulmar_core.policy_bundle import FORMAT, read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.executors import Executor, Watch
+from training.fallback_policy import specialist_settings
 from training.jobs import Job, Outcome
 from training.settings import TrainingSettings, load_training_settings
-from training.specialist import specialist_settings
 
 UPDATES_A_SECOND = 5.0  # of one run on one idle core, where nothing better is known
 

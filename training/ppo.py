@@ -11,7 +11,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
-from training.apprentice import Apprentice
+from training.behavior_cloning import Apprentice
 from training.fast_ppo import FastPPO
 from training.settings import OnPolicy, Ppo, RecurrentPpo
 

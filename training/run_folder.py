@@ -17,8 +17,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from fulmar_core.atomic_write import write_whole
 from fulmar_core.errors import ConfigError
-from fulmar_core.whole_files import write_whole
 
 SETTINGS_FILE = "settings.yaml"
 START_FILE = "start.json"

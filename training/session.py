@@ -15,11 +15,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from training.checkpoint import save_checkpoint
 from training.checks import Check, Judge
 from training.deploy import deployed_network
+from training.fallback_policy import Specialist
 from training.network import DeployedNetwork
 from training.ppo import KlAdaptiveRate
 from training.progress import Watcher
 from training.settings import TrainingSettings
-from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
 
 

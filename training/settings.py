@@ -147,7 +147,7 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Orders:
-    """Commands are learned as orders (`training.orders`): astern, as it is, or ahead, for actuators that slew."""
+    """Incremental actions (`training.incremental_actions`): astern, hold, or ahead, for actuators that slew."""
 
     hold: int  # control steps that an order stands for while it learns; deployed, orders come at every step
 
@@ -159,7 +159,7 @@ class Orders:
 
 @dataclass(frozen=True)
 class SpecialistPlan:
-    """A second network, which takes over where dead valves leave no pose to hold (`training.specialist`)."""
+    """A second network, which takes over where dead valves leave no pose to hold (`training.fallback_policy`)."""
 
     training: str  # its own settings: a file of `configs/training`
     share: float  # of the run that it learns for, before the other begins [-]

@@ -22,6 +22,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint
 from training.checks import held_out_judge
+from training.fallback_policy import Specialist
 from training.interrupt import polite_interrupt
 from training.learners import build_learner, callbacks_of
 from training.network import save_network
@@ -37,7 +38,6 @@ from training.run_folder import (
 )
 from training.session import Limits, RunIsOver, Session, Story
 from training.settings import OffPolicy, TrainingSettings, write_training_settings
-from training.specialist import Specialist
 from training.vec_env import BatchVecEnv
 
 

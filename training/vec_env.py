@@ -23,10 +23,10 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task
 from training.compiled import step_of
-from training.orders import KINDS, check_orders, shares_asked
+from training.disturbance_inputs import ToldTruth
+from training.incremental_actions import KINDS, check_orders, shares_asked
 from training.spaces import action_space, observation_space, shares_space
-from training.stranded import asked_for
-from training.told_truth import ToldTruth
+from training.uncontrollable import asked_for
 
 
 class BatchVecEnv(VecEnv):
@@ -75,7 +75,7 @@ class BatchVecEnv(VecEnv):
             gas: What a valve costs in that choice, as a multiple.
             mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
                 (`fulmar_core.symmetry`).
-            orders_held: Actions are orders (`training.orders`) that stand for so many control steps; 0: they are not.
+            orders_held: Control steps that an incremental action is held (`training.incremental_actions`); 0: direct.
             compiled: Steps are compiled (`training.compiled`).
 
         Raises:

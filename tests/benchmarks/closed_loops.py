@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from fulmar_bringup.domains import reserved_domains
+from fulmar_core.atomic_write import write_whole
 from fulmar_core.tasks import load_task
-from fulmar_core.whole_files import write_whole
 
 REQUIRED = 0.95  # share of episodes that reach their goal
 SLACK_S = 120.0  # what starting and stopping may take on a busy machine

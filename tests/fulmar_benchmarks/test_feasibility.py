@@ -13,7 +13,7 @@ from fulmar_benchmarks.drift.holdable_episodes import can_hold_episodes
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
 from fulmar_core.errors import ConfigError
-from fulmar_core.holding import can_hold, hold_margin, stranding_losses
+from fulmar_core.holdability import can_hold, hold_margin, stranding_losses
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 

@@ -15,8 +15,8 @@ from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.obstacles import FAR, SIGHT
+from fulmar_core.tasks.shortest_paths import TOUCHING
 from fulmar_core.tasks.track_velocities import ERROR_TERMS
-from fulmar_core.tasks.ways import TOUCHING
 from tests.inputs import inputs_at, inputs_of
 
 ROBOT = load_robot("turtlebot2")

@@ -83,7 +83,7 @@ def test_a_bundle_that_cannot_be_replaced_stays_as_it_was(folder, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    monkeypatch.setattr("fulmar_core.whole_files._settle", full)
+    monkeypatch.setattr("fulmar_core.atomic_write._settle", full)
     with pytest.raises(OSError, match="No space left"):
         write_bundle(folder, b"another network", VECTORS, BLANK)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before

@@ -24,7 +24,7 @@ from fulmar_core.disturbances.scenario import (
 )
 from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.holding import stranding_losses
+from fulmar_core.holdability import stranding_losses
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 

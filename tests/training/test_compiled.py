@@ -20,7 +20,7 @@ from tests.pairs import each_pair
 from training import kernel
 from training.compiled import CompiledStep
 from training.kernel import compiler_found
-from training.leaves import leaves, parts_of
+from training.pytree import leaves, parts_of
 from training.vec_env import BatchVecEnv
 
 pytestmark = pytest.mark.skipif(

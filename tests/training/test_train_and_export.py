@@ -19,8 +19,8 @@ from fulmar_core.policy_bundle import read_golden, read_passport
 from policy_server.policy import Policy
 from tests.policy_server.observed import inputs_seeing
 from training.deploy import deployed_network
+from training.evaluator import judge_in_mujoco
 from training.export import export
-from training.judge import judge_in_mujoco
 from training.network import NetworkController, load_network
 from training.run_folder import NETWORK_FILE, RUN_FILE, read_run_record
 from training.train import train

@@ -15,7 +15,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from fulmar_core.whole_files import sync_folder
+from fulmar_core.atomic_write import sync_folder
 
 
 def _provisional_end() -> bytes:

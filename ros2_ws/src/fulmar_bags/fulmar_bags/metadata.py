@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from fulmar_core import yaml_text
-from fulmar_core.whole_files import write_whole
+from fulmar_core.atomic_write import write_whole
 
 METADATA_FILE = "metadata.yaml"
 # Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.

@@ -14,8 +14,8 @@ from fulmar_bags.mcap_file import BagFile, mcap_writer
 from fulmar_bags.metadata import BagSpan, TopicCount, read_custom, write_metadata
 from fulmar_bags.records import bag_files, plain_name, read_records
 from fulmar_core import yaml_text
+from fulmar_core.atomic_write import sync_folder
 from fulmar_core.errors import BagError
-from fulmar_core.whole_files import sync_folder
 
 _QOS = "offered_qos_profiles"  # of a channel's metadata: YAML in a text
 

@@ -13,9 +13,9 @@ from typing import Any
 from fulmar_bags.message_types import message_type, offered_qos
 from fulmar_bags.metadata import BagSpan, TopicCount, write_metadata
 from fulmar_bags.part import BagPart, Topic
+from fulmar_core.atomic_write import sync_folder
 from fulmar_core.errors import BagError
 from fulmar_core.topics import Delivery
-from fulmar_core.whole_files import sync_folder
 
 RUN_RECORD = "fulmar"  # name of the MCAP metadata record and of the entry in `custom_data`
 RUN_KEY = "run"

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import fulmar_evaluation.bounds
+from fulmar_core.atomic_write import whole_file
 from fulmar_core.episode import Episode
-from fulmar_core.whole_files import whole_file
 from fulmar_evaluation.evaluation import Trial
 from fulmar_evaluation.waypoint_score import WaypointBound, waypoint_bound
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.whole_files import whole_file
+from fulmar_core.atomic_write import whole_file
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of what is kept over time
 FIGURE, MORE = "figure:", "more:"  # prefixes of figures and of further arrays in a file

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
-from fulmar_bringup.abandoned_memory import give_back_abandoned_memory
 from fulmar_bringup.environment import environment
+from fulmar_bringup.shared_memory_cleanup import give_back_abandoned_memory
 from fulmar_core.errors import ConfigError
 
 LARGEST = 232  # of DDS

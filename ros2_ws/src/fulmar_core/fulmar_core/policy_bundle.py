@@ -24,12 +24,12 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from fulmar_core.atomic_write import write_whole
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.errors import BundleError, did_you_mean
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from fulmar_core.whole_files import write_whole
 
 FORMAT = 2
 NETWORK = "policy.onnx"

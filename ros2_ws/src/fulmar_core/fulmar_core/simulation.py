@@ -14,9 +14,10 @@ from fulmar_core.counter_rng import Keys, keys_at, uniform_from, words, world_ke
 from fulmar_core.disturbances.scenario import Scenario, longest_delay
 from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.episode import draw_episodes
+from fulmar_core.episode_prefetch import Beginning, UpcomingEpisodes
 from fulmar_core.goal import Goal
 from fulmar_core.motion import actuation_of, control_step, may_be_off_centre, may_open_late
-from fulmar_core.moving import Moves
+from fulmar_core.mutable_state import Moves
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
@@ -24,7 +25,6 @@ from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.tasks import Task
 from fulmar_core.things import Poses, push_things
-from fulmar_core.upcoming import Beginning, UpcomingEpisodes
 
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 

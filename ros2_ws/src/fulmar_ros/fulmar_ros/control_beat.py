@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_ros.deadline import Deadlines
-from fulmar_ros.phase import ArrivalPhase
+from fulmar_ros.phase_lock import ArrivalPhase
 
 PATIENCE_S = 2.0  # for a controller that hangs, before the node goes on without it
 FRESH_NS = 3_000_000  # a measurement that came so shortly before a beat is the one that was due

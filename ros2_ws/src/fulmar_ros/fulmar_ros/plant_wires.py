@@ -45,10 +45,10 @@ from fulmar_ros.deadline import Spread
 from fulmar_ros.node_robot import own_frames
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.paced_capture import MakeCapture
-from fulmar_ros.patience import FLUSH_S, flush, publish_patiently
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.sent_states import SentStates
 from fulmar_ros.simulated_time import SimulatedTime
+from fulmar_ros.subscriber_wait import FLUSH_S, flush, publish_patiently
 from fulmar_ros.wire_readers import TwistReader, VectorReader
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second

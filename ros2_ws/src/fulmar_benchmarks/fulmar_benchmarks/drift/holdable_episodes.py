@@ -6,7 +6,7 @@ import numpy as np
 
 from fulmar_core.disturbances.outside import outside_wrench
 from fulmar_core.episode import Episode
-from fulmar_core.holding import LEAST_MARGIN, hold_margin
+from fulmar_core.holdability import LEAST_MARGIN, hold_margin
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import Robot
 

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from fulmar_core.atomic_write import write_whole
 from fulmar_core.errors import ConfigError
-from fulmar_core.whole_files import write_whole
 
 
 def line_of(key: str, values: Sequence[object]) -> str:

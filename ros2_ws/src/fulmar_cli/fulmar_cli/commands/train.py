@@ -212,8 +212,8 @@ def _revision() -> str:
 
 
 def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
+    from training.evaluator import judge_in_mujoco
     from training.jobs import learn
-    from training.judge import judge_in_mujoco
     from training.progress import LearningBar
     from training.run_folder import START_FILE
     from training.run_lock import learning_in

@@ -8,7 +8,7 @@ from array_api_compat import device
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.disturbances.world import World
-from fulmar_core.moving import Moves
+from fulmar_core.mutable_state import Moves
 from fulmar_core.rotation import Array
 
 

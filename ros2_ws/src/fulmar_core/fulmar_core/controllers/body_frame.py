@@ -13,7 +13,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.obstacles import FAR, SIGHT
-from fulmar_core.tasks.ways import TOUCHING
+from fulmar_core.tasks.shortest_paths import TOUCHING
 
 Vector = tuple[np.ndarray, np.ndarray]  # ahead and to the left, shapes (n,) [m]
 Twist = tuple[np.ndarray, np.ndarray, np.ndarray]  # ahead, to the left [m/s], turn rate [rad/s], shapes (n,)

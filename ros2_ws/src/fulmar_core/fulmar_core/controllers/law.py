@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fulmar_core.controllers.around import room_ahead
 from fulmar_core.controllers.body_frame import BodyFrame, Vector
 from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.free_space import room_ahead
 from fulmar_core.controllers.guidance import passing_speed
-from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.trust import Suspicion
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task

@@ -16,15 +16,15 @@ import numpy as np
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.body_frame import Situation, Vector
 from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.force_authority import Reach
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
-from fulmar_core.controllers.reach import Reach
 from fulmar_core.controllers.riccati import regulator
 from fulmar_core.controllers.valve_allocation import ValveAllocation
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.dynamics.free_body import free_body_step
-from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.trust import Suspicion
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task

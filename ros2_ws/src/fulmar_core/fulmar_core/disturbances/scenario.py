@@ -15,7 +15,7 @@ from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import ConfigError
-from fulmar_core.holding import stranding_losses
+from fulmar_core.holdability import stranding_losses
 from fulmar_core.paths import config_path
 from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import SCENARIO

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.health.applied import Applied
-from fulmar_core.health.suspicion import Suspicion
 from fulmar_core.health.thruster_health import Health, ThrusterHealth
+from fulmar_core.health.trust import Suspicion
 from fulmar_core.health.valve_trials import ValveTrials
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.reach import Reach
+from fulmar_core.controllers.force_authority import Reach
 from fulmar_core.health.thruster_health import Health
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.trust import Suspicion
 
 ALLOWANCE = 1.0  # evidence that is forgotten in one second: errors of the model add up slowly [-]
 MOST = 6.0  # evidence of one measurement at most, as log-likelihood [-]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.health.suspicion import Suspicion
+from fulmar_core.health.trust import Suspicion
 from fulmar_core.robot import Robot
 
 SETTLED = 1e-4  # relative change of a gain from step to step below which it stays

@@ -19,7 +19,7 @@ from fulmar_core.counter_rng import (
     write_keys,
 )
 from fulmar_core.disturbances.world import World
-from fulmar_core.moving import Moves
+from fulmar_core.mutable_state import Moves
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.rotation import Array, wrap_angle
 

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from fulmar_core.counter_rng import Draws
-from fulmar_core.tasks.passing import PassingTask, path_terms
+from fulmar_core.tasks.waypoint_tasks import PassingTask, path_terms
 from fulmar_core.tasks.waypoints import Course
 
 

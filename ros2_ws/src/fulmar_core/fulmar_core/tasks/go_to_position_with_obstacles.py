@@ -14,6 +14,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.go_to_position import GoToPosition, PositionReward
 from fulmar_core.tasks.obstacles import TOUCH, Obstacles, clearance
+from fulmar_core.tasks.shortest_paths import shortest_way
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import (
     MOTION_TERMS,
@@ -24,7 +25,6 @@ from fulmar_core.tasks.terms import (
     motion_terms,
     pose_errors,
 )
-from fulmar_core.tasks.ways import shortest_way
 
 WAY_TERMS = ("way_x_in_body", "way_y_in_body")  # in the direction to take, as long as the way
 FINE_WAY_TERMS = ("fine_way_x_in_body", "fine_way_y_in_body", "way_length")

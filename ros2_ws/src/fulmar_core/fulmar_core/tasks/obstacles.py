@@ -13,7 +13,7 @@ from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.ways import survey
+from fulmar_core.tasks.shortest_paths import survey
 
 CANDIDATES = 8  # places tried for each obstacle; one that fits nowhere is left out
 FAR = 1e3  # where an obstacle is that is not there [m]
@@ -73,7 +73,7 @@ class Obstacles:
         return placed
 
     def survey(self, discs: np.ndarray, target: np.ndarray, robot: Robot) -> np.ndarray:
-        """Discs with the ways around them for a robot; see `fulmar_core.tasks.ways.survey`."""
+        """Discs with the ways around them for a robot; see `fulmar_core.tasks.shortest_paths.survey`."""
         return survey(discs[..., :3], target[..., :2], self.clearance(robot))
 
     def clearance(self, robot: Robot) -> float:

@@ -10,7 +10,7 @@ from fulmar_core.arrays import array_namespace
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.passing import PassingTask, WaypointReward, bearing_of, newly_done, path_terms
+from fulmar_core.tasks.waypoint_tasks import PassingTask, WaypointReward, bearing_of, newly_done, path_terms
 
 
 @dataclass(frozen=True)

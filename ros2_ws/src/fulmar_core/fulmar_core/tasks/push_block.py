@@ -17,9 +17,9 @@ from fulmar_core.goal import Goal, no_obstacles, offset_to
 from fulmar_core.planar import PlanarState, at_rest, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.passing import toward
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
+from fulmar_core.tasks.waypoint_tasks import toward
 from fulmar_core.things import Thing
 
 Range = tuple[float, float]

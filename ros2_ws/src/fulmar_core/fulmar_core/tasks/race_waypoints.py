@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from fulmar_core.counter_rng import Draws
-from fulmar_core.tasks.passing import PassingTask
 from fulmar_core.tasks.race_track import RaceTrack
+from fulmar_core.tasks.waypoint_tasks import PassingTask
 
 
 @dataclass(frozen=True, kw_only=True)

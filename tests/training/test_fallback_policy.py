@@ -12,20 +12,20 @@ import pytest
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.holding import stranding_losses
+from fulmar_core.holdability import stranding_losses
 from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
-from training import jobs, specialist
+from training import fallback_policy, jobs
 from training.export import export
+from training.fallback_policy import specialist_settings
 from training.jobs import Job, learn
 from training.network import load_network
 from training.policies import ShippedPolicy, recipe
 from training.progress import ProgressFile
 from training.run_folder import NETWORK_FILE, SPECIALIST_FOLDER, read_run_record, read_start
 from training.settings import OnPolicy, RecurrentPpo, SpecialistPlan, load_training_settings
-from training.specialist import specialist_settings
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 NAMES = Observer(ROBOT, TASK).names + disturbance_terms(ROBOT)
@@ -46,8 +46,8 @@ def cut(settings):
 
 
 def cut_short(monkeypatch):
-    load = specialist.load_training_settings
-    monkeypatch.setattr(specialist, "load_training_settings", lambda *given: cut(load(*given)))
+    load = fallback_policy.load_training_settings
+    monkeypatch.setattr(fallback_policy, "load_training_settings", lambda *given: cut(load(*given)))
 
 
 @pytest.fixture
@@ -184,8 +184,10 @@ def test_a_run_that_was_broken_off_ends_with_the_very_networks_of_one_that_was_n
 def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
     policy = ShippedPolicy(ROBOT.name, TASK.name, seed=1, updates=6, success=0.9)
     first = recipe(policy, settings)
-    load = specialist.load_training_settings
-    monkeypatch.setattr(specialist, "load_training_settings", lambda *given: replace(load(*given), worlds=64))
+    load = fallback_policy.load_training_settings
+    monkeypatch.setattr(
+        fallback_policy, "load_training_settings", lambda *given: replace(load(*given), worlds=64)
+    )
     assert recipe(policy, settings) != first
 
 
@@ -198,8 +200,10 @@ def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
     ],
 )
 def test_specialists_that_could_not_take_over_are_refused(settings, monkeypatch, change, said):
-    load = specialist.load_training_settings
-    monkeypatch.setattr(specialist, "load_training_settings", lambda *given: replace(load(*given), **change))
+    load = fallback_policy.load_training_settings
+    monkeypatch.setattr(
+        fallback_policy, "load_training_settings", lambda *given: replace(load(*given), **change)
+    )
     with pytest.raises(ConfigError, match=said):
         specialist_settings(settings, ROBOT, TASK)
 

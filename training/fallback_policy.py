@@ -14,7 +14,7 @@ import numpy as np
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.holding import stranding_losses
+from fulmar_core.holdability import stranding_losses
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from training.network import DeployedNetwork, load_network

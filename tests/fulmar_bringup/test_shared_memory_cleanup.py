@@ -6,7 +6,7 @@ import fcntl
 import os
 import time
 
-from fulmar_bringup.abandoned_memory import give_back_abandoned_memory
+from fulmar_bringup.shared_memory_cleanup import give_back_abandoned_memory
 
 SEGMENT, PORT = "fastrtps_0123456789abcdef", "fastrtps_port7411"
 

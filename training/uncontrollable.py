@@ -1,6 +1,6 @@
 """What is asked of a robot that has lost too many valves to hold a pose: the place, whatever the heading.
 
-Where no mean wrench is left in some direction (`fulmar_core.holding`), a platform that turns its working nozzles to
+Where no mean wrench is left in some direction (`fulmar_core.holdability`), a platform that turns its working nozzles to
 where it has to brake can still come to rest at its goal. A reward that asks for the heading all the way there keeps it
 from learning that.
 """

@@ -14,9 +14,9 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.references.race_corners import draw_corners
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from fulmar_core.tasks.passing import PassingTask
 from fulmar_core.tasks.race_gates import LAST, crossings
 from fulmar_core.tasks.race_track import RaceTrack
+from fulmar_core.tasks.waypoint_tasks import PassingTask
 from fulmar_core.tasks.waypoints import Course, headings_along
 from fulmar_core.trajectories import Judge
 

@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from torch.nn.utils import clip_grad_norm_
 
+from training.expert import Teacher, teacher_of
 from training.fast_ppo import FastPPO, rows
-from training.teacher import Teacher, teacher_of
 from training.vec_env import BatchVecEnv
 
 RATE = (1e-3, 1e-4)  # learning rate of the first and of the last lesson
@@ -23,7 +23,7 @@ WEIGHT = 10.0  # of the squared error beside that of the value
 
 
 class Apprentice(FastPPO):
-    """`FastPPO` with a number of lessons before it, of which `training.teacher` says where there are any."""
+    """`FastPPO` with a number of lessons before it, of which `training.expert` says where there are any."""
 
     def __init__(self, *args: Any, lessons: int = 0, **more: Any) -> None:
         """Build it; see `PPO` for everything but the number of lessons."""

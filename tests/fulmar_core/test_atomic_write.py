@@ -6,8 +6,8 @@ import errno
 
 import pytest
 
-from fulmar_core import whole_files
-from fulmar_core.whole_files import whole_file, write_whole
+from fulmar_core import atomic_write
+from fulmar_core.atomic_write import whole_file, write_whole
 
 
 def full_at(number, monkeypatch):
@@ -19,7 +19,7 @@ def full_at(number, monkeypatch):
         if len(done) > number:
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(whole_files, "_settle", settle)
+    monkeypatch.setattr(atomic_write, "_settle", settle)
 
 
 def test_files_are_replaced_and_nothing_else_is_left(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.tasks.ways import BLOCKED, CORNERS, shortest_way, survey
+from fulmar_core.tasks.shortest_paths import BLOCKED, CORNERS, shortest_way, survey
 
 CLEARANCE, RADIUS = 0.3, 0.2
 WIDE = CLEARANCE + RADIUS

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from fulmar_core.controllers.reach import Reach
+from fulmar_core.controllers.force_authority import Reach
 from fulmar_core.robot import load_robot
 
 VALVES = load_robot("floating_platform").actuators
