@@ -99,9 +99,8 @@ def evaluate(
     from fulmar_bringup.planning import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, gains_note, modules_of
     from fulmar_cli.extras import require
-    from fulmar_core.calibration import use_calibration
     from fulmar_core.disturbances.scenario import check_delays, load_scenario
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robot import load_robot, use_calibration
     from fulmar_core.rollout import WORLDS
     from fulmar_core.tasks import load_task
     from fulmar_evaluation.evaluation import (

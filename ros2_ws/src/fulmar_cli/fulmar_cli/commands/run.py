@@ -220,7 +220,7 @@ def run(
     from fulmar_bringup.planning import plan_run
     from fulmar_bringup.system import gains_note, modules_of
     from fulmar_cli.extras import require
-    from fulmar_core.calibration import use_calibration
+    from fulmar_core.robot import use_calibration
     from fulmar_evaluation.run_outcome import run_and_evaluate
     from policy_server.controllers import controller_entry
 
