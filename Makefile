@@ -18,6 +18,8 @@ DEV_SIZE := 7053
 
 # A sourced ROS shell puts its own packages before those of .venv; the two must not mix.
 unexport PYTHONPATH
+# Tests start hundreds of processes, which would all compile the same modules again.
+unexport PYTHONDONTWRITEBYTECODE
 
 # A stamp has the checksum of its lock file: a changed lock needs a new installation, a touched one does not.
 key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
