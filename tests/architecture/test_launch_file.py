@@ -130,11 +130,11 @@ def test_every_row_of_the_table_becomes_one_node(launch_with):
     _, nodes = launch_with(*rows)
     assert [type(node).__name__ for node in nodes] == ["Node", "Node"]
     for row, node in zip(rows, nodes, strict=True):
-        told = node.kwargs
-        assert (told["package"], told["executable"]) == (row.package, row.executable)
-        assert (told["name"], told["namespace"]) == (row.name, row.namespace)
-        assert told["parameters"] == [row.parameters]
-        assert told["output"] == "screen"
+        given = node.kwargs
+        assert (given["package"], given["executable"]) == (row.package, row.executable)
+        assert (given["name"], given["namespace"]) == (row.name, row.namespace)
+        assert given["parameters"] == [row.parameters]
+        assert given["output"] == "screen"
 
 
 def test_a_running_plant_of_the_same_name_is_searched_for_before_the_start(launch_with):
