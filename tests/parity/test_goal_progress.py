@@ -151,7 +151,7 @@ def in_simulators(task, series, monkeypatch):
 
 
 class NoEstop:
-    received = False
+    heard = False
 
     def reason(self, now_ns):
         return ""
