@@ -1,4 +1,4 @@
-# `make help` lists the targets. Everything is installed into `.venv`.
+# `make help` shows what can be asked for. Nothing here is installed outside `.venv`.
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -12,7 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
-# Size of .venv after an installation on x86-64 [MiB], measured by `du -s --block-size=1M .venv`.
+# Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`.
 RUN_SIZE := 884
 DEV_SIZE := 7053
 
@@ -26,8 +26,8 @@ key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
 RUN_STAMP := $(VENV)/.run-$(call key,$(RUN_LOCK))
 DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
 
-# Shows pip's log as one line with a counter, rewritten in place on a terminal, every tenth line in a log.
-# Errors are printed unchanged.
+# Turns pip's long log into one line that counts: on a terminal it rewrites itself, in a log every tenth is kept.
+# Errors go past it unchanged.
 define install_lock
 total=$$(grep -c '==' $(1)); \
 echo "Installing from $(1): at most $$total packages, exact versions, hashes checked."; \
@@ -156,13 +156,13 @@ compile = $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.11
 	--generate-hashes --no-strip-extras --no-header --no-annotate --quiet
 
 .PHONY: lock
-lock: dev ## Make both lock files again (UPGRADE=1: with the newest versions)
+lock: dev ## Make both locks anew (UPGRADE=1 takes the newest versions)
 	$(compile) $(if $(UPGRADE),--upgrade) --extra ros --extra sim --extra policy --extra bags --extra hardware \
 		--extra view --group build --output-file $(RUN_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) --all-extras --group dev --constraint $(RUN_LOCK) --output-file $(DEV_LOCK)
 
 .PHONY: clean
-clean: ## Remove build results and caches; keeps .venv and runs/
+clean: ## Remove what was built and cached; .venv and runs/ stay
 	rm -rf build dist ros2_ws/build ros2_ws/install ros2_ws/log
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
