@@ -33,7 +33,7 @@ total=$$(grep -c '==' $(1)); \
 echo "Installing from $(1): at most $$total packages, exact versions, hashes checked."; \
 free=$$(df -BM --output=avail . | tail -n 1 | tr -dc 0-9); \
 echo "$(VENV) takes $(2) MiB; $$free MiB are free on this disk."; \
-if [ "$$free" -lt $(2) ]; then echo "The disk may be too small for a new installation: make room, or stop with Ctrl-C." >&2; fi; \
+if [ "$$free" -lt $(2) ]; then echo "Less is free than an install from nothing takes: make room, or stop with Ctrl-C." >&2; fi; \
 PYTHONUNBUFFERED=1 $(BIN)/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
 	--require-hashes -r $(1) | { \
 	seen=0; \
@@ -66,7 +66,7 @@ dev: $(DEV_STAMP) ## Install everything, also for training and tests (6.9 GiB)
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
 		echo "'$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true), but Fulmar needs Python 3.11, 3.12 or 3.13." >&2; \
-		echo "Name an installed one: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
+		echo "Name one that you have: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
 		echo "'$(PYTHON) -m venv' failed, see above. On Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 
