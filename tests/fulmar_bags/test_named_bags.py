@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_bags.comparison import differing
 from fulmar_bags.contents import Topic, open_bag
 from fulmar_bags.control_steps import course_of
 from fulmar_bags.decode import messages
-from fulmar_bags.difference import differing
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_reader import read_any_run, read_run
 from fulmar_bags.writer import BagWriter

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from rosbags.rosbag2 import Reader
 
-from fulmar_bags.records import bag_files
+from fulmar_bags.mcap_records import bag_files
 from fulmar_bags.ring import BagRing
 from fulmar_bags.writer import BagWriter
 from fulmar_bags.writer_thread import BagThread

@@ -8,10 +8,8 @@ from typing import Any
 
 import pytest
 
-from fulmar_bringup import reset_robots
-from fulmar_bringup import stop_robots as module
-from fulmar_bringup.reset_robots import robots_to_reset
-from fulmar_bringup.stop_robots import stop_robots
+from fulmar_bringup import estop_robots as module
+from fulmar_bringup.estop_robots import robots_to_reset, stop_robots
 
 
 class Seen:
@@ -60,7 +58,7 @@ class Seen:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, seconds in {"STAY_S": 0.3, "MISS_S": 0.6, "ANSWER_S": 0.4}.items():
         monkeypatch.setattr(module, name, seconds)
-    monkeypatch.setattr(reset_robots, "MISS_S", 0.6)
+    monkeypatch.setattr(module, "MISS_S", 0.6)
 
 
 def test_a_robot_is_stopped_when_it_is_seen_and_its_button_is_pressed_when_that_is_seen():

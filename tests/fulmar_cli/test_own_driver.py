@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from fulmar_bringup.commissioning.wires import wires_of
+from fulmar_bringup.commissioning.hardware_file import wires_of
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_core.errors import ConfigError
 from hardware_drivers.settings import load_hardware

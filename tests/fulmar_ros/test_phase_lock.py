@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_ros.phase_lock import EARLY_NS, LISTEN, ArrivalPhase
+from fulmar_ros.deadline import EARLY_NS, LISTEN, ArrivalPhase
 
 TICK = 20_000_000
 

@@ -14,9 +14,18 @@ from typing import Any
 import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
-from fulmar_bags.folder import files_of, missing_files, storage_of, told_beside
-from fulmar_bags.layout import unreadable
-from fulmar_bags.records import PACKED, ZSTD_MAGIC, file_bytes, read_records, unpack
+from fulmar_bags.mcap_records import (
+    PACKED,
+    ZSTD_MAGIC,
+    file_bytes,
+    files_of,
+    missing_files,
+    read_records,
+    storage_of,
+    told_beside,
+    unpack,
+)
+from fulmar_bags.message_types import unreadable
 from fulmar_bags.ring import FAULTS
 from fulmar_bags.writer import RUN_KEY, RUN_RECORD
 from fulmar_bags.writer_thread import RECORDING

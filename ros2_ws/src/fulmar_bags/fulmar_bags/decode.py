@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.contents import Topic
-from fulmar_bags.layout import ENCAPSULATION, LITTLE_ENDIAN, Walk
-from fulmar_bags.message_types import type_store
+from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, Walk, type_store
 
 NS = 1_000_000_000
 STAMP = slice(ENCAPSULATION, ENCAPSULATION + 8)  # of a message that begins with a header

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fulmar_bags.mcap_file import BagPart, Topic
 from fulmar_bags.message_types import message_type, offered_qos
 from fulmar_bags.metadata import BagSpan, TopicCount, write_metadata
-from fulmar_bags.part import BagPart, Topic
 from fulmar_core.atomic_write import sync_folder
 from fulmar_core.errors import BagError
 from fulmar_core.topics import Delivery

@@ -1,4 +1,4 @@
-"""ROS domains that nobody else on this machine uses, for work that must not be mixed with anybody's."""
+"""ROS domains that nobody else on this machine uses, and environment variables for a while."""
 
 from __future__ import annotations
 
@@ -7,13 +7,28 @@ import fcntl
 import os
 import random
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TextIO
 
-from fulmar_bringup.environment import environment
 from fulmar_bringup.shared_memory_cleanup import give_back_abandoned_memory
 from fulmar_core.errors import ConfigError
+
+
+@contextlib.contextmanager
+def environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Set variables of this process and the children that it starts, until the context ends."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
 
 LARGEST = 232  # of DDS
 DOMAINS = range(1, 102)  # up to 101 the ports of a domain lie below those that Linux hands out to others

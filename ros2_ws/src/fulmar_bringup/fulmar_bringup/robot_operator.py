@@ -1,4 +1,4 @@
-"""A person's side of a system that runs already: asks its services, from a process of its own."""
+"""A person's side of a system that runs already: finds robots, asks their services, looks at their wires."""
 
 from __future__ import annotations
 
@@ -15,17 +15,48 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from fulmar_bringup.reset_robots import release_without_node, robots_to_reset
-from fulmar_bringup.running_robots import running_robots, unfit_publishers
-from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, spaces_with, stop_robots
+from fulmar_bringup.estop_robots import (
+    ANSWER_S,
+    Answer,
+    Stopped,
+    release_without_node,
+    robots_to_reset,
+    spaces_with,
+    stop_robots,
+)
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot_name import namespace_of
-from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP
-from fulmar_ros.command_writers import full_name
+from fulmar_core.topics import ESTOP_RESET, JOY, STATUS, SWAP, WIRES, Wire
+from fulmar_core.wire_check import wire_problems
+from fulmar_ros.graph import full_name, offers_of, robot_namespaces, running_robots_text
 from fulmar_ros.middleware import set_up_middleware
-from fulmar_ros.node_robot import heard_words
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
+
+DISCOVER_S = 1.5  # until the nodes of the domain have found this one
+
+
+def running_robots(node: Node, *, find_s: float = DISCOVER_S) -> set[str]:
+    """Namespaces with a plant or a controller, after some time to find them."""
+    time.sleep(find_s)
+    return robot_namespaces(node)
+
+
+def unfit_publishers(node: Node, spaces: set[str]) -> list[str]:
+    """Publishers on the wires of robots from which nothing arrives, one sentence each."""
+    return [
+        problem
+        for space in sorted(spaces)
+        for wire in WIRES
+        if not wire.name.startswith("/")
+        for problem in _of_wire(node, wire, f"{space.rstrip('/')}/{wire.name}")
+    ]
+
+
+def _of_wire(node: Node, wire: Wire, topic: str) -> list[str]:
+    reliable = wire.source == "operator" and wire is not JOY
+    return wire_problems(wire, topic, offers_of(node, topic), reliable=reliable)
+
 
 FIND_S = 7.0  # whose first announcements are lost announces himself again after 3 s
 LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
@@ -104,9 +135,9 @@ class Operator:
         }
         return came | {space: release_without_node(self._node, space) for space in sorted(without)}
 
-    def heard_words(self) -> str:
+    def running_robots_text(self) -> str:
         """A sentence that lists the robots that are heard now."""
-        return heard_words(self._node)
+        return running_robots_text(self._node)
 
     def look_at_wires(self) -> tuple[set[str], list[str]]:
         """Namespaces of the robots that run here, and publishers on their wires from which nothing arrives."""
@@ -144,7 +175,7 @@ class Operator:
         while not (status and self._takes_swaps(space)):
             if time.monotonic() > until:
                 raise RunFailed(
-                    f"no controller of '{robot}' is heard in this ROS domain. {self.heard_words()}"
+                    f"no controller of '{robot}' is heard in this ROS domain. {self.running_robots_text()}"
                 )
             time.sleep(LOOK_S)
         before, until, asked_s = status.get("swap_requests"), time.monotonic() + answer_s, 0.0

@@ -14,13 +14,18 @@ from typing import Any
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.domains import claimed_domain
-from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
 from fulmar_bringup.goal_plan import is_endless, shown_path
 from fulmar_bringup.node_table import NodeSpec, RunPlan
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import state_words, time_bar
-from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
+from fulmar_bringup.readiness import (
+    CONTROLLER_AND_RECORDER,
+    raise_if_ended,
+    wait_for_publisher,
+    wait_for_reader,
+    while_starting,
+)
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_bringup.system_rows import system_rows

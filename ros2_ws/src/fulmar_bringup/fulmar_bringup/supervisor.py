@@ -28,13 +28,12 @@ from fulmar_core.tasks import load_task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
-from fulmar_ros.late_subscribers import LateSubscribers
+from fulmar_ros.graph import offers_of
 from fulmar_ros.living_plant import refuse_living_plant, sees_living_plant
 from fulmar_ros.middleware import set_up_middleware
-from fulmar_ros.operator_subscription import SUBSCRIPTIONS
+from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
-from fulmar_ros.wire_watch import offers_of
 
 START_TIMEOUT_S = 30.0
 TELL_AGAIN_S = 0.5  # after an e-stop was silent, before the goal is told once more

@@ -8,8 +8,7 @@ from std_srvs.srv import SetBool
 
 from fulmar_core.backend import AirBearing
 from fulmar_core.topics import AIR_BEARING
-from fulmar_ros.qos import publisher_qos
-from fulmar_ros.subscriber_wait import FLUSH_S, flush
+from fulmar_ros.qos import FLUSH_S, flush, publisher_qos
 
 SERVICE = "air_bearing/enable"
 LOOK_S, AT_LEAST_S = 0.1, 1.0

@@ -30,17 +30,15 @@ from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ODOMETRY
-from fulmar_ros.control_beat import ControlBeat
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
+from fulmar_ros.convert import OdometryReader, VectorReader
+from fulmar_ros.deadline import ControlBeat
+from fulmar_ros.fallback import MakeController, PolicySwap, line_up, load_other
 from fulmar_ros.goal_messages import GoalMessage
-from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.node_robot import own_frames
-from fulmar_ros.parameters import read_parameters
-from fulmar_ros.policy_swap import PolicySwap
+from fulmar_ros.graph import WireWatch
+from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.wire_readers import OdometryReader, VectorReader
-from fulmar_ros.wire_watch import WireWatch
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 SAFE_REPEATS = 5

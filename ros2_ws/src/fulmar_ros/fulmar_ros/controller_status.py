@@ -9,8 +9,8 @@ from fulmar_core.health.beliefs import Beliefs
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.deadline import Deadlines, Spread
+from fulmar_ros.fallback import PolicySwap
 from fulmar_ros.health import Health
-from fulmar_ros.policy_swap import PolicySwap
 
 PERIOD_S = 0.4  # at least 2 Hz
 

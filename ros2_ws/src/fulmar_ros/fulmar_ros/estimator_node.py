@@ -26,8 +26,7 @@ from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.health import Health
-from fulmar_ros.node_robot import name_of, own_frames
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 

@@ -31,9 +31,8 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.health import Health
-from fulmar_ros.node_robot import name_of
 from fulmar_ros.operator_subscription import subscribe_operator
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 

@@ -27,10 +27,10 @@ from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, ODOMETRY
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
+from fulmar_ros.graph import running_robots_text
 from fulmar_ros.health import Health
-from fulmar_ros.late_subscribers import LateSubscribers
-from fulmar_ros.node_robot import heard_words, name_of, own_frames
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.operator_subscription import LateSubscribers
+from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
@@ -218,7 +218,7 @@ class GoalNode(Node):
             self._over = True
         self.get_logger().error(
             f"{missing} (after {self._settings.give_up_s:g} s). Start the robot and its controller, or wait for them: "
-            f"fulmar goals --wait. {heard_words(self)}"
+            f"fulmar goals --wait. {running_robots_text(self)}"
         )
         self._request_exit(FAILED)
 

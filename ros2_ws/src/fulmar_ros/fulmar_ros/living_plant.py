@@ -14,7 +14,7 @@ from rclpy.node import Node
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS
-from fulmar_ros.command_writers import full_name
+from fulmar_ros.graph import full_name
 from fulmar_ros.qos import subscriber_qos
 
 PLANT = "plant"  # name of the node

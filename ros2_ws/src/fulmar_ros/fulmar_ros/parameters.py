@@ -1,4 +1,4 @@
-"""ROS parameters as a frozen dataclass: declared, typed and checked in one call."""
+"""Parameters of a node as a frozen dataclass, declared and checked in one call; name and frames of its robot."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.robot import Robot
+from fulmar_core.robot_name import Frames, frames_of
 
 T = TypeVar("T")
-QOS_OVERRIDES = (
-    "qos_overrides."  # rclpy declares these with the publisher or the subscription that they are for
-)
+QOS_OVERRIDES = "qos_overrides."  # rclpy declares these with the publisher or subscription that they are for
 
 
 def read_parameters(node: Node, cls: type[T]) -> T:
@@ -71,3 +71,13 @@ def _as_number(node: Node, name: str, default: object, error: Exception) -> floa
         node.declare_parameter(name, default, ignore_override=True)
         return float(given.value)
     raise ConfigError(f"parameter '{name}' of node '{node.get_name()}': {error}") from error
+
+
+def name_of(node: Node, robot: Robot) -> str:
+    """Name of a node's robot: its namespace; without one, the robot's type."""
+    return node.get_namespace().strip("/") or robot.name
+
+
+def own_frames(node: Node, robot: Robot) -> Frames:
+    """Frames of a node's robot."""
+    return frames_of(name_of(node, robot), robot.name)

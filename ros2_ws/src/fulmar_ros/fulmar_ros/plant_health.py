@@ -14,15 +14,12 @@ from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.topics import DIAGNOSTICS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
-from fulmar_ros.command_writers import UNNAMED
+from fulmar_ros.graph import UNNAMED, WireWatch
 from fulmar_ros.health import Health
-from fulmar_ros.lockstep_loop import LockstepLoop
+from fulmar_ros.plant_clock import SimulatedTime, WallTime
+from fulmar_ros.plant_loops import LockstepLoop, RealtimeLoop
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import publisher_qos
-from fulmar_ros.realtime_loop import RealtimeLoop
-from fulmar_ros.simulated_time import SimulatedTime
-from fulmar_ros.wall_time import WallTime
-from fulmar_ros.wire_watch import WireWatch
 
 LOOK_S = 0.1  # how soon a change is noticed
 AT_LEAST_S = 1.0  # how often it is said without a change

@@ -21,21 +21,16 @@ from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import CLOCK, DIAGNOSTICS
 from fulmar_ros.air_bearing import AirBearingWires
-from fulmar_ros.clock_owner import other_clocks
-from fulmar_ros.first_episode import first_episode
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
-from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
-from fulmar_ros.node_robot import name_of
-from fulmar_ros.paced_capture import MakeCapture, capture_maker
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.motion_capture import MakeCapture, capture_maker
+from fulmar_ros.parameters import name_of, read_parameters
+from fulmar_ros.plant_clock import SimulatedTime, WallTime, other_clocks
 from fulmar_ros.plant_health import PlantHealth
-from fulmar_ros.plant_settings import PlantSettings
+from fulmar_ros.plant_loops import LockstepLoop, OnStep, RealtimeLoop
+from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import subscriber_qos
-from fulmar_ros.realtime_loop import RealtimeLoop
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.simulated_time import SimulatedTime
-from fulmar_ros.wall_time import WallTime
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE

@@ -1,9 +1,10 @@
-"""What a plant publishes and hears: one object for every wire on its side."""
+"""Publishers, subscriptions and answer times of a plant: one object for every wire on its side."""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections import OrderedDict
 from collections.abc import Sequence
 from functools import partial
 
@@ -39,17 +40,83 @@ from fulmar_core.topics import (
     command_wire,
     thing_wire,
 )
-from fulmar_ros.command_writers import writers_of
-from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
+from fulmar_ros.convert import (
+    ImuWriter,
+    OdometryWriter,
+    PoseWriter,
+    TwistReader,
+    VectorReader,
+    VectorWriter,
+    stamp_of,
+)
 from fulmar_ros.deadline import Spread
-from fulmar_ros.node_robot import own_frames
+from fulmar_ros.graph import writers_of
+from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.operator_subscription import subscribe_operator
-from fulmar_ros.paced_capture import MakeCapture
-from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.sent_states import SentStates
-from fulmar_ros.simulated_time import SimulatedTime
-from fulmar_ros.subscriber_wait import FLUSH_S, flush, publish_patiently
-from fulmar_ros.wire_readers import TwistReader, VectorReader
+from fulmar_ros.parameters import own_frames
+from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.qos import FLUSH_S, flush, publish_patiently, publisher_qos, subscriber_qos
+
+REMEMBERED = 256  # states whose answer may still come, at least
+
+
+class SentStates:
+    """Remembers stamps of the plant's clock with the steady time of their sending. Not thread-safe."""
+
+    def __init__(self, too_old_ns: int) -> None:
+        """Remember nothing yet.
+
+        Args:
+            too_old_ns: Nobody may answer a state that was sent longer ago than this, > 0 [ns].
+        """
+        self._too_old_ns = too_old_ns
+        self._waiting: OrderedDict[int, int] = OrderedDict()  # stamp to time of sending; no answer yet
+        self._young: OrderedDict[int, int] = OrderedDict()  # the same, of all that may still be answered
+        self._newest_ns = 0
+        self._outdated_ns = 0  # every stamp up to this one is too old
+
+    def note(self, stamp_ns: int, now_ns: int) -> None:
+        """A state was sent; of one that is sent again the first time counts.
+
+        Args:
+            stamp_ns: Its stamp [ns].
+            now_ns: Steady clock [ns].
+        """
+        if not self._newest_ns or stamp_ns < self._newest_ns:  # the first, or somebody set the clock back
+            self._waiting.clear()
+            self._young.clear()
+            self._outdated_ns = stamp_ns - 1
+        self._newest_ns = stamp_ns
+        self._waiting.setdefault(stamp_ns, now_ns)
+        self._young.setdefault(stamp_ns, now_ns)
+        self._age(now_ns)
+        while len(self._waiting) > REMEMBERED:
+            self._waiting.popitem(last=False)
+
+    def outdated(self, stamp_ns: int, now_ns: int) -> bool:
+        """Whether a stamp is that of a state which is too old by now; never for 0, which stands for none."""
+        self._age(now_ns)
+        return 0 < stamp_ns <= self._outdated_ns
+
+    def answered(self, stamp_ns: int, now_ns: int) -> int | None:
+        """How long the first answer to a state took; None for any other answer [ns]."""
+        sent_ns = self._waiting.pop(stamp_ns, None)
+        return None if sent_ns is None else now_ns - sent_ns
+
+    def close(self) -> None:
+        """Nothing that was sent so far is to be answered, or timed, any more."""
+        self._waiting.clear()
+        self._young.clear()
+        self._outdated_ns = self._newest_ns
+
+    def _age(self, now_ns: int) -> None:
+        while self._young:
+            stamp_ns, sent_ns = next(iter(self._young.items()))
+            if now_ns - sent_ns <= self._too_old_ns:
+                return
+            self._young.popitem(last=False)
+            self._outdated_ns = stamp_ns
+
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last

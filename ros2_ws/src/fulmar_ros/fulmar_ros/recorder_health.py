@@ -9,9 +9,9 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
+from fulmar_bags.ring import RECORDER
 from fulmar_bags.writer_thread import SLOW_S, Account
 from fulmar_core.topics import DIAGNOSTICS
-from fulmar_ros.fault_signs import RECORDER
 from fulmar_ros.health import Health
 from fulmar_ros.qos import publisher_qos
 

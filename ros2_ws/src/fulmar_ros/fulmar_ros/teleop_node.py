@@ -31,7 +31,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping
 from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
 from fulmar_ros.convert import VectorWriter
-from fulmar_ros.node_robot import heard_words
+from fulmar_ros.graph import running_robots_text
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -119,7 +119,7 @@ class TeleopNode(Node):
         self._patience.cancel()
         if not self._publisher.get_subscription_count():
             self.get_logger().warning(
-                f"no plant subscribes {self._publisher.topic_name}. {heard_words(self)}"
+                f"no plant subscribes {self._publisher.topic_name}. {running_robots_text(self)}"
             )
 
     def _on_joy(self, message: Joy) -> None:
@@ -167,7 +167,7 @@ class TeleopNode(Node):
             self._service.remove_pending_request(self._request)
             self._request = None
         if not self._service.service_is_ready():
-            self._say(f"nobody takes the robot back: is its plant running? {heard_words(self)}")
+            self._say(f"nobody takes the robot back: is its plant running? {running_robots_text(self)}")
             return
         self._asked_at = time.monotonic()
         self._request = self._service.call_async(Trigger.Request())

@@ -15,9 +15,9 @@ import rclpy
 import yaml
 from rclpy.signals import SignalHandlerOptions
 
+from fulmar_bringup.commissioning.hardware_file import Wire, actuator_names, wires_of
 from fulmar_bringup.commissioning.procedure import Outcome, click, measure
 from fulmar_bringup.commissioning.session import Session
-from fulmar_bringup.commissioning.wires import Wire, actuator_names, wires_of
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.emulation import Emulation, emulation_of
 from fulmar_bringup.node_table import RunPlan, emulator_spec, guard_specs, plant_spec

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fulmar_bringup.commissioning.hardware_file import Wire, command_of
 from fulmar_bringup.commissioning.session import Session
-from fulmar_bringup.commissioning.wires import Wire, command_of
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.commissioning.match import CLEARLY, Match, match_nozzles, match_sides

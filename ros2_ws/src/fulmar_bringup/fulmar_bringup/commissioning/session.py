@@ -31,7 +31,7 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.convert import TwistWriter, VectorWriter
-from fulmar_ros.node_robot import name_of, own_frames
+from fulmar_ros.parameters import name_of, own_frames
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 MOST_TRAVEL_M = 0.5

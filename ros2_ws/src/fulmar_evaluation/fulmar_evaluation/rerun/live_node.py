@@ -48,9 +48,8 @@ from fulmar_evaluation.rerun.rerun import Answers
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.middleware import set_up_middleware
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import FLUSH_S, flush, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
-from fulmar_ros.subscriber_wait import FLUSH_S, flush
 
 START_TIMEOUT_S, ANSWER_TIMEOUT_S = 30.0, 10.0
 RESEND_S = 0.5

@@ -1,27 +1,41 @@
-"""Stop robots as they are found: on the wire itself, at once, and through their e-stop nodes, so that it lasts."""
+"""Stop and reset robots: on the wire itself, and through their e-stop nodes, so that it lasts."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from geometry_msgs.msg import TwistStamped
 from rclpy.client import Client
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.task import Future
-from std_msgs.msg import Bool
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_core.robot_name import namespace_of
-from fulmar_core.topics import ESTOP, ESTOP_TRIGGER
-from fulmar_ros.qos import publisher_qos
+from fulmar_core.safety.estop import EstopButton
+from fulmar_core.topics import (
+    COMMAND,
+    ESTOP,
+    ESTOP_RELEASED,
+    ESTOP_RESET,
+    ESTOP_TRIGGER,
+    TELEOP,
+    VELOCITY_COMMAND,
+    Wire,
+)
+from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 Answer = tuple[bool, str]  # whether it was done, and what was said
 SAY_S = 0.05  # between two words on the wire
 STAY_S = 1.0  # at least so long, for robots that are found after the first
 MISS_S = 3.0  # so long for a robot whose e-stop node is not found, or whose wire nobody hears
 ANSWER_S = 2.0  # in which a node must answer
-_BEAT_S = 0.005
+_STOP_LOOK_S, _RESET_LOOK_S = 0.005, 0.05
 
 
 @dataclass(frozen=True)
@@ -62,7 +76,7 @@ def stop_robots(node: Node, robot: str | None, *, find_s: float) -> list[Stopped
             return [found[space].stopped() for space in sorted(found)]
         if not found and now_s - began_s > find_s:
             return []
-        time.sleep(_BEAT_S)
+        time.sleep(_STOP_LOOK_S)
 
 
 class _Robot:
@@ -109,3 +123,84 @@ def _spaces(node: Node, robot: str | None) -> set[str]:
     plants = {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
     found = spaces_with(node, ESTOP_TRIGGER) | plants
     return found if robot is None else found & {namespace_of(robot)}
+
+
+WATCH_S = 1.0  # commands must be zero, or absent, for about half of it
+SETTLE_S = 0.3  # after the first robot was found, for others
+
+
+def robots_to_reset(node: Node, robot: str | None, *, find_s: float) -> tuple[set[str], set[str]]:
+    """Namespaces with an e-stop node, and namespaces with a plant alone.
+
+    Args:
+        node: Spins already.
+        robot: Only this one; None for all.
+        find_s: Longest wait for the first robot [s].
+
+    Returns:
+        With a node, and without; a plant counts as without a node once none was seen for 3 s.
+    """
+    began_s = time.monotonic()
+    plants: dict[str, float] = {}  # and when they were found [s]
+    first_s = float("inf")
+    while True:
+        now_s = time.monotonic()
+        nodes = _only(spaces_with(node, ESTOP_RESET), robot)
+        seen = {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
+        for space in _only(seen, robot):
+            plants.setdefault(space, now_s)
+        alone = plants.keys() - nodes
+        if nodes or plants:
+            first_s = min(first_s, now_s)
+            settled = robot is not None or now_s - first_s > SETTLE_S
+            if settled and all(now_s - plants[space] > MISS_S for space in alone):
+                return nodes, alone
+        elif now_s - began_s > find_s:
+            return set(), set()
+        time.sleep(_RESET_LOOK_S)
+
+
+def release_without_node(node: Node, space: str) -> Answer:
+    """Release the e-stop of a robot that has no e-stop node, if its commands are zero.
+
+    Args:
+        node: Spins already.
+        space: Namespace of the robot.
+
+    Returns:
+        Whether it is released, and why not.
+    """
+    button = EstopButton()
+    button.press()
+
+    def watch(wire: Wire, moves: Callable[[JointState | TwistStamped], bool]) -> None:
+        kind = TwistStamped if wire is VELOCITY_COMMAND else JointState
+        name = f"{space}/{wire.name}"
+        node.create_subscription(
+            kind,
+            name,
+            lambda message: button.hear_command(name, not moves(message), time.monotonic_ns()),
+            subscriber_qos(wire),
+        )
+
+    watch(COMMAND, lambda message: any(message.effort))
+    watch(TELEOP, lambda message: any(message.effort))
+    watch(VELOCITY_COMMAND, lambda m: m.twist.linear.x != 0.0 or m.twist.angular.z != 0.0)
+    publisher = node.create_publisher(String, f"{space}/{ESTOP_RELEASED.name}", publisher_qos(ESTOP_RELEASED))
+    time.sleep(WATCH_S)
+    problem = button.reset(time.monotonic_ns())
+    if problem:
+        return False, problem
+    until = time.monotonic() + ANSWER_S
+    while not publisher.get_subscription_count():
+        if time.monotonic() > until:
+            return False, f"nothing subscribes to {publisher.topic_name}: is its plant running?"
+        time.sleep(_RESET_LOOK_S)
+    time.sleep(SETTLE_S)  # a match is seen here a moment before the other side is ready
+    publisher.publish(String(data=node.get_fully_qualified_name()))
+    publisher.wait_for_all_acked(Duration(seconds=ANSWER_S))
+    return True, "released on the wire, since it has no e-stop node: controllers wait for a new goal"
+
+
+def _only(spaces: set[str], robot: str | None) -> set[str]:
+    return spaces if robot is None else spaces & {namespace_of(robot)}
