@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from fulmar_bags.run_reader import read_run
-from fulmar_bags.run_record import HealthSample
+from fulmar_bags.run_record import HealthSample, read_run
 from fulmar_bringup import run_executor
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.supervisor import Report

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fulmar_bags.contents import open_bag
-from fulmar_bags.control_steps import course_of
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.control_steps import control_steps_of
+from fulmar_bags.run_record import read_run
 from fulmar_bringup import readiness
 from fulmar_bringup.bag_origin import attachments
 from fulmar_bringup.launched_system import list_nodes
@@ -216,8 +216,8 @@ def test_a_rerun_refuses_an_external_controller_and_compares_another(external, r
         line = complaint(fulmar("bag", "rerun", external, *words))
         assert "an external controller drove" in line
         assert "--controller classical --from odometry" in line
-    course = course_of(open_bag(external))
-    stamped = course_of(open_bag(reached))
+    course = control_steps_of(open_bag(external))
+    stamped = control_steps_of(open_bag(reached))
     np.testing.assert_array_equal(course.stamp_ns, stamped.stamp_ns[: len(course)])
     np.testing.assert_array_equal(course.commands, stamped.commands[: len(course)])
     code, out, _ = fulmar(

@@ -14,7 +14,7 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from rclpy.duration import Duration
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_bringup.robot_operator import Operator
 from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
 from fulmar_core.goal import goal_at

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.contents import Bag, Topic
+from fulmar_bags.decode import by_stamp
 from fulmar_bags.figures import provenance
 from fulmar_bags.tables import Row, columns, rows
 from fulmar_core.errors import ConfigError, UnknownNameError
@@ -322,9 +323,7 @@ def _pairs(first: list[int], second: list[int]) -> tuple[list[tuple[int, int]], 
 
     Where no time is common, as without stamps, they are taken in their order.
     """
-    waiting: dict[int, list[int]] = {}
-    for index in range(len(second) - 1, -1, -1):
-        waiting.setdefault(second[index], []).append(index)
+    waiting = by_stamp(second)
     pairs = []
     for index, time in enumerate(first):
         mine = waiting.get(time)

@@ -112,6 +112,17 @@ class Bag:
         name = self.name or (spaces.pop() if len(spaces) == 1 else "")
         return Frames(f"{name}/") if name else PLAIN
 
+    def number(self, name: str, default: float) -> float:
+        """A number of the run record; `default` where it says nothing, or 0.
+
+        Raises:
+            BagError: It is no number.
+        """
+        try:
+            return float((self.info or {}).get(name) or default)
+        except (TypeError, ValueError) as error:
+            raise BagError(f"the run record of the bag has an invalid {name}: {error}.") from error
+
     def relative(self, topic: str) -> str:
         """Name of a topic without what all topics of the robot begin with."""
         return topic.removeprefix(self.prefix)

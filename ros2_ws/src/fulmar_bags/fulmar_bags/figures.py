@@ -10,7 +10,6 @@ import numpy as np
 
 from fulmar_bags.contents import Bag, Topic, json_object, span_ns
 from fulmar_bags.decode import messages, stamps_ns
-from fulmar_bags.guarded import number_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
 from fulmar_core.provenance import MADE_BY, PATCH
@@ -136,7 +135,7 @@ def _lateness(
     time goes faster, a delay has no meaning.
     """
     info = bag.info or {}
-    if stamps is None or period_ns is None or info.get("lockstep") or number_of(info, "rate", 1.0) != 1.0:
+    if stamps is None or period_ns is None or info.get("lockstep") or bag.number("rate", 1.0) != 1.0:
         return None, None
     delay_ns = (log_ns - stamps).astype(float)
     delay_ns -= delay_ns.min()

@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 
 from fulmar_bags.mcap_records import read_records
 from fulmar_bags.message_types import type_store
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_bags.writer import BagWriter
 from fulmar_core.errors import BagError
 from fulmar_core.goal import goal_at
