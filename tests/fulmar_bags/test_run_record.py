@@ -71,7 +71,7 @@ def rewritten_in_parts(bag: Path, folder: Path) -> Path:
             parts.add_topic(record.topic, schemas[record.schema_id], "stream")
         elif isinstance(record, Message):
             parts.write(topics[record.channel_id], record.data, log_ns=record.log_time)
-            if parts.messages % 1000 == 0:
+            if parts.counts.messages % 1000 == 0:
                 parts.split()
     parts.close()
     return folder

@@ -11,7 +11,7 @@ import pytest
 
 from fulmar_bags.run_record import HealthSample, read_run
 from fulmar_bringup import run_executor
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import RunFailed

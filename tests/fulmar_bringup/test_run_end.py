@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.run_executor import _wait_for_end
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_core.errors import RunFailed
 from fulmar_core.safety.watchdog import NO_COMMAND

@@ -16,9 +16,9 @@ from fulmar_bags.run_record import read_run
 from fulmar_bringup import readiness
 from fulmar_bringup.bag_origin import attachments
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.readiness import command_input, wait_for_publisher, wait_for_reader
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import ConfigError, RunFailed

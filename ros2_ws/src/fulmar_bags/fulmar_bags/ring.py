@@ -10,11 +10,11 @@ from __future__ import annotations
 import json
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fulmar_bags.message_types import type_store
-from fulmar_bags.writer import BagWriter
+from fulmar_bags.writer import BagCounts, BagWriter
 from fulmar_core.topics import DIAGNOSTICS, ESTOP, STATUS, Wire
 
 FAULTS = "fulmar_faults"  # entry of `custom_data`: JSON list of when and why
@@ -79,24 +79,10 @@ class BagRing:
         return (self._kept[-1].log_ns - self._kept[0].log_ns) / NS if self._kept else 0.0
 
     @property
-    def messages(self) -> int:
-        """Messages that belong into the bag so far."""
-        return (self._bag.messages if self._bag else 0) + (len(self._kept) if self._due else 0)
-
-    @property
-    def messages_on_disk(self) -> int:
-        """Messages that a reader of the bag finds now."""
-        return self._bag.messages_on_disk if self._bag else 0
-
-    @property
-    def files(self) -> int:
-        """MCAP files of the bag so far."""
-        return self._bag.files if self._bag else 0
-
-    @property
-    def size(self) -> int:
-        """Bytes on disk."""
-        return self._bag.size if self._bag else 0
+    def counts(self) -> BagCounts:
+        """Of the bag, and of messages that belong to a fault whose file has not begun."""
+        counts = self._bag.counts if self._bag else BagCounts()
+        return replace(counts, messages=counts.messages + (len(self._kept) if self._due else 0))
 
     @property
     def waiting(self) -> int:

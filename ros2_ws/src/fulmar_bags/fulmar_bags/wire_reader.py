@@ -71,7 +71,7 @@ class WireReader:
 
     def goals(self, task: Task | None) -> list[Received]:
         """Goals in the order of recording; a controller receives the topic of its task alone, None: any topic."""
-        found = []
+        found: list[Received] = []
         for wire in (wire for topic in GOAL_WIRES for wire in goal_wires(topic)):
             count = len(self.bag.of(wire))
             if task is None or wire in goal_wires(task.goal_topic):

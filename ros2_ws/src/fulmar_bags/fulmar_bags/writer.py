@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,20 @@ RUN_RECORD = "fulmar"  # name of the MCAP metadata record and of the entry in `c
 RUN_KEY = "run"
 # A bag may lack the last second at most; the disk, and a machine that is busy, get the other half of it.
 FLUSH_EVERY_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class BagCounts:
+    """Messages and bytes of a bag so far."""
+
+    messages: int = 0  # given
+    on_disk: int = 0  # messages that a reader of the bag finds now
+    files: int = 0  # MCAP files
+    size: int = 0  # of them on disk [bytes]
+
+    def __add__(self, other: BagCounts) -> BagCounts:
+        """Counts of two bags together."""
+        return BagCounts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
 
 class BagWriter:
@@ -74,24 +89,10 @@ class BagWriter:
             raise BagError(f"{directory}: cannot write a bag here: {error.strerror}.") from error
 
     @property
-    def messages(self) -> int:
-        """Messages given so far."""
-        return self._written
-
-    @property
-    def messages_on_disk(self) -> int:
-        """Messages that a reader of the bag finds now."""
-        return self._flushed
-
-    @property
-    def files(self) -> int:
-        """MCAP files of the bag so far."""
-        return len(self._finished) + 1
-
-    @property
-    def size(self) -> int:
-        """Bytes of all MCAP files on disk."""
-        return sum(part.size for part in (*self._finished, self._part))
+    def counts(self) -> BagCounts:
+        """Messages and bytes so far."""
+        parts = (*self._finished, self._part)
+        return BagCounts(self._written, self._flushed, len(parts), sum(part.size for part in parts))
 
     @property
     def waiting(self) -> int:

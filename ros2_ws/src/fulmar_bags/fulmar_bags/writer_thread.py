@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from fulmar_bags.writer import BagCounts
 from fulmar_core.errors import BagError
 
 MAX_QUEUED = 100_000  # messages that may wait for the thread
@@ -32,13 +33,7 @@ class Bag(Protocol):
     """What the thread writes to: a `BagWriter`, a `BagRing` or a `BagPerGoal`."""
 
     @property
-    def messages(self) -> int: ...  # noqa: D102 - as BagWriter's, all of them
-    @property
-    def messages_on_disk(self) -> int: ...  # noqa: D102
-    @property
-    def size(self) -> int: ...  # noqa: D102
-    @property
-    def files(self) -> int: ...  # noqa: D102
+    def counts(self) -> BagCounts: ...  # noqa: D102 - as of `BagWriter`, all of them
     @property
     def waiting(self) -> int: ...  # noqa: D102
     def write(self, topic: str, data: bytes, *, log_ns: int) -> None: ...  # noqa: D102
@@ -125,15 +120,15 @@ class BagThread:
 
     def account(self, *, complete: bool = False) -> Account:
         """What became of the messages so far; from any thread."""
-        recorded = self._bag.messages_on_disk
+        counts = self._bag.counts
         return Account(
             received=self._received,
-            recorded=recorded,
+            recorded=counts.on_disk,
             waiting=self._put_bytes - self._taken_bytes + self._bag.waiting,
-            size=self._bag.size,
-            files=self._bag.files,
+            size=counts.size,
+            files=counts.files,
             dropped=dict(Counter(dict(self._crowded_out)) + Counter(dict(self._refused))),
-            unwritten=self._bag.messages - recorded,
+            unwritten=counts.messages - counts.on_disk,
             slowest_write_s=self._slowest_s,
             problem=self._problem,
             complete=complete,

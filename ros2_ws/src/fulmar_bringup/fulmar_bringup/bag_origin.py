@@ -21,7 +21,7 @@ from policy_server.controllers import controller_entry
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:
-    from fulmar_bringup.node_table import RunPlan
+    from fulmar_bringup.run_plan import RunPlan
 
 CALIBRATION = "calibration.yaml"  # name of the attachment
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 
-from fulmar_bringup.node_table import NodeSpec
+from fulmar_bringup.run_plan import NodeSpec
 from fulmar_ros.living_plant import PLANT, refuse_living_plant
 from fulmar_ros.middleware import set_up_middleware
 

@@ -15,8 +15,8 @@ import numpy as np
 from fulmar_bringup.emulation import check_emulated
 from fulmar_bringup.external import adapter_path, check_external
 from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.remapping import read_remappings
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import (
     Guards,
     check_names,

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from fulmar_bags.contents import Bag, Topic
@@ -22,9 +20,8 @@ from fulmar_bags.decode import stamps_ns
 from fulmar_core.errors import BagError, ConfigError, UnknownNameError
 from fulmar_core.topics import CLOCK, ODOMETRY, WIRES
 from fulmar_ros.convert import stamp_of
-from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import ros_node
 
 NS = 1_000_000_000
 CLOCK_HZ = 100.0  # of what we publish: rclpy suffers from a faster one
@@ -169,25 +166,19 @@ def play(
         BagError: No type of any topic is installed.
     """
     stop = stop or threading.Event()
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("bag_player")
-    try:
-        with spinning(node, lambda _error: stop.set()):
-            publishers, left_out = _publishers(node, plan, bag)
-            player = _Player(plan, publishers, node if clock else None, rate, stop)
-            stop.wait(wait_s)
-            rounds = 0
-            while not stop.is_set():
-                player.play_once()
-                rounds += 1
-                if not loop:
-                    break
-            time.sleep(GOODBYE_S)
-            late = player.late_ms
-            return Played(player.count, rounds, left_out, float(np.percentile(late, 99)) if late else 0.0)
-    finally:
-        rclpy.try_shutdown()
+    with ros_node("bag_player", lambda _error: stop.set()) as node:
+        publishers, left_out = _publishers(node, plan, bag)
+        player = _Player(plan, publishers, node if clock else None, rate, stop)
+        stop.wait(wait_s)
+        rounds = 0
+        while not stop.is_set():
+            player.play_once()
+            rounds += 1
+            if not loop:
+                break
+        time.sleep(GOODBYE_S)
+        late = player.late_ms
+        return Played(player.count, rounds, left_out, float(np.percentile(late, 99)) if late else 0.0)
 
 
 def _publishers(node: Node, plan: Schedule, bag: Bag) -> tuple[dict[str, Any], tuple[str, ...]]:

@@ -18,7 +18,7 @@ from typing import IO
 
 import psutil
 
-from fulmar_bringup.node_table import NodeSpec, Parameter
+from fulmar_bringup.run_plan import NodeSpec, Parameter
 from fulmar_ros.middleware import middleware_environment
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for

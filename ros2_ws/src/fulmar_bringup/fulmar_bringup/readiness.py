@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from fulmar_bringup.console import console
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot

@@ -7,10 +7,8 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -29,9 +27,8 @@ from fulmar_core.robot_name import namespace_of
 from fulmar_core.topics import ESTOP_RESET, JOY, STATUS, SWAP, WIRES, Wire
 from fulmar_core.wire_check import wire_problems
 from fulmar_ros.graph import full_name, offers_of, robot_namespaces, running_robots_text
-from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import ros_node
 
 DISCOVER_S = 1.5  # until the nodes of the domain have found this one
 
@@ -201,12 +198,6 @@ class Operator:
 @contextlib.contextmanager
 def operator() -> Iterator[Operator]:
     """An operator whose node spins until the context ends."""
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     errors: list[Exception] = []
-    node = rclpy.create_node(f"operator_{os.getpid()}")
-    try:
-        with spinning(node, errors.append):
-            yield Operator(node)
-    finally:
-        rclpy.try_shutdown()
+    with ros_node(f"operator_{os.getpid()}", errors.append) as node:
+        yield Operator(node)

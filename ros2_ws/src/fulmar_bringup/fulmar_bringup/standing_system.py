@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import RunRequest, chosen_recording, plan_run
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import raise_if_ended, wait_for_publisher, wait_for_reader, while_starting
@@ -22,6 +21,7 @@ from fulmar_bringup.run_executor import (
     silence_limits_s,
     with_plant_reaction,
 )
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor
 from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of

@@ -12,15 +12,13 @@ from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, field
 from functools import partial
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.safety.estop import HOLDS, SILENT
@@ -30,10 +28,9 @@ from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.graph import offers_of
 from fulmar_ros.living_plant import refuse_living_plant, sees_living_plant
-from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import ros_node
 
 START_TIMEOUT_S = 30.0
 TELL_AGAIN_S = 0.5  # after an e-stop was silent, before the goal is told once more
@@ -55,14 +52,15 @@ class Report:
 class Supervisor:
     """Operator of one robot."""
 
-    def __init__(self, node: Node, plan: RunPlan) -> None:
-        """Listen to plant and controller of the plan's robot."""
+    def __init__(self, node: Node, plan: RunPlan, errors: list[Exception] | None = None) -> None:
+        """Listen to plant and controller of the plan's robot; `errors` gets what a callback raises."""
         task = load_task(plan.task)
         self._node, self._plan, self._task = node, plan, task
         self._made_s = time.monotonic()
         self.plant, self.controller, self.recorder = Report(), Report(), Report()
         self._changed = threading.Condition()
-        self._error: Exception | None = None
+        self._errors: list[Exception] = [] if errors is None else errors
+        self.fail = self._errors.append  # gives up the wait of whoever waits
         wire = GOAL_WIRES[task.goal_topic]
         self._goal = node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
         self._sent: list[GoalMessage] = []  # of the current goal
@@ -283,24 +281,14 @@ class Supervisor:
         """
         with self._changed:
             while not self._changed.wait_for(condition, 0.1):
-                if self._error is not None:
-                    raise RunFailed(f"the supervisor failed: {self._error!r}") from self._error
+                if self._errors:
+                    raise RunFailed(f"the supervisor failed: {self._errors[0]!r}") from self._errors[0]
                 alive()
-
-    def fail(self, error: Exception) -> None:
-        """A callback of ours raised this; whoever waits is told."""
-        self._error = error
 
 
 @contextlib.contextmanager
 def supervisor(plan: RunPlan) -> Iterator[Supervisor]:
     """A supervisor of a plan's robot that listens in a thread of its own until the context ends."""
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("supervisor", namespace=plan.namespace)
-    try:
-        overseer = Supervisor(node, plan)
-        with spinning(node, overseer.fail):
-            yield overseer
-    finally:
-        rclpy.try_shutdown()
+    errors: list[Exception] = []
+    with ros_node("supervisor", errors.append, namespace=plan.namespace) as node:
+        yield Supervisor(node, plan, errors)

@@ -11,7 +11,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import NodeSpec
+from fulmar_bringup.run_plan import NodeSpec
 
 ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",

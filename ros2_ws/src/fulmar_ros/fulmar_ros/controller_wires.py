@@ -23,7 +23,6 @@ from fulmar_core.topics import (
     ACTUATORS_HEALTH,
     ACTUATORS_STATE,
     AIR_BEARING,
-    DIAGNOSTICS,
     ESTOP,
     ESTOP_RELEASED,
     METADATA,
@@ -101,8 +100,7 @@ class ControllerWires:
             self._health = node.create_publisher(JointState, ACTUATORS_HEALTH.name, qos(ACTUATORS_HEALTH))
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
-        diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self.health = Health(f"{name_of(node, robot)}: controller", [status, diagnostics])
+        self.health = Health(node, f"{name_of(node, robot)}: controller", status)
         self._actuators, self._frames = robot.actuators, own_frames(node, robot)
         self._streams = [
             self._command,
@@ -110,7 +108,7 @@ class ControllerWires:
             self._action,
             *([self._health] if self._health else []),
         ]
-        self._publishers = (*self._streams, self._metadata, status, diagnostics)
+        self._publishers = (*self._streams, self._metadata, *self.health.publishers)
         self._write_command = self._command_writer()
         self._newest: bytes | None = None
         self._write_action = VectorWriter(robot.actuators.names)

@@ -8,7 +8,6 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
@@ -23,7 +22,7 @@ from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.health import Health
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
@@ -74,8 +73,7 @@ class EstimatorNode(Node):
         self._said: tuple[object, ...] = ()
         self._said_s = 0.0
         self._publisher = self.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
-        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{name_of(self, robot)}: estimator", [diagnostics])
+        self._health = Health(self, f"{name_of(self, robot)}: estimator")
         self.create_subscription(PoseStamped, MOCAP.name, self._on_pose, subscriber_qos(MOCAP, depth=5))
         # The readings drive the velocity: each counts.
         self.create_subscription(Imu, IMU.name, self._on_imu, subscriber_qos(IMU, reliable=True, depth=50))

@@ -8,7 +8,6 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -21,7 +20,6 @@ from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
 from fulmar_core.topics import (
-    DIAGNOSTICS,
     ESTOP,
     ESTOP_RELEASED,
     ESTOP_RESET,
@@ -71,8 +69,7 @@ class EstopNode(Node):
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
         self._released = self.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
         subscribe_operator(self, Bool, ESTOP, self._on_estop, with_info=True)
-        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{name_of(self, robot)}: estop", [diagnostics])
+        self._health = Health(self, f"{name_of(self, robot)}: estop")
         wire = command_wire(robot)
         if wire is VELOCITY_COMMAND:
             self.create_subscription(TwistStamped, wire.name, self._on_velocity, subscriber_qos(wire))

@@ -9,7 +9,6 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -25,7 +24,7 @@ from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, ODOMETRY
+from fulmar_core.topics import GOAL_WIRES, ODOMETRY
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.graph import running_robots_text
 from fulmar_ros.health import Health
@@ -111,8 +110,7 @@ class GoalNode(Node):
         self._message: GoalMessage | None = None  # the newest
         if not self._settings.lockstep:  # there a goal comes with each odometry
             LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
-        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{name}: goals", [diagnostics])
+        self._health = Health(self, f"{name}: goals")
         self.create_subscription(
             Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
         )

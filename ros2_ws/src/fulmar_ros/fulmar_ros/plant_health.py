@@ -7,19 +7,16 @@ import socket
 import time
 from collections.abc import Callable
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode
 
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.topics import DIAGNOSTICS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.graph import UNNAMED, WireWatch
 from fulmar_ros.health import Health
 from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_loops import LockstepLoop, RealtimeLoop
 from fulmar_ros.plant_wires import PlantWires
-from fulmar_ros.qos import publisher_qos
 
 LOOK_S = 0.1  # how soon a change is noticed
 AT_LEAST_S = 1.0  # how often it is said without a change
@@ -56,15 +53,15 @@ class PlantHealth:
             "pid": str(os.getpid()),
             "started_ns": str(started_ns),
         }
-        self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{self._robot}: plant", [self._publisher])
+        self._health = Health(node, f"{self._robot}: plant")
         self._wire_watch = WireWatch(node, self._wires.subscribed)
         self._timer = node.create_timer(LOOK_S, self.tell)
 
     def close(self, node: LifecycleNode) -> None:
         """Publish no more."""
         node.destroy_timer(self._timer)
-        node.destroy_publisher(self._publisher)
+        for publisher in self._health.publishers:
+            node.destroy_publisher(publisher)
 
     def watch(
         self,

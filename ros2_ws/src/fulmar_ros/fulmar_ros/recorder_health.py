@@ -6,14 +6,11 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from fulmar_bags.ring import RECORDER
 from fulmar_bags.writer_thread import SLOW_S, Account
-from fulmar_core.topics import DIAGNOSTICS
 from fulmar_ros.health import Health
-from fulmar_ros.qos import publisher_qos
 
 PERIOD_S = 1.0
 COMMANDERS = "command_publishers"  # key of the publishers of commands that the recorder is matched with
@@ -44,8 +41,7 @@ class RecorderHealth:
         """
         self._commanders = commanders
         self._account, self._mode, self._directory = account, mode, directory
-        publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{robot}: {RECORDER}", [publisher])
+        self._health = Health(node, f"{robot}: {RECORDER}")
         node.create_timer(PERIOD_S, self.tell)
 
     def tell(self) -> None:

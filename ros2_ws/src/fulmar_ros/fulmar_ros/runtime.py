@@ -149,6 +149,19 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
         node.destroy_node()
 
 
+@contextlib.contextmanager
+def ros_node(name: str, on_error: Callable[[Exception], None], *, namespace: str = "") -> Iterator[Node]:
+    """A node of a process that is no node itself: rclpy starts, the node spins, and both end with the context."""
+    set_up_middleware()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node(name, namespace=namespace or None)
+        with spinning(node, on_error):
+            yield node
+    finally:
+        rclpy.try_shutdown()
+
+
 def _stop(node: Any) -> int:
     stop = getattr(node, "stop", None)
     if stop is None:

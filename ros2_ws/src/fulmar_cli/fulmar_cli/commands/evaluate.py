@@ -10,8 +10,8 @@ import typer
 from rich.table import Table
 
 from fulmar_bringup.console import console, output, print_json
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_cli.commands.arguments import (
     CalibrationOption,
     ControllerOption,

@@ -25,8 +25,8 @@ from fulmar_bags.control_steps import ControlSteps
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_bags.wire_reader import ABSENT, Received
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import BagError, RunFailed
