@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from fulmar_bringup.bag_origin import attachments, run_info
-from fulmar_bringup.external import adapter_path, check_external
 from fulmar_bringup.goal_plan import checked_goals, goal_path
+from fulmar_bringup.plan_checks import adapter_path, check_external
 from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import default_hardware, varied_system
 from fulmar_bringup.system_rows import own_nodes, system_rows

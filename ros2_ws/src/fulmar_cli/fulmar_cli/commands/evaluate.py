@@ -96,7 +96,7 @@ def evaluate(
 
     fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
     """
-    from fulmar_bringup.planning import checked_rate, chosen_policy
+    from fulmar_bringup.plan_checks import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, gains_note, modules_of
     from fulmar_cli.extras import require
     from fulmar_core.calibration import use_calibration
