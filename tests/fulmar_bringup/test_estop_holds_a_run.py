@@ -28,7 +28,7 @@ class Overseer:
     def __init__(self, *plants: Report) -> None:
         self._rest = list(plants)
         self.plant = self._rest.pop(0)
-        self.controller = Report(heard=time.monotonic())
+        self.controller = Report(received_s=time.monotonic())
 
     def wait_until(self, condition: Any, alive: Any) -> None:
         while not condition():

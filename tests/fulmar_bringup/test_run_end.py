@@ -24,7 +24,7 @@ class Overseer:
     def __init__(self, mode: str, *reports: tuple[str, str]) -> None:
         self._reports = reports
         self.plant = Report()
-        self.controller = Report(values={"mode": mode}, heard=time.monotonic())
+        self.controller = Report(values={"mode": mode}, received_s=time.monotonic())
 
     def wait_until(self, condition, alive) -> None:
         for level, message in self._reports:

@@ -243,7 +243,7 @@ def test_a_robot_that_has_no_e_stop_node_is_stopped_too(
 ) -> None:
     monkeypatch.setattr("fulmar_bringup.estop_robots.MISS_S", 0.5)
     until(lambda: drive(neighbour))
-    assert stop_robots(neighbour.node, ROBOT, find_s=5.0) == [Stopped(NAMESPACE, heard=True, answer=None)]
+    assert stop_robots(neighbour.node, ROBOT, find_s=5.0) == [Stopped(NAMESPACE, reached=True, answer=None)]
     until(lambda: not drive(neighbour))
     time.sleep(0.6)
     assert not drive(neighbour)

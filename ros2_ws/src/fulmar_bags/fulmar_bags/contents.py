@@ -17,12 +17,12 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from fulmar_bags.mcap_records import (
     PACKED,
     ZSTD_MAGIC,
+    custom_text,
     file_bytes,
     files_of,
     missing_files,
     read_records,
     storage_of,
-    told_beside,
     unpack,
 )
 from fulmar_bags.message_types import unreadable
@@ -219,7 +219,7 @@ def open_bag(path: Path) -> Bag:
     if len(problems) == len(files):
         raise BagError(problems[0])
     gathered.check_types()
-    beside = json_object(told_beside(path, RUN_RECORD))
+    beside = json_object(custom_text(path, RUN_RECORD))
     info = gathered.info or beside
     if info and beside and json.dumps(info, sort_keys=True) != json.dumps(beside, sort_keys=True):
         # A metadata record of MCAP has no checksum.
@@ -231,8 +231,8 @@ def open_bag(path: Path) -> Bag:
         files=files,
         topics=dict(sorted(gathered.topics.items())),
         info=info,
-        recording=json_object(told_beside(path, RECORDING)) or {},
-        faults=_faults(gathered.faults or told_beside(path, FAULTS)),
+        recording=json_object(custom_text(path, RECORDING)) or {},
+        faults=_faults(gathered.faults or custom_text(path, FAULTS)),
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )

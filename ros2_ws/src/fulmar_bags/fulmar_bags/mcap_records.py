@@ -232,6 +232,6 @@ def missing_files(path: Path) -> tuple[str, ...]:
     return tuple(name for name in names if plain_name(Path(name)).name not in there)
 
 
-def told_beside(path: Path, entry: str) -> str:
+def custom_text(path: Path, entry: str) -> str:
     """A text from `custom_data` in the bag's `metadata.yaml`; empty where it is not there."""
     return read_custom(path if path.is_dir() else path.parent).get(entry, "")

@@ -50,8 +50,8 @@ def recover(directory: Path) -> tuple[str, ...]:
             raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
     if not copies:
         raise BagError(f"{directory}: nothing can be read. {damage[0]}")
-    told = {name: text for copy in copies.values() for name, text in copy.custom.items()}
-    custom = {**read_custom(directory), **told}
+    recorded = {name: text for copy in copies.values() for name, text in copy.custom.items()}
+    custom = {**read_custom(directory), **recorded}
     try:
         spans = {name: copy.span() for name, copy in copies.items()}
         write_metadata(directory, spans, _all_topics(list(copies.values())), custom)

@@ -43,7 +43,7 @@ class Stopped:
     """What came of one robot."""
 
     space: str  # its namespace
-    heard: bool  # somebody hears what is said on its wire
+    reached: bool  # whether a node subscribes its e-stop topic
     answer: Answer | None  # of its e-stop node
 
 
@@ -87,19 +87,19 @@ class _Robot:
         self._wire: Publisher = node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
         self._button: Client = node.create_client(Trigger, f"{space}/{ESTOP_TRIGGER}")
         self._asked: tuple[float, Future] | None = None  # when [s], and what will be answered
-        self._heard = False
+        self._reached = False
 
     def say(self) -> None:
         """Say it once more, and ask the node as soon as it is there."""
         self._wire.publish(Bool(data=True))
-        self._heard = self._heard or self._wire.get_subscription_count() > 0
+        self._reached = self._reached or self._wire.get_subscription_count() > 0
         if self._asked is None and self._button.service_is_ready():
             self._asked = time.monotonic(), self._button.call_async(Trigger.Request())
 
     def is_over(self, now_s: float) -> bool:
         """Whether nothing more is to be waited for."""
         since_s = now_s - self._found_s
-        if self._asked is None or not self._heard:
+        if self._asked is None or not self._reached:
             return since_s > MISS_S
         asked_s, answer = self._asked
         return since_s > STAY_S and (answer.done() or now_s - asked_s > ANSWER_S)
@@ -107,9 +107,9 @@ class _Robot:
     def stopped(self) -> Stopped:
         """What came of it."""
         if self._asked is None or not self._asked[1].done():
-            return Stopped(self._space, self._heard, None)
+            return Stopped(self._space, self._reached, None)
         said = self._asked[1].result()
-        return Stopped(self._space, self._heard, (said.success, said.message))
+        return Stopped(self._space, self._reached, (said.success, said.message))
 
 
 def spaces_with(node: Node, service: str) -> set[str]:

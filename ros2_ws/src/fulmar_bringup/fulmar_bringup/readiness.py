@@ -53,11 +53,11 @@ def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], No
 
 def _said(report: Report) -> str:
     """What a node said last, and when: one that is heard no more is another fault than one that has nothing new."""
-    if not report.heard:
+    if not report.received_s:
         return "nothing"
     refused = report.values.get("goal_refused")
     more = f" (it refused the goal: {refused})" if refused else ""
-    return f"{report.message or report.level}{more}, {time.monotonic() - report.heard:.1f} s ago"
+    return f"{report.message or report.level}{more}, {time.monotonic() - report.received_s:.1f} s ago"
 
 
 TIMEOUT_S = 20.0

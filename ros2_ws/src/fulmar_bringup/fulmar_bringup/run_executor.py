@@ -241,8 +241,8 @@ def raise_if_silent(name: str, report: Report, limit_s: float) -> None:
     Raises:
         RunFailed: It has.
     """
-    silent_s = time.monotonic() - report.heard
-    if report.heard and silent_s > limit_s:
+    silent_s = time.monotonic() - report.received_s
+    if report.received_s and silent_s > limit_s:
         raise RunFailed(f"{name}: has not reported for {silent_s:.1f} s; it hangs")
 
 

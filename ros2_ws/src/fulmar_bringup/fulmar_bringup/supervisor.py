@@ -33,7 +33,7 @@ from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import ros_node
 
 START_TIMEOUT_S = 30.0
-TELL_AGAIN_S = 0.5  # after an e-stop was silent, before the goal is told once more
+REPEAT_S = 0.5  # after an e-stop was silent, before the goal is told once more
 SUBSCRIBES_S = 1.0  # for an external controller that publishes already to subscribe its goal
 STOP_S = 1.0  # for a plant to come to rest when a run is stopped
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
@@ -46,7 +46,7 @@ class Report:
     level: str = "ok"
     message: str = ""
     values: dict[str, str] = field(default_factory=dict)
-    heard: float = 0.0  # monotonic [s]
+    received_s: float = 0.0  # when, by a monotonic clock; 0: nothing yet [s]
 
 
 class Supervisor:
@@ -76,10 +76,10 @@ class Supervisor:
         node.create_subscription(
             DiagnosticArray,
             DIAGNOSTICS.name,
-            self._hear,
+            self._on_diagnostics,
             subscriber_qos(DIAGNOSTICS, reliable=True, depth=10),
         )
-        node.create_subscription(DiagnosticArray, STATUS.name, self._hear, subscriber_qos(STATUS))
+        node.create_subscription(DiagnosticArray, STATUS.name, self._on_diagnostics, subscriber_qos(STATUS))
         self._plant_service = node.create_client(ChangeState, "plant/change_state")
 
     def sees_living_plant(self) -> bool:
@@ -97,7 +97,7 @@ class Supervisor:
         """
         refuse_living_plant(self._node, self._plan.namespace, since_s=self._made_s, spins=True)
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             parts = {"plant": self.plant, "controller": self.controller, "recorder": self.recorder}
             part = parts.get(status.name.removeprefix(f"{self._plan.robot_name}: "))
@@ -109,7 +109,7 @@ class Supervisor:
                 )
                 part.message = status.message
                 part.values = {pair.key: pair.value for pair in status.values}
-                part.heard = time.monotonic()
+                part.received_s = time.monotonic()
                 self._changed.notify_all()
 
     def give_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None], listeners: int = 1) -> None:
@@ -141,12 +141,12 @@ class Supervisor:
         def found() -> bool:
             return all(wire.get_subscription_count() >= SUBSCRIPTIONS * listeners for wire in wires)
 
-        while not (self._told(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
+        while not (self._publish_parts(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
             parts = [(part, stamp + 1) for part, stamp in parts]
             stamps = {stamp for _, stamp in parts}
             self.wait_until(lambda: not self._reason.startswith(SILENT), alive)
             self._raise_if_pressed()
-            time.sleep(TELL_AGAIN_S)
+            time.sleep(REPEAT_S)
             self._raise_if_pressed()
 
     @property
@@ -159,7 +159,7 @@ class Supervisor:
         if self._reason.startswith(HOLDS) and not self._reason.startswith(SILENT):
             raise RunFailed(f"the controller refused the goal: {self._reason}")
 
-    def _told(
+    def _publish_parts(
         self, parts: Sequence[tuple[Goal, int]], stamps_ns: Set[int], alive: Callable[[], None]
     ) -> bool:
         """Publish goals, each when the controller has the one before; False if a silent e-stop came between."""

@@ -20,7 +20,7 @@ class Reported(Protocol):
     level: str
     message: str
     values: dict[str, str]
-    heard: float  # when it came, by a monotonic clock [s]
+    received_s: float  # when, by a monotonic clock [s]
 
 
 class SystemEvents:
@@ -72,8 +72,8 @@ class SystemEvents:
         if controller.values.get("mode") == "armed":
             self._acts_since = None
         elif self._acts_since is None:
-            self._acts_since = controller.heard
-        return self._acts_since is not None and plant.heard - self._acts_since > ARRIVES_S
+            self._acts_since = controller.received_s
+        return self._acts_since is not None and plant.received_s - self._acts_since > ARRIVES_S
 
     def _look_at_estop(self, plant: Reported, time_s: float) -> None:
         held = plant.message.startswith(HOLDS)

@@ -30,16 +30,16 @@ class AirBearingWires:
         self._publisher = node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
         self._service = node.create_service(SetBool, SERVICE, self._switch)
         self._timer = node.create_timer(LOOK_S, self._look)
-        self.tell()
+        self.publish()
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Publish the state now."""
         self._said, self._silent_s = self._bearing.bearing_on, 0.0
         self._publisher.publish(Bool(data=self._said))
 
-    def tell_everybody(self) -> None:
+    def publish_and_wait(self) -> None:
         """Publish the state now, and wait, not for ever, until every subscriber has it."""
-        self.tell()
+        self.publish()
         flush([self._publisher], FLUSH_S)
 
     def destroy(self, node: Node) -> None:
@@ -51,11 +51,11 @@ class AirBearingWires:
     def _look(self) -> None:
         self._silent_s += LOOK_S
         if self._bearing.bearing_on is not self._said or self._silent_s >= AT_LEAST_S:
-            self.tell()
+            self.publish()
 
     def _switch(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         refusal = self._bearing.set_bearing(bool(request.data))
         response.success = not refusal
         response.message = refusal or f"the air bearing is {'on' if request.data else 'off'}"
-        self.tell()
+        self.publish()
         return response

@@ -37,7 +37,7 @@ class ControllerStatus:
         """Say it the next time whether or not anything changes."""
         self._said_at = 0.0
 
-    def tell(
+    def publish(
         self,
         health: Health,
         decision: Decision,

@@ -75,12 +75,12 @@ class ControllerWires:
             task: Says on which topic goals come.
             observation_names: Of the terms that the controller observes.
             on_odometry: Receives every odometry message, serialised.
-            on_goal: Told every goal.
-            on_obstacles: Told all obstacles whenever they change.
-            on_thing: Told the name of a thing and where it is.
-            on_estop: Told whether the e-stop is pressed.
+            on_goal: Receives every goal.
+            on_obstacles: Receives all obstacles whenever they change.
+            on_thing: Receives the name of a thing and its pose.
+            on_estop: Receives whether the e-stop is pressed.
             on_estop_released: Called after each reset of the e-stop.
-            on_swap: Told which policy shall go on.
+            on_swap: Receives the folder of the policy that shall take over.
             on_applied: Receives what the actuators do, serialised, of robots whose actuators can be watched.
             on_bearing: Receives whether the air bearing is on; None where there is none.
             lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag

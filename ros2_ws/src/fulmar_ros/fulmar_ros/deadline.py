@@ -134,13 +134,13 @@ class ArrivalPhase:
     def __init__(self, rate: float) -> None:
         """Listen to stamps that run `rate` times as fast as the wall clock."""
         self._rate = rate
-        self._heard = 0
+        self._arrivals = 0
         self._least_ns: float | None = None
 
     @property
     def known(self) -> bool:
         """Whether enough measurements have come."""
-        return self._heard >= LISTEN
+        return self._arrivals >= LISTEN
 
     def anchor_ns(self, stamp_ns: int, arrival_ns: int) -> int | None:
         """Note one arrival.
@@ -152,12 +152,12 @@ class ArrivalPhase:
         Returns:
             The instant on the monotonic clock to beat at, once, after enough arrivals; else None [ns].
         """
-        if self._heard >= LISTEN:
+        if self._arrivals >= LISTEN:
             return None
         delay = arrival_ns - stamp_ns / self._rate
         self._least_ns = delay if self._least_ns is None else min(self._least_ns, delay)
-        self._heard += 1
-        if self._heard < LISTEN:
+        self._arrivals += 1
+        if self._arrivals < LISTEN:
             return None
         return round(stamp_ns / self._rate + self._least_ns - LEAD_NS / max(1.0, self._rate))
 
@@ -209,7 +209,7 @@ class ControlBeat:
         Args:
             step: One control step.
             copy: Sends the command of the step once more.
-            failed: Told why the beat has come to an end by itself.
+            failed: Receives the error that ended the thread.
         """
         self._stop.clear()
         self._thread = threading.Thread(

@@ -68,7 +68,7 @@ class EstimatorNode(Node):
         self._published_ns = -1
         self._published, self._refused = 0, 0
         self._problem, self._refusal = self._estimator.problem, ""
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
         self._prior = False
         self._said: tuple[object, ...] = ()
         self._said_s = 0.0
@@ -77,7 +77,7 @@ class EstimatorNode(Node):
         self.create_subscription(PoseStamped, MOCAP.name, self._on_pose, subscriber_qos(MOCAP, depth=5))
         # The readings drive the velocity: each counts.
         self.create_subscription(Imu, IMU.name, self._on_imu, subscriber_qos(IMU, reliable=True, depth=50))
-        self.create_timer(WATCH_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(WATCH_S, self._publish_status, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_pose(self, message: PoseStamped) -> None:
         p, q = message.pose.position, message.pose.orientation
@@ -111,7 +111,7 @@ class EstimatorNode(Node):
         if problem:
             self._refuse(problem)
             return
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
         estimate = self._estimator.estimate()
         self._problem = self._estimator.problem
         if estimate is not None and estimate.stamp_ns > self._published_ns:
@@ -133,9 +133,9 @@ class EstimatorNode(Node):
         self._refused += 1
         self._refusal = reason
 
-    def _tell(self) -> None:
+    def _publish_status(self) -> None:
         with self._lock:
-            silent_s = time.monotonic() - self._heard_s
+            silent_s = time.monotonic() - self._received_s
             stale = f"nothing usable comes for {silent_s:.1f} s" if silent_s > self._bridge_s else ""
             problem = self._problem or stale
             key = (problem[:16], self._estimator.epoch, self._refused > 0)
@@ -166,7 +166,7 @@ def _in_body(covariance: np.ndarray, yaw: float) -> np.ndarray:
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(EstimatorNode))
 
 

@@ -63,7 +63,7 @@ class EstopNode(Node):
         robot = load_robot(settings.robot)
         self._button = EstopButton()
         self._button.pressed = settings.pressed
-        self._told_s = 0.0
+        self._reported_s = 0.0
         self._published = 0
         self._own: deque[tuple[int, int, int]] = deque(maxlen=OWN_MESSAGES)  # number, and sent between [ns]
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
@@ -100,7 +100,7 @@ class EstopNode(Node):
         if not message.data or self._is_own(info) or self._button.pressed:
             return
         self._button.press()
-        self._tell()
+        self._publish()
         self.get_logger().warning(f"e-stop pressed by another publisher of {self._publisher.topic_name}")
 
     def _is_own(self, info: dict[str, Any]) -> bool:
@@ -109,7 +109,7 @@ class EstopNode(Node):
 
     def _trigger(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._button.press()
-        self._tell()
+        self._publish()
         self.get_logger().warning("e-stop pressed")
         response.success, response.message = True, "pressed: every actuator goes to its safe state"
         return response
@@ -118,7 +118,7 @@ class EstopNode(Node):
         problem = self._button.reset(time.monotonic_ns())
         if not problem:
             self._released.publish(String(data=self.get_fully_qualified_name()))
-        self._tell()
+        self._publish()
         self.get_logger().warning(f"e-stop reset {problem}" if problem else "e-stop reset: released")
         response.success = not problem
         response.message = problem or "released: controllers wait for a new goal"
@@ -128,28 +128,28 @@ class EstopNode(Node):
         if not self._prior:  # in the executor's thread, which is not there before
             take_priority_with_helpers(CONTROL_PRIORITY)  # its silence stops the robot
             self._prior = True
-        self._tell()
+        self._publish()
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         pressed = self._button.pressed
         self._published += 1
         begin_ns = time.time_ns()
         self._publisher.publish(Bool(data=pressed))
         self._own.append((self._published, begin_ns, time.time_ns()))
-        if time.monotonic() - self._told_s >= 1.0:
-            self._told_s = time.monotonic()
+        if time.monotonic() - self._reported_s >= 1.0:
+            self._reported_s = time.monotonic()
             level, words = ("warn", "pressed") if pressed else ("ok", "released")
             self._health.publish(level, words, {"pressed": str(pressed).lower()})
 
     def stop(self) -> None:
         """Last word before the process ends: pressed. Silence would say the same, half a second later."""
         self._button.press()
-        self._tell()
+        self._publish()
         self._publisher.wait_for_all_acked(FLUSH)
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(EstopNode))
 
 

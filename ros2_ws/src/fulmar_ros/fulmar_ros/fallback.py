@@ -33,7 +33,7 @@ def line_up(
         robot: The robot.
         task: What it shall do.
         settings: Of the node.
-        complain: Told why the fallback begins.
+        complain: Receives why the fallback begins.
 
     Raises:
         FulmarError: Both are refused, or the one is and no other is named.
@@ -98,8 +98,8 @@ class PolicySwap:
 
         Args:
             load: Loads the bundle of a folder, in another thread; None where no policy runs.
-            propose: Told about what has been loaded.
-            warn: Told about what has been refused.
+            propose: Receives what was loaded.
+            warn: Receives why a request was refused.
         """
         self._load, self._propose, self._warn = load, propose, warn
         self._loader: threading.Thread | None = None

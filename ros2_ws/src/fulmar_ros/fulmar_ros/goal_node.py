@@ -94,16 +94,18 @@ class GoalNode(Node):
         self._request_exit = request_exit
         self._gate = InputGate(robot.limits, frozen_after=0)  # whether a sensor is stuck, controllers judge
         self._lock = threading.Lock()
-        self._told: Goal | None = None
+        self._sent: Goal | None = None
         self._newest: Measurement | None = None
-        self._time_ns, self._told_at_ns = 0, 0  # of the sequence; it stands still while no odometry comes
+        self._time_ns, self._sent_at_ns = 0, 0  # of the sequence; it stands still while no odometry comes
         self._period_ns = round(1e9 / self._settings.control_hz)
         self._timeout_s = self._settings.input_timeout_s / min(self._settings.rate, 1.0)
         self._progress = self._sequence.progress
         self._said, self._said_at = "", 0.0
         self._problem, self._stale, self._over = "", False, False
         self._alone_checked = False
-        self._heard = self._settings.stay  # whoever starts all nodes together knows that somebody will listen
+        self._subscribers_checked = (
+            self._settings.stay
+        )  # whoever starts all nodes together knows that somebody will listen
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
         self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
@@ -124,17 +126,17 @@ class GoalNode(Node):
             problem = self._gate.problem(measurement)
             if self._over or problem:
                 self._problem = problem or ""
-                if self._settings.lockstep and self._told is not None and not self._over:
-                    self._tell(
-                        self._told, measurement.stamp_ns
+                if self._settings.lockstep and self._sent is not None and not self._over:
+                    self._publish_goal(
+                        self._sent, measurement.stamp_ns
                     )  # others wait for a goal with this very stamp
                 return
             was_done = self._sequence.done
             self._resume(measurement)
             goal = self._sequence.step(planar_of(measurement.state), self._time_ns / 1e9)
-            self._tell_progress()
+            self._publish_progress()
             if self._is_due(goal):
-                self._tell(goal, measurement.stamp_ns)
+                self._publish_goal(goal, measurement.stamp_ns)
             if self._sequence.done and not was_done:
                 self._over = not self._settings.stay
                 self.get_logger().info(self._farewell())
@@ -153,20 +155,20 @@ class GoalNode(Node):
         self._problem, self._stale = "", False
 
     def _is_due(self, goal: Goal) -> bool:
-        if self._told is None or self._settings.lockstep:
+        if self._sent is None or self._settings.lockstep:
             return True
-        if np.array_equal(goal.targets, self._told.targets):
+        if np.array_equal(goal.targets, self._sent.targets):
             return False
-        return self._sequence.done or self._time_ns - self._told_at_ns >= self._period_ns
+        return self._sequence.done or self._time_ns - self._sent_at_ns >= self._period_ns
 
-    def _tell(self, goal: Goal, stamp_ns: int) -> None:
+    def _publish_goal(self, goal: Goal, stamp_ns: int) -> None:
         self._message = goal_message(goal, self._sequence.topic, stamp_ns, self._frames)
         self._publisher.publish(self._message)
-        if self._single and self._told is None:
+        if self._single and self._sent is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
-        self._told, self._told_at_ns = goal, self._time_ns
+        self._sent, self._sent_at_ns = goal, self._time_ns
 
-    def _tell_progress(self) -> None:
+    def _publish_progress(self) -> None:
         if self._sequence.progress != self._progress:
             self._progress = self._sequence.progress
             self.get_logger().info(self._progress)
@@ -196,8 +198,8 @@ class GoalNode(Node):
             if late and not self._stale and not self._over:
                 self._stale = True
                 self._pause()
-        if not self._heard and now - self._began > PATIENCE_S:
-            self._heard = True  # told once
+        if not self._subscribers_checked and now - self._began > PATIENCE_S:
+            self._subscribers_checked = True  # told once
             if not self._settings.give_up_s and (alone := self._without_subscriber()):
                 self.get_logger().warning(alone)
 
@@ -232,9 +234,9 @@ class GoalNode(Node):
 
     def _stand_still(self) -> bool:
         """End a velocity that was told; other goals need no end."""
-        if self._sequence.topic != "goal_velocity" or self._told is None or self._newest is None:
+        if self._sequence.topic != "goal_velocity" or self._sent is None or self._newest is None:
             return False
-        self._tell(STANDSTILL, self._newest.stamp_ns)
+        self._publish_goal(STANDSTILL, self._newest.stamp_ns)
         return True
 
     def _without_subscriber(self) -> str:

@@ -55,7 +55,7 @@ class PlantHealth:
         }
         self._health = Health(node, f"{self._robot}: plant")
         self._wire_watch = WireWatch(node, self._wires.subscribed)
-        self._timer = node.create_timer(LOOK_S, self.tell)
+        self._timer = node.create_timer(LOOK_S, self.publish)
 
     def close(self, node: LifecycleNode) -> None:
         """Publish no more."""
@@ -75,10 +75,10 @@ class PlantHealth:
         self._guard, self._wires, self._clock = guard, wires, clock
         self._lockstep, self._realtime = lockstep, realtime
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Publish when something changed, and now and then."""
         self._wires.see_writers()
-        level, message, key = self._verdict()
+        level, message, key = self._status()
         more = self.more()
         unfit = BETWEEN.join(self._wire_watch.look())
         warning = more.get("warning", "") or unfit
@@ -91,7 +91,7 @@ class PlantHealth:
         self._said, self._said_at = changed, now
         self._health.publish(level, message, self._values() | {WIRE_WARNINGS: unfit} | more)
 
-    def _verdict(self) -> tuple[str, str, str]:
+    def _status(self) -> tuple[str, str, str]:
         """Level, message, and what of the message counts as a change."""
         if self.mode == "fault":
             return "error", self.reason, "fault"

@@ -66,7 +66,7 @@ class LockstepLoop:
             sample: First sample of the episode.
             steps: How many; None for no end.
             stop: Set by another thread.
-            on_step: Told about every step.
+            on_step: Called after every step.
 
         Raises:
             LockstepError: If an answer does not come in time.

@@ -54,7 +54,7 @@ class PlantNode(LifecycleNode):
         settings_class: type[PlantSettings] = PlantSettings,
         cli_args: list[str] | None = None,
     ) -> None:
-        """Read the parameters and, unless told otherwise, start.
+        """Read the parameters and, unless `autostart` is off, start.
 
         Args:
             make_backend: Builds the backend; called at configuration.
@@ -189,7 +189,7 @@ class PlantNode(LifecycleNode):
             finally:
                 self._backend.close()
                 if self._air is not None:
-                    self._air.tell()
+                    self._air.publish()
         return self._exit_code
 
     def run_episode(self, episode: Episode, *, number: int, seed: int, steps: int, on_step: OnStep) -> None:
@@ -200,7 +200,7 @@ class PlantNode(LifecycleNode):
             number: Number of the episode.
             seed: Seed of the sensor noise.
             steps: Control steps to run.
-            on_step: Told about every step.
+            on_step: Called after every step.
 
         Raises:
             LockstepError: If the controller does not answer in time.
@@ -243,7 +243,7 @@ class PlantNode(LifecycleNode):
             self.clock,
             control_hz=self.settings.control_rate(self.robot),
             answer_timeout_s=self.settings.answer_timeout_s,
-            publish_bearing=self._air.tell_everybody if self._air else lambda: None,
+            publish_bearing=self._air.publish_and_wait if self._air else lambda: None,
         )
         self._realtime = RealtimeLoop(backend, self.wires, self.guard, self.clock, rate=self.settings.rate)
         self.health.watch(
@@ -333,7 +333,7 @@ class PlantNode(LifecycleNode):
         except Exception as error:  # noqa: BLE001 - a broken backend must not keep the process alive
             self.get_logger().error(f"the backend could not be made safe: {type(error).__name__}: {error}")
         finally:
-            self.health.tell()
+            self.health.publish()
             self._request_exit(FAILED)
 
     def _make_safe(self) -> None:

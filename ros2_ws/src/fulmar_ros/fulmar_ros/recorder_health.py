@@ -42,12 +42,12 @@ class RecorderHealth:
         self._commanders = commanders
         self._account, self._mode, self._directory = account, mode, directory
         self._health = Health(node, f"{robot}: {RECORDER}")
-        node.create_timer(PERIOD_S, self.tell)
+        node.create_timer(PERIOD_S, self.publish)
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Publish what became of the messages so far."""
         account, free = self._account(), _free_bytes(self._directory)
-        level, message = verdict(account, free)
+        level, message = status_of(account, free)
         values = {
             "mode": self._mode(),
             COMMANDERS: str(self._commanders()),
@@ -64,7 +64,7 @@ class RecorderHealth:
         self._health.publish(level, message or self._mode(), values)
 
 
-def verdict(account: Account, free_bytes: int) -> tuple[str, str]:
+def status_of(account: Account, free_bytes: int) -> tuple[str, str]:
     """Level and words for an account.
 
     Args:

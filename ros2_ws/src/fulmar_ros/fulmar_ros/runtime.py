@@ -122,7 +122,7 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
 
     Args:
         node: The node.
-        on_error: Told, in that thread, what a callback raised; no further callback is served then.
+        on_error: Called in that thread with what a callback raised; no further callback is served then.
     """
     executor, over = _executor(), Future()
     executor.add_node(node)

@@ -210,7 +210,7 @@ def _keys_at_once() -> Iterator[None]:
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(TeleopNode))
 
 

@@ -65,7 +65,7 @@ def estop(
 
 def _unanswered(robot: Stopped) -> tuple[bool, str]:
     """Whether a robot is stopped for which no e-stop node answers, and words for it."""
-    if robot.heard:
+    if robot.reached:
         return (
             True,
             "stopped on the wire, since no e-stop node answers: it stays so until `fulmar estop --reset`",
