@@ -1,4 +1,4 @@
-"""The air bearing on ROS: one service, one latched state, and nothing that hangs on commands of thrust."""
+"""Service and latched state of the air bearing, independent of thrust commands."""
 
 from __future__ import annotations
 
@@ -18,12 +18,7 @@ class AirBearingWires:
     """Serves `air_bearing/enable` and publishes `air_bearing/state`."""
 
     def __init__(self, node: Node, bearing: AirBearing) -> None:
-        """Create every endpoint.
-
-        Args:
-            node: Owner of the endpoints.
-            bearing: What is switched.
-        """
+        """Create every endpoint; requests switch `bearing`."""
         self._bearing = bearing
         self._said: bool | None = None
         self._silent_s = 0.0
@@ -38,12 +33,12 @@ class AirBearingWires:
         self._publisher.publish(Bool(data=self._said))
 
     def publish_and_wait(self) -> None:
-        """Publish the state now, and wait, not for ever, until every subscriber has it."""
+        """Publish the state now, and wait at most `FLUSH_S` until every subscriber has it."""
         self.publish()
         flush([self._publisher], FLUSH_S)
 
     def destroy(self, node: Node) -> None:
-        """Give every endpoint back."""
+        """Destroy every endpoint."""
         node.destroy_timer(self._timer)
         node.destroy_service(self._service)
         node.destroy_publisher(self._publisher)

@@ -47,7 +47,7 @@ class Spread:
 
 
 class Deadlines:
-    """A steady beat: wait for the next deadline, know how late it came."""
+    """A steady beat of absolute deadlines; those that are missed are counted, never made up for in a burst."""
 
     def __init__(self, period_s: float) -> None:
         """Beat with this period, > 0 [s]."""
@@ -62,36 +62,27 @@ class Deadlines:
         self.period_error_ms = Spread()
 
     def align(self, anchor_ns: int) -> None:
-        """Beat from now on at this instant and whole periods after it.
+        """Beat from now on at this instant of the monotonic clock [ns] and whole periods after it.
 
         A controller that beats shortly after its measurements come acts on fresh ones.
-
-        Args:
-            anchor_ns: Monotonic clock [ns].
         """
         self._anchor_ns = anchor_ns
 
     def wait(self, stop: threading.Event) -> bool:
-        """Sleep until the next deadline; the first one is now.
+        """Sleep until the next deadline; the first one is now. False once another thread has set `stop`.
 
         Deadlines that have passed already are skipped and counted as overruns.
-
-        Args:
-            stop: Set by another thread to end the beat.
-
-        Returns:
-            False if `stop` is set.
         """
         if self._next_ns is None:
             self._next_ns = time.monotonic_ns()
         ahead = self._next_ns - time.monotonic_ns()
-        if ahead > LONG_NS:  # slow enough to be told to stop meanwhile
+        if ahead > LONG_NS:  # slow enough to be stopped meanwhile
             stop.wait((ahead - LONG_NS) / NS)
             ahead = self._next_ns - time.monotonic_ns()
         if ahead > EARLY_NS and not stop.is_set():
             time.sleep((ahead - EARLY_NS) / NS)  # wakes more punctually than waiting for an event
         while time.monotonic_ns() < self._next_ns and not stop.is_set():
-            time.sleep(0.0)  # a sleeper wakes late; who only lets others pass does not
+            time.sleep(0.0)  # a sleeping thread wakes late; one that only yields does not
         if stop.is_set():
             return False
         now = time.monotonic_ns()
@@ -121,18 +112,18 @@ class Deadlines:
         return (self.beats - 1) * NS / (self._last_ns - self._first_ns)
 
 
-LISTEN = 25  # measurements; the least delayed of them tells the phase
+LISTEN = 25  # measurements; the least delayed of them sets the phase
 LEAD_NS = 1_000_000  # a beat comes so long before the least delayed measurement, and waits for the one due
 
 
 class ArrivalPhase:
     """Finds the instant just before measurements arrive.
 
-    Single arrivals are late by the scheduler's whim, most of all the first ones; stamps are not.
+    The scheduler delays single arrivals, most of all the first ones, but not their stamps.
     """
 
     def __init__(self, rate: float) -> None:
-        """Listen to stamps that run `rate` times as fast as the wall clock."""
+        """Expect stamps that run `rate` times as fast as the wall clock."""
         self._rate = rate
         self._arrivals = 0
         self._least_ns: float | None = None
@@ -143,14 +134,11 @@ class ArrivalPhase:
         return self._arrivals >= LISTEN
 
     def anchor_ns(self, stamp_ns: int, arrival_ns: int) -> int | None:
-        """Note one arrival.
+        """Instant on the monotonic clock to beat at, once, after enough arrivals; else None [ns].
 
         Args:
-            stamp_ns: Stamp of the measurement [ns].
-            arrival_ns: Monotonic clock when it came [ns].
-
-        Returns:
-            The instant on the monotonic clock to beat at, once, after enough arrivals; else None [ns].
+            stamp_ns: Stamp of the measurement that arrived [ns].
+            arrival_ns: Its arrival on the monotonic clock [ns].
         """
         if self._arrivals >= LISTEN:
             return None
@@ -177,7 +165,7 @@ class ControlBeat:
     """
 
     def __init__(self, period_s: float, *, rate: float, copies: int) -> None:
-        """Stand still.
+        """Do not run yet.
 
         Args:
             period_s: Wall-clock time between steps, > 0 [s].
@@ -204,7 +192,7 @@ class ControlBeat:
     def start(
         self, step: Callable[[], None], copy: Callable[[], object], failed: Callable[[str], None]
     ) -> None:
-        """Begin; not while the last beat hangs.
+        """Start the thread; not while the last one hangs.
 
         Args:
             step: One control step.
@@ -224,11 +212,7 @@ class ControlBeat:
             self._thread.join(PATIENCE_S)
 
     def follow(self, stamp_ns: int) -> None:
-        """A measurement has come that can be used: let the beat follow the arrivals.
-
-        Args:
-            stamp_ns: Its stamp [ns].
-        """
+        """Let the beat follow the arrivals: a usable measurement of this stamp has come [ns]."""
         if self._arrived_ns is None:
             take_priority_with_helpers(CONTROL_PRIORITY)
         self._arrived_ns = time.monotonic_ns()
@@ -237,7 +221,7 @@ class ControlBeat:
             self.deadlines.align(anchor)
 
     def wake(self) -> None:
-        """Whatever a beat waits for has come."""
+        """Wake a beat that waits for a measurement."""
         self._arrived.set()
 
     def _run(
@@ -251,11 +235,11 @@ class ControlBeat:
                 for _ in range(self._copies - 1):
                     if not self._stop.wait(COPY_AFTER * self._period_s):
                         copy()
-        except Exception as error:  # noqa: BLE001 - a loop that ended without a word would look like one that waits
+        except Exception as error:  # noqa: BLE001 - a loop that ended silently would look like one that waits
             failed(f"the control loop raised {type(error).__name__}: {error}")
 
     def _wait_for_what_is_due(self) -> None:
-        """Wait a moment for the measurement that comes with this beat: what is acted on is as young as it can be."""
+        """Wait a moment for the measurement that is due with this beat, so that the step acts on the freshest one."""
         self._arrived.clear()
         last_ns = self._arrived_ns
         if last_ns is not None and time.monotonic_ns() - last_ns > FRESH_NS:

@@ -26,17 +26,10 @@ def line_up(
     settings: ControllerSettings,
     complain: Callable[[str], object],
 ) -> Succession[Standby]:
-    """The controller that was asked for, or, where it is refused and one is named, its fallback.
-
-    Args:
-        make_controller: Loads the one that was asked for.
-        robot: The robot.
-        task: What it shall do.
-        settings: Of the node.
-        complain: Receives why the fallback begins.
+    """Primary controller and its fallback; where the primary is refused, the fallback begins, and `complain` says why.
 
     Raises:
-        FulmarError: Both are refused, or the one is and no other is named.
+        FulmarError: Both are refused, or the primary is and no fallback is named.
         ImportError: A library is missing, and no fallback is named.
     """
     fallback = _fallback(robot, task, settings)
@@ -57,7 +50,7 @@ def load_other(
     settings: ControllerSettings,
     folder: str,
 ) -> Standby:
-    """Another policy, ready to take over; the other arguments as of `line_up`.
+    """The policy of a bundle folder, ready to take over.
 
     Raises:
         FulmarError: It cannot take the place of the one that runs.
@@ -78,14 +71,14 @@ LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 
 
 class PolicySwap:
-    """Takes requests for another policy; the one that runs is not disturbed.
+    """Loads other policies on request, in a thread of its own, while one acts.
 
-    An operator repeats a request until it is answered. A repeat that comes while the folder is being loaded, or waits
-    for its turn, is the same request: it loads nothing.
+    An operator repeats a request until it is answered. A repeat while the folder is being loaded, or waits for its
+    turn, loads nothing.
 
     Attributes:
         requests: How many were taken, without repeats.
-        said: What came of the last request: empty, or a word of loading, ready, done or refused, with the folder.
+        said: State of the last request: empty, or loading, ready, done or refused, with the folder.
     """
 
     def __init__(
@@ -107,7 +100,7 @@ class PolicySwap:
         self.requests = 0
 
     def ask(self, folder: str) -> None:
-        """Load the bundle of a folder, or say why not."""
+        """Load the bundle of a folder, or refuse with a reason."""
         if self.said in (f"loading {folder}", f"ready {folder}"):
             return
         self.requests += 1
@@ -125,7 +118,7 @@ class PolicySwap:
             self._loader.start()
 
     def took_over(self) -> None:
-        """What was loaded controls now."""
+        """Note that the loaded policy controls now."""
         self.said = self.said.replace("ready", "done", 1)
 
     def _fetch(self, load: Callable[[str], Standby], folder: str) -> None:

@@ -1,4 +1,4 @@
-"""Looks in the ROS graph: which nodes publish commands, which robots run, which publishers do not fit."""
+"""Look-ups in the ROS graph: publishers of commands, running robots, and publishers that do not match."""
 
 from __future__ import annotations
 
@@ -28,19 +28,10 @@ def full_name(info: TopicEndpointInfo) -> str:
 
 
 def writers_of(node: Node, subscription: Subscription) -> list[str]:
-    """Full names of the nodes that publish to a subscription, sorted.
+    """Full names of the nodes that publish to a subscription, sorted; none where there is at most one publisher.
 
-    Two processes may give their nodes the same name, which then comes twice. A node counts once, however many
-    publishers it has.
-
-    The graph is asked only where there is more than one publisher, which takes 0.2 ms; the usual case takes 1 us.
-
-    Args:
-        node: Owner of the subscription.
-        subscription: Of the commands.
-
-    Returns:
-        The names; empty where there is at most one publisher.
+    A node counts once, however many publishers it has; two processes with nodes of one name count twice. A look in the
+    graph takes 0.2 ms, so that it is only taken where there is more than one publisher, which takes 1 us to see.
     """
     if subscription.get_publisher_count() < 2:
         return []
@@ -50,37 +41,28 @@ def writers_of(node: Node, subscription: Subscription) -> list[str]:
 
 
 class WireWatch:
-    """Looks at most every 2 s at the publishers of some wires.
-
-    Attributes:
-        problems: Sentences, empty where every publisher fits.
-    """
+    """Looks at most every 2 s at the publishers of the wires that a node subscribes."""
 
     def __init__(self, node: Node, wires: Mapping[Wire, bool]) -> None:
-        """Watch the wires of a node.
-
-        Args:
-            node: Whose graph is looked at, and in whose namespace the wires are.
-            wires: Wires that it subscribes, and whether reliably.
-        """
+        """Watch wires of a node; the values say whether it subscribes them reliably."""
         self._node = node
         self._wires = {
             wire: (node.resolve_topic_name(wire.name), reliable) for wire, reliable in wires.items()
         }
         self._looked_s = 0.0
-        self.problems: list[str] = []
+        self._problems: list[str] = []
 
     def look(self) -> list[str]:
-        """Look, if the last look is long enough ago; the problems."""
+        """Publishers from which nothing arrives, one sentence each."""
         now_s = time.monotonic()
         if now_s - self._looked_s > LOOK_S:
             self._looked_s = now_s
-            self.problems = [
+            self._problems = [
                 problem
                 for wire, (topic, reliable) in self._wires.items()
                 for problem in wire_problems(wire, topic, offers_of(self._node, topic), reliable=reliable)
             ]
-        return self.problems
+        return self._problems
 
 
 def offers_of(node: Node, topic: str) -> list[Offer]:

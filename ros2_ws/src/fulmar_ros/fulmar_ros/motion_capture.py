@@ -32,18 +32,10 @@ class MotionCapture:
         self._under_way: deque[tuple[int, RigidBodyState]] = deque()
 
     def see(self, state: RigidBodyState, time_ns: int) -> list[tuple[int, RigidBodyState]]:
-        """Note a measurement.
-
-        Args:
-            state: Measured.
-            time_ns: When [ns].
-
-        Returns:
-            Poses to send now, each with its stamp [ns].
-        """
+        """Note a measurement and its time [ns]; returns poses to send now, each with its stamp [ns]."""
         last = self._captured_ns
         if last is None or time_ns < last or time_ns - last >= self._period_ns:
-            # On the beat of the captures, not of whoever asks.
+            # Captures keep their own rate, whatever the rate of measurements.
             steps = (time_ns - last) // self._period_ns if last is not None and self._period_ns else 0
             self._captured_ns = last + steps * self._period_ns if last is not None and steps > 0 else time_ns
             self._under_way.append((time_ns + self._late_ns, state))
@@ -87,15 +79,7 @@ class PacedCapture:
         self._thread: threading.Thread | None = None
 
     def see(self, state: RigidBodyState, time_ns: int) -> list[tuple[int, RigidBodyState]]:
-        """Note a measurement.
-
-        Args:
-            state: Measured.
-            time_ns: When [ns].
-
-        Returns:
-            Nothing: poses are published by the thread.
-        """
+        """Note a measurement and its time [ns]; the thread publishes the poses, so that none is returned."""
         with self._lock:
             self._newest = (state, time_ns, time.monotonic_ns())
         if self._thread is None:

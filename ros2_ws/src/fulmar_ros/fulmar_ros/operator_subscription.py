@@ -70,10 +70,7 @@ def subscribe_operator(
 
 
 class _Once:
-    """A callback of several subscriptions that passes each message on once.
-
-    A message is recognised by when and as which of its publisher's it was sent.
-    """
+    """A callback of several subscriptions that passes each message on once, by its source time and number."""
 
     # Asks rclpy for message info.
     __signature__ = inspect.signature(lambda message, info: None)
@@ -94,7 +91,7 @@ class _Once:
             self._callback(message)
 
     def _is_second(self, sent_ns: int, number: int) -> bool:
-        """Whether this message came before; without a time of sending, twice is better than never."""
+        """Whether this message came before; one without a source time is passed on each time."""
         key = (sent_ns, number)
         if not sent_ns or key in self._known:
             return bool(sent_ns)
@@ -105,23 +102,17 @@ class _Once:
         return False
 
 
-LOOK_S = 0.5  # a subscriber that was seen at the look before is matched by now
+LOOK_S = 0.5  # a subscriber that was there at the look before is matched by now
 
 
 class LateSubscribers:
-    """Publishes the current messages of a latched publisher once more when a volatile subscriber has come.
+    """Repeats latched messages for volatile subscribers that come late, which the middleware leaves out.
 
     Nodes that subscribe the topic latched, as ours do, need no repetition and cause none.
     """
 
     def __init__(self, node: Node, publisher: Publisher, current: Callable[[], Sequence[Any]]) -> None:
-        """Look twice a second.
-
-        Args:
-            node: Owner of the publisher; its executor looks.
-            publisher: Latched.
-            current: Messages to repeat, as they were sent, stamps included: subscribers that have them see nothing new.
-        """
+        """Look twice a second; `current` gives the messages as they were sent, so that nobody sees anything new."""
         self._node, self._publisher, self._current = node, publisher, current
         self._seen: set[bytes] = set()
         self._served: set[bytes] = set()

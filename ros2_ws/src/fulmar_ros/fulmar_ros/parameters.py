@@ -19,14 +19,9 @@ QOS_OVERRIDES = "qos_overrides."  # rclpy declares these with the publisher or s
 
 
 def read_parameters(node: Node, cls: type[T]) -> T:
-    """Declare one parameter for each field and read them all.
+    """Declare one parameter for each field of a dataclass and read them all.
 
-    Args:
-        node: Whose parameters.
-        cls: Dataclass whose fields all have defaults; its `__post_init__` may raise ValueError.
-
-    Returns:
-        The filled dataclass.
+    All fields have defaults; `__post_init__` may raise ValueError.
 
     Raises:
         ConfigError: A parameter has another type than its default or is not known, or the dataclass refuses it.
@@ -49,12 +44,9 @@ def read_parameters(node: Node, cls: type[T]) -> T:
 
 
 def _refuse_unknown(node: Node, known: Iterable[str]) -> None:
-    """Refuse parameters that were given to a node and that it does not have: a misspelt one would change nothing.
+    """Refuse parameters that the node does not have: a misspelt one would change nothing.
 
-    What `-p` and files say for other nodes does not come here; what they say for all nodes does.
-
-    Raises:
-        ConfigError: There is one; rclpy's own, such as `use_sim_time`, are none.
+    Those for all nodes count, those for other nodes do not, nor do rclpy's own, such as `use_sim_time`.
     """
     for name in node._parameter_overrides:
         if name not in known and not node.has_parameter(name) and not name.startswith(QOS_OVERRIDES):

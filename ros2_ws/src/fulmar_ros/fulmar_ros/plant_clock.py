@@ -38,10 +38,7 @@ class WallTime:
 def other_clocks(node: Node, *, since_s: float, within_s: float) -> list[str]:
     """Full names of other nodes that publish the clock, as soon as one is discovered.
 
-    Args:
-        node: Looks at the graph.
-        since_s: When the node was created, on the monotonic clock [s].
-        within_s: How old the node has to be before it finds nobody [s].
+    Two simulations in one domain share one clock. A node created at `since_s` (monotonic [s]) looks for `within_s` [s].
     """
     own = node.get_fully_qualified_name()
     while True:
