@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -46,18 +46,15 @@ def compare(
     stamp_ns: np.ndarray,
     tolerance: float = 0.0,
 ) -> list[Field]:
-    """Compare one kind of vector.
+    """Compare vectors entry by entry.
 
     Args:
-        field: What it is called.
-        names: Of its entries.
+        field: Name of the vectors.
+        names: Of their entries.
         recorded: Shape (n, m), NaN where there is none.
         found: Same.
         stamp_ns: Of the steps, shape (n,) [ns].
         tolerance: Largest difference that counts as the same; 0 asks for the same bits.
-
-    Returns:
-        One line for each entry.
     """
     return [
         _field(field, name, recorded[:, i], found[:, i], stamp_ns, tolerance) for i, name in enumerate(names)
@@ -118,14 +115,7 @@ def as_json(fields: Sequence[Field]) -> list[dict[str, Any]]:
 
 
 def read_tolerances(texts: Sequence[str], fields: Sequence[str]) -> Mapping[str, float]:
-    """Read tolerances.
-
-    Args:
-        texts: `1e-6` for every field, `action=1e-6` for one; later ones win.
-        fields: Names that are known.
-
-    Returns:
-        Tolerance of each field, 0 where nothing was said.
+    """Tolerance of each field, 0 by default, from texts such as `1e-6` for all or `action=1e-6`; later ones win.
 
     Raises:
         ConfigError: No number, a negative one, or an unknown field.
@@ -149,20 +139,12 @@ def read_tolerances(texts: Sequence[str], fields: Sequence[str]) -> Mapping[str,
     return found
 
 
-# They tell of the machine and of this very run, not of what the robot did.
+# About the computer and the single run, not about what the robot did.
 OF_THE_MACHINE = (CLOCK, DIAGNOSTICS, STATUS, METADATA)
 ORIGIN = (
-    "robot",
-    "name",
-    "task",
-    "controller",
-    "policy",
-    "scenario",
-    "seed",
-    "control_hz",
-    "git_revision",
+    "robot", "name", "task", "controller", "policy", "scenario", "seed", "control_hz", "git_revision",
     "controller_sha256",
-)
+)  # fmt: skip
 
 
 def differing(
@@ -177,7 +159,7 @@ def differing(
         first: One bag.
         second: Another.
         tolerance: Largest difference of numbers that counts as the same; 0 asks for the same bits.
-        only: Topics, relative or absolute; by default all but those that tell of the machine.
+        only: Topics, relative or absolute; by default all but those about the computer.
 
     Returns:
         Ready for JSON, with `same`, which takes that something was compared. Topics with messages that cannot be read
@@ -188,11 +170,10 @@ def differing(
     """
     one, other = _by_name(first), _by_name(second)
     known = sorted({*one, *other})
-    wanted = (
-        [second.relative(first.relative(name)) for name in only]
-        if only
-        else [n for n in known if n not in _machine()]
-    )
+    machine = {wire.name for wire in OF_THE_MACHINE}
+    wanted = [
+        second.relative(first.relative(name)) for name in only or [n for n in known if n not in machine]
+    ]
     for name in wanted:
         if name not in known:
             raise UnknownNameError("topic", name, known)
@@ -209,10 +190,6 @@ def differing(
     }
 
 
-def _machine() -> set[str]:
-    return {wire.name for wire in OF_THE_MACHINE}
-
-
 def _by_name(bag: Bag) -> dict[str, Topic]:
     return {bag.relative(name): topic for name, topic in bag.topics.items() if len(topic)}
 
@@ -221,12 +198,9 @@ def _rows(topic: Topic, frames: Frames) -> tuple[list[int], list[Row]]:
     """Stamps and fields of messages, with frames without the prefix of their robot."""
     _, stamps, found = rows(topic)
     for row in found:
-        row.update({path: frames.plain(text) for path, text in row.items() if _is_frame(path, text)})
+        frame_ids = {p: v for p, v in row.items() if p.endswith("frame_id") and isinstance(v, str)}
+        row.update({path: frames.plain(text) for path, text in frame_ids.items()})
     return stamps, found
-
-
-def _is_frame(path: str, value: Any) -> bool:
-    return path.endswith("frame_id") and isinstance(value, str)
 
 
 def _of_topic(
@@ -252,9 +226,8 @@ def _of_topic(
     left, right = [rows_1[i] for i, _ in pairs], [rows_2[j] for _, j in pairs]
     stamps = np.array([stamps_1[i] for i, _ in pairs], dtype=np.int64)
     paths = [path for path in columns(left + right) if not path.startswith("header.stamp")]
-    numbers = [
-        path for path in paths if _all(left + right, path, lambda v: not isinstance(v, str | np.ndarray))
-    ]
+    both = left + right
+    numbers = [p for p in paths if not any(isinstance(row.get(p), str | np.ndarray) for row in both)]
     fields = _numbers(numbers, left, right, stamps, tolerance)
     texts = [
         {"field": path, "differing": count}
@@ -277,7 +250,7 @@ def _of_topic(
 
 
 def _bytes_of(first: Topic, second: Topic) -> dict[str, Any]:
-    """What differs between messages that nobody here can read."""
+    """Differences of messages that cannot be read."""
     alone = len(first) - len(second)
     differing = sum(a != b for a, b in zip(first.data, second.data, strict=False))
     return {
@@ -299,10 +272,6 @@ def _alike(one: Any, other: Any, tolerance: float) -> bool:
     return bool(
         np.isclose(one.astype(float), other.astype(float), rtol=0.0, atol=tolerance, equal_nan=True).all()
     )
-
-
-def _all(found: list[Row], path: str, holds: Callable[[Any], bool]) -> bool:
-    return all(holds(row[path]) for row in found if path in row)
 
 
 def _numbers(

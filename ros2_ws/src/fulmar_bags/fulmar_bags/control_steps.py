@@ -46,7 +46,7 @@ class ControlSteps:
     observation_names: tuple[str, ...]  # empty: none were recorded
     actions: np.ndarray  # (n, m) NaN where unknown
     commands: np.ndarray  # (n, m) NaN where unknown
-    acted: np.ndarray  # (n,) whether the controller was asked; nothing but True where that is not known
+    acted: np.ndarray  # (n,) whether the controller was asked; True where that is not known
     odometry: Odometries
     sample: np.ndarray  # (n,) index into the odometry, ABSENT where it is not in the bag
     goals: tuple[Received, ...]
@@ -268,7 +268,7 @@ def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int
 
 
 def _timed(seen: Odometries, warnings: list[str]) -> Odometries:
-    """Odometry whose stamps tell the time; where they never change, by when it was recorded."""
+    """Odometry with its times of recording in the place of stamps that never change."""
     if len(seen) < 2 or np.ptp(seen.stamp_ns) > 0:
         return seen
     warnings.append("the stamps of the odometry do not advance: the times of recording stand in for them.")

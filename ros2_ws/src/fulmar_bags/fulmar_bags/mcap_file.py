@@ -39,21 +39,18 @@ BEGUN = ".begun"  # ending of a file without content; a power cut may leave it t
 
 
 def mcap_writer(file: BagFile, **options: Any) -> Writer:
-    """A writer with the options of `mcap.writer.Writer`, which asks its stream for no more than this file has."""
+    """An MCAP writer, which needs no more of its stream than `BagFile` has."""
     return Writer(cast(IO[Any], file), **options)
 
 
 class BagFile:
-    """What `mcap_writer` writes to; bytes wait in memory until `flush`.
+    """The file below an MCAP writer; bytes wait in memory until `flush`.
 
-    It has its name from the first flush on: nobody finds a file that readers refuse because nothing is in it yet.
+    It gets its name with the first flush, so that readers never find an empty file, which they refuse.
     """
 
     def __init__(self, path: Path) -> None:
-        """Create the file, under the name that it has until it holds something.
-
-        Args:
-            path: Must not exist yet.
+        """Create the file, under the name that it has until the first flush.
 
         Raises:
             OSError: It exists, or cannot be created.
@@ -86,7 +83,7 @@ class BagFile:
         return len(data)
 
     def flush(self) -> None:
-        """Bring what waits to the disk, followed by the provisional end.
+        """Write waiting bytes and the provisional end to the disk.
 
         Raises:
             OSError: The disk refuses. The file then ends as before, and the bytes go on waiting.
@@ -94,21 +91,17 @@ class BagFile:
         self._append(PROVISIONAL_END)
 
     def finish(self) -> None:
-        """Bring what waits, which ends with a footer of its own, to the disk.
-
-        Raises:
-            OSError: As `flush`.
-        """
+        """Write waiting bytes, which end with a footer of their own, to the disk; raises as `flush`."""
         self._append(b"")
 
     def close(self) -> None:
-        """Let go of the file; what waits is lost, and so is a file that never got a name."""
+        """Close the file; waiting bytes are lost, and so is a file that never got a name."""
         os.close(self._descriptor)
         if not self._named:
             self._nameless.unlink(missing_ok=True)
 
     def discard(self) -> None:
-        """Let go of the file and remove it."""
+        """Close the file and remove it."""
         self.close()
         self._path.unlink(missing_ok=True)
 
@@ -153,9 +146,6 @@ class BagPart:
     def __init__(self, path: Path) -> None:
         """Create the file, without content.
 
-        Args:
-            path: Must not exist yet.
-
         Raises:
             OSError: It exists, or cannot be created.
         """
@@ -188,13 +178,7 @@ class BagPart:
         attachments: Mapping[str, bytes],
         topics: Iterable[Topic],
     ) -> None:
-        """Say what made the bag.
-
-        Args:
-            records: Metadata records by name.
-            attachments: Files by name.
-            topics: What was announced before this file was begun.
-        """
+        """Write metadata records and attachments by name, and topics announced before this file was begun."""
         for name, record in records.items():
             self.add_record(name, record)
         for name, data in attachments.items():
@@ -212,7 +196,7 @@ class BagPart:
         self._mcap.add_metadata(name, dict(record))
 
     def add_topic(self, topic: Topic) -> None:
-        """Announce a topic; its definition reaches the disk with the next flush, also without a message."""
+        """Announce a topic; its definition is written with the next flush, even without a message."""
         kind, definition = topic.type, topic.type.definition.encode()
         builder = RecordBuilder()
         if kind.name not in self._schemas:
@@ -244,7 +228,7 @@ class BagPart:
         self._messages += 1
 
     def flush(self) -> None:
-        """Bring everything to the disk, where it is readable.
+        """Write everything to the disk, where it is readable.
 
         Raises:
             OSError: The disk refuses; what it took before stays readable, the rest waits.
@@ -253,7 +237,7 @@ class BagPart:
         self._file.flush()
 
     def finish(self) -> None:
-        """Write the index and let go.
+        """Write the index and close the file.
 
         Raises:
             OSError: The disk refuses. What it took before stays readable.
@@ -265,10 +249,10 @@ class BagPart:
             self._file.close()
 
     def discard(self) -> None:
-        """Let go of the file and remove it."""
+        """Close the file and remove it."""
         self._file.discard()
 
     def finish_if_there_is_room(self) -> None:
-        """As `finish`, but without an index, which readers can do without, if the disk refuses that."""
+        """As `finish`, but without the index, which readers can do without, if the disk is full."""
         with contextlib.suppress(OSError):
             self.finish()

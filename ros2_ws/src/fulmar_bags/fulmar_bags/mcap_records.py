@@ -43,10 +43,7 @@ _READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
 
 
 def bag_files(bag: Path) -> list[Path]:
-    """The MCAP files of a bag, in the order in which they were written.
-
-    Args:
-        bag: Bag folder, or one of the files itself.
+    """The MCAP files of a bag folder, in the order in which they were written, or the one that is given.
 
     Raises:
         BagError: There is none.
@@ -63,7 +60,7 @@ def bag_files(bag: Path) -> list[Path]:
 
 
 def place_in_bag(path: Path) -> tuple[str, int]:
-    """What files of a bag are sorted by: `run_10.mcap` comes after `run_9.mcap`."""
+    """Sort key of the files of a bag: `run_10.mcap` comes after `run_9.mcap`."""
     name = plain_name(path).stem
     stem, _, number = name.rpartition("_")
     return (stem, int(number)) if number.isdecimal() else (name, 0)
@@ -75,14 +72,9 @@ def plain_name(path: Path) -> Path:
 
 
 def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
-    """Go through an MCAP file.
+    """Schemas, channels, messages, metadata and attachments of an MCAP file, in their order.
 
-    Args:
-        path: The file.
-        damage: Grows by one line for each part that cannot be read.
-
-    Yields:
-        Schemas, channels, messages, metadata and attachments, in the order of the file.
+    `damage` grows by one line for each part that cannot be read.
 
     Raises:
         BagError: The file cannot be opened, is empty, or is no MCAP file at all.
@@ -112,11 +104,7 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
 
 
 def file_bytes(path: Path, damage: list[str]) -> bytes:
-    """What is in a file, unpacked where its name says that it is packed as a whole.
-
-    Args:
-        path: The file.
-        damage: Grows by one line where it cannot be unpacked to its end.
+    """Bytes of a file, unpacked if it is packed as a whole; `damage` grows by a line where that fails on the way.
 
     Raises:
         BagError: It cannot be opened.
@@ -224,11 +212,8 @@ def missing_files(path: Path) -> tuple[str, ...]:
     """Names that `metadata.yaml` lists and that are not in the folder; none where one file alone was given."""
     listed = read_information(path).get("relative_file_paths") if path.is_dir() else None
     there = {plain_name(file).name for file in path.iterdir()} if path.is_dir() else set()
-    names = (
-        [name for name in listed if isinstance(name, str) and Path(name).name]
-        if isinstance(listed, list)
-        else []
-    )
+    entries = listed if isinstance(listed, list) else []
+    names = [name for name in entries if isinstance(name, str) and Path(name).name]
     return tuple(name for name in names if plain_name(Path(name)).name not in there)
 
 

@@ -40,10 +40,7 @@ def type_store() -> Typestore:
 
 @functools.cache
 def message_type(name: str) -> MessageType:
-    """Describe a message type.
-
-    Args:
-        name: Such as `nav_msgs/msg/Odometry`.
+    """Describe a message type such as `nav_msgs/msg/Odometry`.
 
     Raises:
         BagError: Jazzy has no such type.
@@ -83,16 +80,9 @@ BASE_BYTES = {
 
 
 def unreadable(kind: str, data: Sequence[bytes]) -> list[int]:
-    """Which messages cannot be what their topic says.
+    """Indices of messages in CDR that do not fit their type; none where the type is unknown.
 
-    Messages whose texts and lengths are those of the first one that can be read are like it, whatever their numbers.
-
-    Args:
-        kind: Such as `nav_msgs/msg/Odometry`.
-        data: Messages in CDR.
-
-    Returns:
-        Indices; none where nobody here knows the type.
+    A message with the texts and lengths of the first one fits if that one does, whatever its numbers.
     """
     if kind not in type_store().fielddefs or not data:
         return []

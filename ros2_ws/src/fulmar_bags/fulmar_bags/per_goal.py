@@ -28,7 +28,7 @@ class BagPerGoal:
         Args:
             open_bag: Makes the bag of a number, from 1, with its topics.
             goals: Topics of goals.
-            latched: Topics whose newest messages hold on however old they are, and how many of each.
+            latched: Latched topics, and how many messages of each a bag begins with.
 
         Raises:
             BagError: The first bag cannot be written.

@@ -1,4 +1,4 @@
-"""Makes a bag whole again that a power cut or a damaged disk left torn."""
+"""Recovers a bag that a power cut or a damaged disk left incomplete."""
 
 from __future__ import annotations
 
@@ -25,9 +25,6 @@ def recover(directory: Path) -> tuple[str, ...]:
 
     A file that lost its name with the power gets it back. Each new file replaces the old one in one step. Where
     something could not be read, the old file stays beside it as `<name>.damaged`; one that holds nothing at all goes.
-
-    Args:
-        directory: The bag.
 
     Returns:
         One line for each part that could not be read; empty if the bag was whole.
@@ -92,7 +89,7 @@ def _all_topics(copies: list[_Copy]) -> list[TopicCount]:
 
 
 class _Copy:
-    """A fresh MCAP file with the records of another one, of which it tells what could not be read."""
+    """A fresh MCAP file with the records of another one that can be read."""
 
     def __init__(self, path: Path, old: Path, damage: list[str]) -> None:
         self.custom: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Keeps the newest messages in memory, and begins to write when told of a fault. Knows no rclpy.
+"""Ring buffer of messages that writes a bag when a fault occurs; and which messages are faults. Knows no rclpy.
 
 Each fault gives a file of the bag: what came before it, and what came for a while after. Latched messages that are
 older than the memory, such as the goal, come first in it, at the time where it begins, as a late subscriber would get
@@ -33,7 +33,7 @@ class _Message:
 
 
 class BagRing:
-    """Takes messages as a `BagWriter` does; most of them never reach a disk."""
+    """Receives messages as a `BagWriter` does; most of them never reach a disk."""
 
     def __init__(
         self,
@@ -51,8 +51,8 @@ class BagRing:
             open_bag: Makes the bag, with its topics; called at the first fault, and again where it fails.
             before_s: How much is kept [s].
             after_s: How long writing goes on after the last sign of a fault [s].
-            latched: Topics whose newest messages hold on however old they are, and how many of each.
-            fault_in: What fault a message tells of, by topic and data; empty if none.
+            latched: Latched topics, and how many messages of each are kept however old they are.
+            fault_in: Fault that a message reports, by topic and data; empty if none.
             max_bytes: More is not kept; then less than `before_s` is.
         """
         self._open_bag, self._fault_in = open_bag, fault_in
@@ -90,10 +90,7 @@ class BagRing:
         return (self._bag.waiting if self._bag else 0) + self._bytes_due
 
     def write(self, topic: str, data: bytes, *, log_ns: int) -> None:
-        """Take a message; arguments as of `BagWriter.write`.
-
-        What belongs to a fault stays in memory until `tick` has begun its file; the caller watches `waiting`.
-        """
+        """As `BagWriter.write`; messages of a fault stay in memory until `tick` has begun its file."""
         message = _Message(topic, data, log_ns)
         reason = self._fault_in(topic, data)
         if reason:
@@ -195,14 +192,14 @@ class BagRing:
 
 
 def fault_finder(robot: str, topics: Mapping[Wire, str]) -> Callable[[str, bytes], str]:
-    """Look for a robot's faults: an error of its plant (the watchdog's among them) or its controller, an e-stop.
+    """A function that finds faults of a robot: errors of its plant (a watchdog trip, too) or controller, an e-stop.
 
     Args:
-        robot: Name of the robot; other robots' errors on `/diagnostics` are none of its own.
+        robot: Name of the robot; `/diagnostics` has those of others, too.
         topics: Absolute name of each wire.
 
     Returns:
-        A function of topic and CDR data that gives the fault in words, or an empty text.
+        Gives the fault in words by topic and CDR data, or an empty text.
     """
     watched = {topics[wire]: wire for wire in (STATUS, DIAGNOSTICS, ESTOP)}
 
@@ -214,13 +211,11 @@ def fault_finder(robot: str, topics: Mapping[Wire, str]) -> Callable[[str, bytes
             message = type_store().deserialize_cdr(data, wire.type)
         except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; they are kept, and no fault
             return ""
-        return _of_estop(message) if wire is ESTOP else _of_diagnostics(robot, message)
+        if wire is ESTOP:
+            return "e-stop" if message.data else ""
+        return _of_diagnostics(robot, message)
 
     return fault_in
-
-
-def _of_estop(message: Any) -> str:
-    return "e-stop" if message.data else ""
 
 
 def _of_diagnostics(robot: str, message: Any) -> str:

@@ -106,7 +106,7 @@ class HealthSample:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Everything a bag tells about one run."""
+    """Content of a bag of one run."""
 
     path: Path
     info: dict[str, Any]  # what was asked for
@@ -123,7 +123,7 @@ class RunRecord:
 
     @property
     def actuation(self) -> Actuation:
-        """What was applied; where the bag does not tell, what was commanded."""
+        """What was applied; what was commanded where the bag does not have that."""
         return self.applied if len(self.applied) else self.commanded
 
     @property
@@ -145,13 +145,7 @@ class RunRecord:
 
 
 def read_run(path: Path) -> RunRecord:
-    """Read one run.
-
-    Args:
-        path: Bag folder, or a file in it.
-
-    Returns:
-        The run. What is damaged or missing is left out and named in `warnings`.
+    """Read one run from a bag folder, or a file in it; damaged and missing parts are named in its `warnings`.
 
     Raises:
         BagError: There is no bag, it is empty, or Fulmar did not record it.
@@ -166,15 +160,12 @@ def read_run(path: Path) -> RunRecord:
 
 
 def read_any_run(path: Path, *, task: str | None = None, robot: str | None = None) -> RunRecord:
-    """Read a run that Fulmar need not have recorded, from whatever its bag holds.
+    """Read a run that Fulmar need not have recorded; its `info` lacks `task` or `robot` where nothing names them.
 
     Args:
         path: Bag folder, or a file in it.
-        task: Task of the run; by default what the bag or its controller names, if they do.
-        robot: Robot of the run; by default what they name, or the namespace of the odometry.
-
-    Returns:
-        The run; its `info` lacks `task` or `robot` where nothing names them.
+        task: Task of the run; by default that of the bag or its controller.
+        robot: Robot of the run; by default that of the bag or its controller, or the namespace of the odometry.
 
     Raises:
         BagError: There is no bag, or nothing of it can be read.

@@ -68,15 +68,12 @@ TIMES = ("log_ns", "stamp_ns")
 
 
 def write_csv(bag: Bag, folder: Path) -> tuple[list[Path], list[str]]:
-    """Write one table for each topic that has messages.
+    """Write one table for each topic that has messages, into a folder that is made.
 
-    Args:
-        bag: The bag.
-        folder: Is made.
+    Columns are the time of recording and the stamp [ns], then every field by its path.
 
     Returns:
-        The files, and what they lack, in words. First two columns: when it was recorded and its stamp [ns]; then every
-        field by its path.
+        The files, and what they lack, in words.
 
     Raises:
         BagError: The bag has no messages.
@@ -109,12 +106,8 @@ def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
     Numbers that a message lacks are NaN; texts are arrays of texts; long arrays, if they are always of one length, are
     rows of one array. Nothing in it needs pickle.
 
-    Args:
-        bag: The bag.
-        path: Of the file; its folder is made.
-
     Returns:
-        The file, and what it lacks, in words.
+        The file, whose folder is made, and what it lacks, in words.
 
     Raises:
         BagError: The bag has no messages.
@@ -129,10 +122,8 @@ def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
         arrays[f"{name}/stamp_ns"] = np.array(stamps, dtype=np.int64)
         for column in columns(found):
             values: list[Any] = [row.get(column) for row in found]
-            if (
-                any(isinstance(value, np.ndarray) for value in values)
-                and len({np.shape(value) for value in values}) > 1
-            ):
+            arrays_among = any(isinstance(value, np.ndarray) for value in values)
+            if arrays_among and len({np.shape(value) for value in values}) > 1:
                 left_out.append(f"{topic.name}: {column}: its length changes.")
                 continue
             arrays[f"{name}/{column}"] = _array(values)

@@ -39,10 +39,7 @@ class BagCounts:
 
 
 class BagWriter:
-    """One bag being written.
-
-    The caller drives time: `tick` flushes twice a second, so at most a second is lost with the process.
-    """
+    """One bag being written; the caller's `tick` flushes twice a second, so a crash loses at most a second."""
 
     def __init__(
         self,
@@ -100,12 +97,7 @@ class BagWriter:
         return self._part.waiting
 
     def add_topic(self, name: str, type_name: str, delivery: Delivery) -> None:
-        """Announce a topic.
-
-        Args:
-            name: Absolute topic name.
-            type_name: Such as `nav_msgs/msg/Odometry`.
-            delivery: How its publishers offer it.
+        """Announce a topic by its absolute name, its type such as `nav_msgs/msg/Odometry`, and its delivery.
 
         Raises:
             BagError: Unknown type.
@@ -135,19 +127,16 @@ class BagWriter:
         )
 
     def attach(self, name: str, data: bytes) -> None:
-        """Carry a file along that was not there at the beginning, in this MCAP file and all that follow."""
+        """Attach a file to this MCAP file and all that follow."""
         self._attachments[name] = data
         self._part.attach(name, data)
 
     def note(self, name: str, text: str) -> None:
-        """Say something about the recording in `custom_data`, with the next flush; the last text of a name stays."""
+        """Write a text into `custom_data` with the next flush; the last text of a name stays."""
         self._notes[name] = text
 
     def tick(self, now: float) -> None:
-        """Flush if the last flush is half a second ago, and begin a new file where one is due; call this often.
-
-        Args:
-            now: Any steady clock [s].
+        """Flush if the last flush is half a second ago, and begin a new file where one is due; `now` is steady [s].
 
         Raises:
             OSError: As `flush`.
@@ -187,7 +176,7 @@ class BagWriter:
         self.flush()
 
     def close(self) -> None:
-        """Write the rest, the index and the final counts, and let go.
+        """Write the rest, the index and the final counts, and close the bag.
 
         Raises:
             OSError: The disk refuses. What it took before stays readable.
@@ -215,10 +204,6 @@ class BagWriter:
 
 
 def check_free(directory: Path) -> None:
-    """Refuse a folder that holds something already.
-
-    Raises:
-        BagError: If it does.
-    """
+    """Raise BagError where a folder is not empty, since bags are never overwritten."""
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         raise BagError(f"{directory} exists already, and bags are never overwritten. Name a new folder.")

@@ -30,7 +30,7 @@ RECORDING = "fulmar_recording"  # entry of `custom_data`: JSON of `Account`
 
 
 class Bag(Protocol):
-    """What the thread writes to: a `BagWriter`, a `BagRing` or a `BagPerGoal`."""
+    """Target of the thread: a `BagWriter`, a `BagRing` or a `BagPerGoal`."""
 
     @property
     def counts(self) -> BagCounts: ...  # noqa: D102 - as of `BagWriter`, all of them
@@ -137,7 +137,7 @@ class BagThread:
         )
 
     def stop(self) -> Account:
-        """Write what waits, close the bag, and say how it went."""
+        """Write what waits, close the bag, and return the final account."""
         self._stop.set()
         self._thread.join()
         return self.account(complete=True)
