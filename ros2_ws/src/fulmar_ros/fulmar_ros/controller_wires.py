@@ -1,4 +1,4 @@
-"""What a controller publishes and hears: one object for every wire on its side."""
+"""Publishers and subscriptions of a controller: one object for every wire on its side."""
 
 from __future__ import annotations
 
@@ -72,19 +72,18 @@ class ControllerWires:
         Args:
             node: Owner of the endpoints.
             robot: The robot.
-            task: Says on which topic goals come.
+            task: Has the topic of the goals.
             observation_names: Of the terms that the controller observes.
-            on_odometry: Receives every odometry message, serialised.
+            on_odometry: Receives odometry, serialised.
             on_goal: Receives every goal.
             on_obstacles: Receives all obstacles whenever they change.
             on_thing: Receives the name of a thing and its pose.
             on_estop: Receives whether the e-stop is pressed.
-            on_estop_released: Called after each reset of the e-stop.
+            on_estop_released: Receives each reset of the e-stop.
             on_swap: Receives the folder of the policy that shall take over.
             on_applied: Receives what the actuators do, serialised, of robots whose actuators can be watched.
             on_bearing: Receives whether the air bearing is on; None where there is none.
-            lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag
-                behind.
+            lockstep: Ask for lost odometry again, since the plant waits, and wait for readers that lag behind.
         """
         wire = command_wire(robot)
         qos = partial(publisher_qos, lockstep=lockstep)
@@ -102,12 +101,8 @@ class ControllerWires:
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
         self.health = Health(node, f"{name_of(node, robot)}: controller", status)
         self._actuators, self._frames = robot.actuators, own_frames(node, robot)
-        self._streams = [
-            self._command,
-            self._observation,
-            self._action,
-            *([self._health] if self._health else []),
-        ]
+        streams = (self._command, self._observation, self._action, self._health)
+        self._streams = [publisher for publisher in streams if publisher is not None]
         self._publishers = (*self._streams, self._metadata, *self.health.publishers)
         self._write_command = self._command_writer()
         self._newest: bytes | None = None
@@ -141,8 +136,10 @@ class ControllerWires:
         self.subscribed = {ODOMETRY: lockstep, **dict.fromkeys(reliably, True)}  # and whether reliably
         for thing in task.things:
             stream = subscriber_qos(thing.wire, reliable=lockstep)
-            told = partial(on_thing, thing.name)
-            self._subscriptions.append(node.create_subscription(PoseStamped, thing.wire.name, told, stream))
+            on_pose = partial(on_thing, thing.name)
+            self._subscriptions.append(
+                node.create_subscription(PoseStamped, thing.wire.name, on_pose, stream)
+            )
 
     def _command_writer(self) -> TwistWriter | VectorWriter:
         return TwistWriter(self._frames) if self._by_velocity else VectorWriter(self._actuators.names)
@@ -166,7 +163,7 @@ class ControllerWires:
             self._publish(self._command, self._newest)
 
     def forget_command(self) -> None:
-        """Have nothing to repeat."""
+        """Repeat no command until the next one."""
         self._newest = None
 
     def publish_safe(self, stamp: int) -> None:
@@ -174,18 +171,18 @@ class ControllerWires:
         self._publish(self._command, self._command_writer().raw(self._actuators.safe_command, stamp))
 
     def destroy(self, node: LifecycleNode) -> None:
-        """Give every endpoint back."""
+        """Destroy every endpoint."""
         for subscription in self._subscriptions:
             node.destroy_subscription(subscription)
         for publisher in self._publishers:
             node.destroy_publisher(publisher)
 
     def flush(self) -> None:
-        """Wait, not for ever, until every subscriber has the last messages."""
+        """Wait for a limited time until every subscriber has the last messages."""
         flush(self._streams, self._flush_s)
 
     def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
-        """Publish the very vectors behind a command, where somebody listens."""
+        """Publish the observation and the action of a command, where they have a subscriber."""
         if self._observation.get_subscription_count():
             self._publish(self._observation, self._write_observation.raw(observation, stamp))
         if self._action.get_subscription_count():
@@ -193,14 +190,14 @@ class ControllerWires:
 
     @property
     def health_wanted(self) -> bool:
-        """Whether somebody listens to the health of the actuators."""
+        """Whether the health of the actuators has a subscriber."""
         return self._health is not None and bool(self._health.get_subscription_count())
 
     def publish_actuators_health(self, effectiveness: np.ndarray, stamp: int) -> None:
-        """Publish what is believed of each actuator; only where that is wanted."""
+        """Publish the estimated effectiveness of each actuator, where `health_wanted`."""
         assert self._health is not None
         self._publish(self._health, self._write_health.raw(effectiveness, stamp))
 
     def publish_metadata(self, text: str) -> None:
-        """Say who controls: a JSON object."""
+        """Publish the metadata of the controller that acts: a JSON object."""
         self._metadata.publish(String(data=text))

@@ -18,9 +18,7 @@ from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_wires import PlantWires
 
 RESEND_S = 0.5
-OnStep = Callable[
-    [Sample, np.ndarray], None
-]  # called with the sample after a step and the command of the step
+OnStep = Callable[[Sample, np.ndarray], None]  # the sample after a step, and the command of the step
 
 
 class LockstepLoop:
@@ -37,16 +35,9 @@ class LockstepLoop:
         answer_timeout_s: float,
         publish_bearing: Callable[[], None] = lambda: None,
     ) -> None:
-        """Join the parts.
+        """Step a simulator at `control_hz` [Hz], waiting at most `answer_timeout_s` [s] for each command.
 
-        Args:
-            backend: A simulator.
-            wires: Endpoints of the plant.
-            guard: The last word on commands.
-            clock: Stamps of the states.
-            control_hz: Command rate [Hz].
-            answer_timeout_s: Longest wait for one answer [s].
-            publish_bearing: Publishes the state of the air bearing, and waits until every subscriber has it.
+        `publish_bearing` publishes the state of the air bearing, and waits until every subscriber has it.
         """
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
         robot: Robot = backend.robot
@@ -60,13 +51,7 @@ class LockstepLoop:
     def run(
         self, sample: Sample, steps: int | None, stop: threading.Event, on_step: OnStep | None = None
     ) -> None:
-        """Step until the number of steps is done or somebody stops it.
-
-        Args:
-            sample: First sample of the episode.
-            steps: How many; None for no end.
-            stop: Set by another thread.
-            on_step: Called after every step.
+        """Step from the first sample of an episode until `steps` are done, None for no end, or `stop` is set.
 
         Raises:
             LockstepError: If an answer does not come in time.
@@ -82,13 +67,13 @@ class LockstepLoop:
             self.steps += 1
             if on_step is not None:
                 on_step(sample, command)
-        # Nobody shall answer the last state, but where it ended belongs into the bag.
+        # The last state needs no answer, but belongs into the bag.
         self._wires.publish_truth(sample, self._clock.now_ns)
 
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp = self._clock.now_ns
         began = time.monotonic()
-        grounded = self._tell_bearing()
+        grounded = self._update_bearing()
         before = self._wires.answered_ns
         self._wires.publish_sample(sample, stamp)
         with self._wires.lock:
@@ -111,15 +96,15 @@ class LockstepLoop:
         return command
 
     def _why_unanswered(self, before_ns: int | None) -> str:
-        """What came in the place of an answer, if anything; with the stamp that was answered before."""
+        """What the plant received in the place of an answer; with the stamp that was answered before."""
         answered_ns = self._wires.answered_ns
         if answered_ns is not None and answered_ns != before_ns:
             return f"the last command is stamped t = {answered_ns / 1e9:.2f} s. A command answers an odom by its stamp."
         refused = f" {self._guard.last_rejection}." if self._guard.last_rejection else ""
         return f"the controller is silent.{refused}"
 
-    def _tell_bearing(self) -> bool:
-        """Publish a change of the air bearing before the state that it is true of; returns whether it is off."""
+    def _update_bearing(self) -> bool:
+        """Publish a change of the air bearing before the state that it belongs to; returns whether it is off."""
         if not isinstance(self._backend, AirBearing):
             return False
         on = self._backend.bearing_on
@@ -141,15 +126,7 @@ class RealtimeLoop:
         *,
         rate: float,
     ) -> None:
-        """Join the parts.
-
-        Args:
-            backend: A simulator or a robot.
-            wires: Endpoints of the plant.
-            guard: The last word on commands.
-            clock: Stamps of the states.
-            rate: Simulated seconds a wall-clock second, > 0.
-        """
+        """Step a simulator or a robot; `rate` is simulated seconds a wall-clock second, > 0."""
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
         self._dt = backend.robot.timing.physics_dt
         self.period_s = self._dt / rate
@@ -158,13 +135,7 @@ class RealtimeLoop:
         self._ticked_ns: int | None = None
 
     def run(self, sample: Sample, ticks: int | None, stop: threading.Event) -> None:
-        """Tick until the number of ticks is done or somebody stops it.
-
-        Args:
-            sample: First sample.
-            ticks: How many; None for no end.
-            stop: Set by another thread.
-        """
+        """Tick from the first sample until `ticks` are done, None for no end, or `stop` is set."""
         take_priority(PLANT_PRIORITY)
         self._ticked_ns = time.monotonic_ns()
         self._wires.publish_sample(sample, self._clock.now_ns)
@@ -179,11 +150,7 @@ class RealtimeLoop:
             self._wires.publish_sample(sample, self._clock.now_ns)
 
     def since_tick_s(self, now_ns: int) -> float:
-        """Time since the last finished step, 0 before the first [s].
-
-        Args:
-            now_ns: Monotonic clock [ns].
-        """
+        """Time since the last finished step, 0 before the first [s]; `now_ns` by the monotonic clock."""
         return 0.0 if self._ticked_ns is None else (now_ns - self._ticked_ns) / 1e9
 
     def _command(self) -> np.ndarray:
