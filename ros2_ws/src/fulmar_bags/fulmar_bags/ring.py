@@ -208,7 +208,7 @@ def fault_finder(robot: str, topics: Mapping[Wire, str]) -> Callable[[str, bytes
         if wire is None:
             return ""
         try:
-            message = type_store().deserialize_cdr(data, wire.type)
+            message: Any = type_store().deserialize_cdr(data, wire.type)
         except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; they are kept, and no fault
             return ""
         if wire is ESTOP:

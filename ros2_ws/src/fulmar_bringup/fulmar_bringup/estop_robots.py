@@ -31,16 +31,16 @@ from fulmar_core.topics import (
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 Answer = tuple[bool, str]  # whether it was done, and what was said
-SAY_S = 0.05  # between two words on the wire
+SAY_S = 0.05  # between two messages
 STAY_S = 1.0  # at least so long, for robots that are found after the first
-MISS_S = 3.0  # so long for a robot whose e-stop node is not found, or whose wire nobody hears
+MISS_S = 3.0  # for a robot whose e-stop node is not found, or whose topic has no subscriber
 ANSWER_S = 2.0  # in which a node must answer
 _STOP_LOOK_S, _RESET_LOOK_S = 0.005, 0.05
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """What came of one robot."""
+    """Result for one robot."""
 
     space: str  # its namespace
     reached: bool  # whether a node subscribes its e-stop topic
@@ -48,15 +48,15 @@ class Stopped:
 
 
 def stop_robots(node: Node, robot: str | None, *, find_s: float) -> list[Stopped]:
-    """Say on the wire of every robot that the e-stop is pressed, and ask its e-stop node to say so from then on.
+    """Publish a pressed e-stop for every robot, and ask its e-stop node to publish it from then on.
 
-    A robot is stopped as soon as its plant or its e-stop node is seen. Meanwhile others are looked for, and its node,
-    if that was not seen yet: one that nobody asked goes on saying "released", and its robot would go on.
+    A robot is stopped as soon as its plant or its e-stop node is discovered. Meanwhile others are looked for, and its
+    node, if that is missing: one that was not asked goes on publishing "released", and its robot would go on.
 
     Args:
         node: Spins already.
         robot: Only this one; None for all.
-        find_s: After this long without any robot nobody is there [s].
+        find_s: Longest wait for the first robot [s].
 
     Returns:
         Every robot that was found, by name.
@@ -90,14 +90,14 @@ class _Robot:
         self._reached = False
 
     def say(self) -> None:
-        """Say it once more, and ask the node as soon as it is there."""
+        """Publish once more, and ask the node as soon as it is there."""
         self._wire.publish(Bool(data=True))
         self._reached = self._reached or self._wire.get_subscription_count() > 0
         if self._asked is None and self._button.service_is_ready():
             self._asked = time.monotonic(), self._button.call_async(Trigger.Request())
 
     def is_over(self, now_s: float) -> bool:
-        """Whether nothing more is to be waited for."""
+        """Whether there is nothing more to wait for."""
         since_s = now_s - self._found_s
         if self._asked is None or not self._reached:
             return since_s > MISS_S
@@ -105,7 +105,7 @@ class _Robot:
         return since_s > STAY_S and (answer.done() or now_s - asked_s > ANSWER_S)
 
     def stopped(self) -> Stopped:
-        """What came of it."""
+        """The result."""
         if self._asked is None or not self._asked[1].done():
             return Stopped(self._space, self._reached, None)
         said = self._asked[1].result()
@@ -113,13 +113,13 @@ class _Robot:
 
 
 def spaces_with(node: Node, service: str) -> set[str]:
-    """Namespaces in which somebody offers, or asks for, a service, as far as they are seen now."""
+    """Namespaces in which a service is offered or asked for, as far as discovered."""
     end = f"/{service}"
     return {name.removesuffix(end) for name, _ in node.get_service_names_and_types() if name.endswith(end)}
 
 
 def _spaces(node: Node, robot: str | None) -> set[str]:
-    """Namespaces with a plant or an e-stop node, as far as they are seen now."""
+    """Namespaces with a plant or an e-stop node, as far as discovered."""
     plants = {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
     found = spaces_with(node, ESTOP_TRIGGER) | plants
     return found if robot is None else found & {namespace_of(robot)}
@@ -132,13 +132,7 @@ SETTLE_S = 0.3  # after the first robot was found, for others
 def robots_to_reset(node: Node, robot: str | None, *, find_s: float) -> tuple[set[str], set[str]]:
     """Namespaces with an e-stop node, and namespaces with a plant alone.
 
-    Args:
-        node: Spins already.
-        robot: Only this one; None for all.
-        find_s: Longest wait for the first robot [s].
-
-    Returns:
-        With a node, and without; a plant counts as without a node once none was seen for 3 s.
+    The arguments are those of `stop_robots`. A plant counts as alone once no e-stop node was discovered for 3 s.
     """
     began_s = time.monotonic()
     plants: dict[str, float] = {}  # and when they were found [s]
@@ -161,27 +155,18 @@ def robots_to_reset(node: Node, robot: str | None, *, find_s: float) -> tuple[se
 
 
 def release_without_node(node: Node, space: str) -> Answer:
-    """Release the e-stop of a robot that has no e-stop node, if its commands are zero.
-
-    Args:
-        node: Spins already.
-        space: Namespace of the robot.
-
-    Returns:
-        Whether it is released, and why not.
-    """
+    """Release the e-stop of a robot without e-stop node, by its namespace, if its commands are zero."""
     button = EstopButton()
     button.press()
 
     def watch(wire: Wire, moves: Callable[[JointState | TwistStamped], bool]) -> None:
         kind = TwistStamped if wire is VELOCITY_COMMAND else JointState
         name = f"{space}/{wire.name}"
-        node.create_subscription(
-            kind,
-            name,
-            lambda message: button.hear_command(name, not moves(message), time.monotonic_ns()),
-            subscriber_qos(wire),
-        )
+
+        def on_command(message: JointState | TwistStamped) -> None:
+            button.hear_command(name, not moves(message), time.monotonic_ns())
+
+        node.create_subscription(kind, name, on_command, subscriber_qos(wire))
 
     watch(COMMAND, lambda message: any(message.effort))
     watch(TELEOP, lambda message: any(message.effort))

@@ -35,12 +35,7 @@ def default_task(
 ) -> str:
     """Name of the task that a goal asks for: two numbers are a position, three a pose; without a goal it is a pose.
 
-    Args:
-        robot: Name of the robot.
-        controller: Name of the controller.
-        backend: Name of the backend.
-        goal: x [m], y [m] and, for a pose, heading [deg].
-        policy: Bundle that was given; it is checked against the task later.
+    The goal is x [m], y [m] and, for a pose, heading [deg]; a bundle that was given is checked later.
 
     Raises:
         ConfigError: The controller does not do that task with this robot, but another one; with what to say instead.
@@ -78,7 +73,7 @@ def why_not(robot: str, task: str, controller: str, policy: Path | None) -> str:
 
 
 def check_heading(task: str, goal: tuple[float, ...]) -> str:
-    """What a goal says too much for a task that was named; empty if nothing.
+    """Warning about a heading that a named task does not use; empty if there is none.
 
     Raises:
         ConfigError: The task needs a heading, and the goal has none.
@@ -135,7 +130,7 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
 
 
 def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
-    """Refuse velocities that the robot cannot have, whoever drives it.
+    """Refuse velocities that the robot cannot reach.
 
     Raises:
         ConfigError: They are beyond its top speed or turn rate, or sideways or on the spot where it cannot go so.
@@ -187,7 +182,7 @@ def first_targets(file: GoalFile) -> np.ndarray:
 
 
 def start_of(file: GoalFile) -> PoseTuple | None:
-    """Where to begin; None for places: anywhere about the first of them."""
+    """Start of a run; None for places: the start that the seed draws around the first of them."""
     if isinstance(file, FollowedPath):
         (x, y), (next_x, next_y) = file.planner().points[:2].tolist()
         return x, y, math.degrees(math.atan2(next_y - y, next_x - x))

@@ -50,7 +50,7 @@ def list_nodes(
         hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.
-        emulate: `true`: with backend hardware, an emulator speaks for the device.
+        emulate: `true`: with backend hardware, an emulator stands in for the device.
 
     Returns:
         As of `system_rows`. The row of an external controller is not there, or is that of its adapter.

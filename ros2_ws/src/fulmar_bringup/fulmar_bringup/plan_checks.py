@@ -35,20 +35,14 @@ from hardware_drivers.settings import TOPIC_DRIVERS, UNARMED, MavlinkBoat, load_
 from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry
 from policy_server.shipped import shipped_policies, shipped_policy
 
-# What a plant, a controller and an estimator say to each other. Goals, e-stop and reports keep their names: the run
-# itself and every other command of `fulmar` use them.
+# Topics between plant, controller and estimator. Goals, e-stop and status keep their names: the run itself and every
+# other command of `fulmar` use them.
 REMAPPABLE = tuple(wire.name for wire in (MOCAP, ODOMETRY, IMU, TRUTH, COMMAND, VELOCITY_COMMAND))
 TOPIC = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
 def read_remappings(texts: Sequence[str]) -> dict[str, str]:
-    """Read what was asked for.
-
-    Args:
-        texts: Each `FROM:=TO`; TO without a leading slash lies in the robot's namespace.
-
-    Returns:
-        New names by the wires' own.
+    """New topic names by the wires' own, from texts `FROM:=TO`; TO without leading slash is in the robot's namespace.
 
     Raises:
         ConfigError: Not of this form, no topic that may be renamed, no name of a topic, or two topics of one name.
@@ -81,13 +75,6 @@ def check_external(
     controller: str, guards: Guards, *, adapter: str | None, topic: str | None, lockstep: bool
 ) -> None:
     """Refuse guards that no node would carry out, and an adapter where a controller of ours commands.
-
-    Args:
-        controller: Name of the controller.
-        guards: What watches over the run.
-        adapter: Hardware file of an adapter, as it was written.
-        topic: Topic that the adapter takes in the place of the file's.
-        lockstep: Whether the plant waits for each command.
 
     Raises:
         ConfigError: On the first thing that would have no effect, or that cannot work.
@@ -129,11 +116,7 @@ def _check_guards(guards: Guards) -> None:
 
 
 def adapter_path(robot: str, asked: str | None) -> str:
-    """The hardware file of an adapter, as a path; empty where none is asked for.
-
-    Args:
-        robot: The robot.
-        asked: A name of `configs/hardware`, or a path that ends in `.yaml`.
+    """Path of an adapter's hardware file, by a name of `configs/hardware` or a path; empty where none is asked for.
 
     Raises:
         ConfigError: There is no such file, it is another robot's, or its driver speaks no topic.
@@ -167,9 +150,7 @@ def checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: bo
             raise ConfigError(f"--hardware and --emulate go with --backend hardware, not with {backend}.")
         return ""
     if hurried:
-        raise ConfigError(
-            "a device neither waits nor hurries: --backend hardware takes no --lockstep and no --rate."
-        )
+        raise ConfigError("a device runs in real time: --backend hardware takes no --lockstep and no --rate.")
     path = default_hardware(robot, asked)
     driver = load_hardware(path).driver
     if emulate:
@@ -179,11 +160,7 @@ def checked_hardware(robot: str, backend: str, asked: str | None, *, emulate: bo
 
 
 def check_node_options(controller: str, *, copies: int, network: str) -> None:
-    """Refuse options of the controller node where an external controller runs.
-
-    Raises:
-        ConfigError: On the first one.
-    """
+    """Raise ConfigError for options of the controller node where an external controller runs."""
     for option, given in (("--copies", copies > 1), ("--controller-in", bool(network))):
         if given and controller_entry(controller).is_external:
             raise ConfigError(
@@ -192,14 +169,9 @@ def check_node_options(controller: str, *, copies: int, network: str) -> None:
 
 
 def check_arming(hardware: str, *, arm: bool) -> None:
-    """Refuse to drive a boat that may not arm, and `--arm` where nothing is armed.
+    """Raise ConfigError for a boat that may not arm, and for `--arm` where nothing is armed.
 
-    Args:
-        hardware: Hardware file; empty for simulators.
-        arm: Whether `--arm` was given.
-
-    Raises:
-        ConfigError: One of the two.
+    The hardware file is empty for simulators.
     """
     file = load_hardware(hardware) if hardware else None
     if file is None or not file.arms:
@@ -259,11 +231,7 @@ def checked_guards(
 
 
 def check_distance(robot: Robot, task: Task, mission: Goal, start: PoseTuple) -> None:
-    """Refuse a start beyond the geofence around the first target, and targets as far from each other.
-
-    Raises:
-        ConfigError: If it is.
-    """
+    """Raise ConfigError for a start beyond the geofence around the first target, or targets as far from each other."""
     if task.goal_topic == "goal_velocity":
         return
     places = [np.asarray(start[:2]), *mission.targets[:, :2]]
@@ -285,11 +253,7 @@ def check_finite(**values: PoseTuple | float | None) -> None:
 
 
 def checked_rate(robot: Robot, control_hz: float) -> float:
-    """The rate itself, if the physics can keep it.
-
-    Raises:
-        ConfigError: If the control period is no multiple of the physics step.
-    """
+    """The rate itself; raises ConfigError where the control period is no multiple of the physics step."""
     try:
         robot.timing.substeps(control_hz)
     except ValueError as error:
@@ -298,14 +262,11 @@ def checked_rate(robot: Robot, control_hz: float) -> float:
 
 
 def check_beat(control_hz: float, rate: float) -> None:
-    """Refuse commands so rare that the plant's watchdog would trip between any two of them, in real time.
+    """Raise ConfigError where the watchdog would trip between any two commands, in real time.
 
     Args:
         control_hz: Command rate, in simulated time [Hz].
         rate: Simulated seconds a wall-clock second.
-
-    Raises:
-        ConfigError: If the control period is not shorter than the watchdog's timeout.
     """
     period_s, timeout_s = 1.0 / (control_hz * rate), default_timeout(1.0 / control_hz) / min(rate, 1.0)
     if period_s >= timeout_s:

@@ -1,4 +1,4 @@
-"""From what a person asked for to a complete, checked plan; nothing is started here."""
+"""Request of a run: a complete, checked plan of what a person asked for; starts nothing."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What to run, where to go, and where to record."""
+    """Plan of a run, its goal, and its bag."""
 
     plan: RunPlan
     goal: PoseTuple | None  # None: the task has more than one target, or none in space
     record: Path  # folder of the bag; must not exist
     command: str  # command line, for the record
-    mission: Goal = field(compare=False)  # everything that the task is about; `goal` is a part of it
+    mission: Goal = field(compare=False)  # all targets and obstacles; `goal` is a part of it
     end_on_estop: bool = False  # the run ends, and fails, when an e-stop stops the robot
 
 
@@ -104,8 +104,8 @@ def plan_run(
         backend: Name of the backend.
         policy: Bundle; the shipped one by default.
         goal: x [m], y [m], heading [deg]; drawn from the seed by default, always so for tasks with other goals.
-        start: Same; by default as far from the goal as the seed's episode begins. Where something stands about, it
-            stays where the seed has put it, and so does the start.
+        start: Same; by default as far from the goal as the seed's episode begins. With obstacles, these and the start
+            stay where the seed has put them.
         duration_s: Simulated time; the task's episode by default [s].
         lockstep: Whether plant and controller wait for each other.
         rate: Simulated seconds a wall-clock second.
@@ -217,14 +217,14 @@ def _from_file(file: GoalFile, drawn: Goal, start: PoseTuple) -> tuple[Goal, Pos
 
 
 def _moved(task: Task, mission: Goal, start: PoseTuple, goal: PoseTuple) -> tuple[Goal, PoseTuple]:
-    """Put another target into a drawn mission, and move the start along where nothing stands about.
+    """Put another target into a drawn mission, and move the start along where there are no obstacles or things.
 
     Raises:
         ConfigError: The task has no single target in space.
     """
     if task.goal_topic not in PLACES:
         raise ConfigError(
-            f"the targets of task '{task.name}' cannot be said in one --goal. Leave it out: --seed draws them. "
+            f"the targets of task '{task.name}' do not fit into one --goal. Leave it out: --seed draws them. "
             "Or publish your own while a system runs."
         )
     x, y, heading = goal

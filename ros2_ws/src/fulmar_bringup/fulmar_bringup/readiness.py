@@ -19,15 +19,11 @@ from fulmar_ros.recorder_health import COMMANDERS
 from hardware_drivers.adapter_node import heard_class
 from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
 
-CONTROLLER_AND_RECORDER = 2  # who has to know the goal before anything moves
+CONTROLLER_AND_RECORDER = 2  # nodes that receive the goal before anything moves
 
 
 def raise_if_ended(group: ProcessGroup) -> None:
-    """Give up where a process has ended.
-
-    Raises:
-        RunFailed: With its name, how it ended and, where it gave up by itself, its last words.
-    """
+    """Raise RunFailed where a process has ended; with its name, how it ended and, after an error, its last line."""
     end = group.ended()
     if end is not None:
         words = group.last_words(end.name, ended=True) if (end.returncode or 0) > 0 else ""
@@ -35,13 +31,13 @@ def raise_if_ended(group: ProcessGroup) -> None:
 
 
 def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], None]:
-    """What to call while nodes get ready, from now on; it raises `RunFailed` where waiting has no sense any more."""
+    """A check to call while nodes get ready; it raises RunFailed once a process ended or the time is over."""
     began_s = time.monotonic()
 
     def alive() -> None:
         raise_if_ended(group)
         if time.monotonic() - began_s > START_TIMEOUT_S:
-            plant, controller = _said(overseer.plant), _said(overseer.controller)
+            plant, controller = _last_status(overseer.plant), _last_status(overseer.controller)
             raise RunFailed(
                 f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the plant said: {plant}; "
                 f"the controller said: {controller}). "
@@ -51,8 +47,8 @@ def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], No
     return alive
 
 
-def _said(report: Report) -> str:
-    """What a node said last, and when: one that is heard no more is another fault than one that has nothing new."""
+def _last_status(report: Report) -> str:
+    """Last status of a node and its age: a node that went silent has another fault than one without news."""
     if not report.received_s:
         return "nothing"
     refused = report.values.get("goal_refused")
@@ -86,12 +82,7 @@ def command_input(plan: RunPlan) -> CommandInput:
 
 
 def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
-    """Wait until a node publishes the commands that a plan waits for.
-
-    Args:
-        plan: What runs.
-        overseer: Sees who publishes.
-        alive: Called while waiting; raises to give up.
+    """Wait until a node publishes the commands of a plan; `alive` is called while waiting and raises to give up.
 
     Raises:
         RunFailed: No publisher fits within the time for it; with those that do not, and why.
@@ -128,12 +119,7 @@ def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], 
 
 
 def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
-    """Wait until a plant in lock step, which has been started, no longer waits for subscribers.
-
-    Args:
-        plan: What runs.
-        overseer: Receives what the plant reports.
-        alive: Called while waiting; raises to give up.
+    """Wait until a plant in lock step, which was started, has its subscribers; `alive` as of `wait_for_publisher`.
 
     Raises:
         RunFailed: Too few nodes subscribe its odometry within the time for it.

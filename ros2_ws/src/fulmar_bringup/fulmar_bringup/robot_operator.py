@@ -55,16 +55,16 @@ def _of_wire(node: Node, wire: Wire, topic: str) -> list[str]:
     return wire_problems(wire, topic, offers_of(node, topic), reliable=reliable)
 
 
-FIND_S = 7.0  # whose first announcements are lost announces himself again after 3 s
+FIND_S = 7.0  # a node whose first announcements are lost announces itself again after 3 s
 LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
 ASK_AGAIN_S = 0.5  # a controller says at once that it has a request
 
 
 class Operator:
-    """Finds robots by what they offer, and asks."""
+    """Finds robots by their services, and calls these."""
 
     def __init__(self, node: Node) -> None:
-        """Ask through a node that spins already."""
+        """Call through a node that spins already."""
         self._node = node
 
     def robots_with(self, service: str, robot: str | None, *, wait_s: float) -> list[str]:
@@ -76,33 +76,19 @@ class Operator:
                 found &= {namespace_of(robot)}
             if time.monotonic() > until or (found and robot is not None):
                 return sorted(found)
-            if found:  # who is found first is rarely alone: the others get a moment
+            if found:  # the first one is rarely alone: the others get a moment
                 until = min(until, time.monotonic() + SETTLE_S)
             time.sleep(LOOK_S)
 
     def ask(self, service: str) -> tuple[bool, str]:
-        """Call a Trigger service by its full name.
-
-        Returns:
-            Whether it was done, and what was said.
-
-        Raises:
-            RunFailed: No answer comes.
-        """
+        """Call a Trigger service by its full name; raises RunFailed where no answer comes."""
         answer = self.ask_all([service])[service]
         if answer is None:
-            raise RunFailed(f"nobody answers on {service} within {ANSWER_S:g} s.")
+            raise RunFailed(f"no node answers on {service} within {ANSWER_S:g} s.")
         return answer
 
     def ask_all(self, services: Sequence[str]) -> dict[str, Answer | None]:
-        """Call Trigger services by their full names, all at once.
-
-        Args:
-            services: Which.
-
-        Returns:
-            What each said; None where no answer comes within 2 s.
-        """
+        """Call Trigger services by their full names, all at once; None where no answer comes within 2 s."""
         clients = {service: self._node.create_client(Trigger, service) for service in services}
         futures: dict[str, Future] = {}
         until = time.monotonic() + ANSWER_S
@@ -133,7 +119,7 @@ class Operator:
         return came | {space: release_without_node(self._node, space) for space in sorted(without)}
 
     def running_robots_text(self) -> str:
-        """A sentence that lists the robots that are heard now."""
+        """A sentence that lists the robots that run now."""
         return running_robots_text(self._node)
 
     def look_at_wires(self) -> tuple[set[str], list[str]]:
@@ -172,7 +158,7 @@ class Operator:
         while not (status and self._takes_swaps(space)):
             if time.monotonic() > until:
                 raise RunFailed(
-                    f"no controller of '{robot}' is heard in this ROS domain. {self.running_robots_text()}"
+                    f"no controller of '{robot}' runs in this ROS domain. {self.running_robots_text()}"
                 )
             time.sleep(LOOK_S)
         before, until, asked_s = status.get("swap_requests"), time.monotonic() + answer_s, 0.0

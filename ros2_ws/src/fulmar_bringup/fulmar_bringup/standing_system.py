@@ -103,7 +103,7 @@ def plan_system(
 
 @dataclass(frozen=True)
 class Ending:
-    """How a system came down."""
+    """How a system ended."""
 
     failure: str  # why it failed; empty where it was stopped
     watchdog_trips: int | None  # of the plant; None where it has not reported any number
@@ -115,7 +115,7 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
     Args:
         request: Of `plan_system`.
         emit: Called with each event; see `SystemEvents`. The first is `started`.
-        show: Called several times a second with what a person wants to see.
+        show: Called several times a second with time, distance and mode.
 
     Returns:
         How it ended.
@@ -153,7 +153,7 @@ def _who(plan: RunPlan) -> dict[str, Any]:
 
 
 def _get_ready(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
-    """Wait for the controller, give it what stands about, and start the plant."""
+    """Wait for the controller, publish the obstacles, and start the plant."""
     external = controller_entry(plan.controller).is_external
     if external:
         wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))

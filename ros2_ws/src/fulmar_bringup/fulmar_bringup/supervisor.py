@@ -1,6 +1,6 @@
-"""The operator's side of a run: gives goal and obstacles, starts the plant when all are ready, and watches.
+"""The operator's side of a run: publishes goal and obstacles, starts the plant when all are ready, and watches.
 
-The only module of the bringup that speaks ROS while a run is on. What came of the run is read from its bag.
+The only module of the bringup that uses ROS during a run. The result of the run is read from its bag.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import ros_node
 
 START_TIMEOUT_S = 30.0
-REPEAT_S = 0.5  # after an e-stop was silent, before the goal is told once more
+REPEAT_S = 0.5  # after an e-stop was silent, before the goal is published again
 SUBSCRIBES_S = 1.0  # for an external controller that publishes already to subscribe its goal
 STOP_S = 1.0  # for a plant to come to rest when a run is stopped
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
@@ -83,18 +83,11 @@ class Supervisor:
         self._plant_service = node.create_client(ChangeState, "plant/change_state")
 
     def sees_living_plant(self) -> bool:
-        """Whether a plant of this robot is at work already; call before ours is configured.
-
-        Returns as soon as one is seen, and otherwise when this node has had `DISCOVERY_S` to discover others.
-        """
+        """Whether a plant of this robot runs already, within `DISCOVERY_S`; call before ours is configured."""
         return sees_living_plant(self._node, self._plan.namespace, since_s=self._made_s)
 
     def refuse_living_plant(self) -> None:
-        """Refuse to go on where a plant of this robot is at work already, unless it is dead.
-
-        Raises:
-            ConfigError: With its name, process and host.
-        """
+        """Raise ConfigError, with name, process and host, where a plant of this robot runs already."""
         refuse_living_plant(self._node, self._plan.namespace, since_s=self._made_s, spins=True)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -117,12 +110,12 @@ class Supervisor:
 
         A recorder may find this operator later than the controller does, and a short run would be over by then.
 
-        Velocities that follow one another are all sent now, stamped with the time when each begins: what a controller
-        tracks then hangs on the plant's clock alone.
+        Velocities in sequence are all sent now, each stamped with its begin, so that tracking depends on the plant's
+        clock alone.
 
-        An e-stop that was silent for a moment, as on a busy computer that starts many nodes, makes the controller
-        refuse the goal or forget it. It was not pressed, and nothing has moved yet: it is given again, stamped a
-        nanosecond later, since a repetition with the same stamp counts for nothing.
+        An e-stop that was silent for a moment, as on a busy computer, makes the controller refuse or forget the goal.
+        It was not pressed, and nothing has moved yet: the goal is published again, stamped a nanosecond later, since a
+        repetition with the same stamp does not count.
 
         Args:
             goal: The goal, without a batch axis.
@@ -162,10 +155,10 @@ class Supervisor:
     def _publish_parts(
         self, parts: Sequence[tuple[Goal, int]], stamps_ns: Set[int], alive: Callable[[], None]
     ) -> bool:
-        """Publish goals, each when the controller has the one before; False if a silent e-stop came between."""
+        """Publish goals, each once the controller has the one before; False if a silent e-stop came between."""
         self._sent = []
         for part, stamp in parts:
-            self.controller.values.pop("goal_refused", None)  # of what was told before
+            self.controller.values.pop("goal_refused", None)  # of earlier goals
             self._sent.append(goal_message(part, self._task.goal_topic, stamp, self._plan.frames))
             self._goal.publish(self._sent[-1])
             if not self._before_silence(partial(self._has, stamp), stamps_ns, alive):
@@ -173,7 +166,7 @@ class Supervisor:
         return True
 
     def _has(self, stamp_ns: int) -> bool:
-        """Whether the controller says that it has the goal of a time."""
+        """Whether the controller reports the goal of a stamp."""
         return self.controller.values.get("goal_stamp_ns") == str(stamp_ns)
 
     def _before_silence(
@@ -203,14 +196,9 @@ class Supervisor:
             self._obstacles.publish(self._sent_obstacles[0])
 
     def publish_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
-        """Publish a goal, with the obstacles if the task has any, to a controller that reports nothing.
+        """Publish a goal, and obstacles if the task has any, to a controller that reports nothing; as `give_goal`.
 
-        The recorder has found this operator by then. A controller that subscribes later receives both all the same.
-
-        Args:
-            goal: The goal, without a batch axis.
-            time_ns: As of `give_goal`.
-            alive: Called while waiting; raises to give up.
+        The recorder has found this operator by then, and a controller that subscribes later receives both, too.
         """
         self.wait_until(lambda: self._goal.get_subscription_count() >= SUBSCRIPTIONS, alive)
         until_s = time.monotonic() + SUBSCRIBES_S  # one that takes its goal from elsewhere never subscribes
@@ -273,12 +261,7 @@ class Supervisor:
         return (self.plant.message if self.plant.level == "error" else last_words()) or "it gave no reason"
 
     def wait_until(self, condition: Callable[[], bool], alive: Callable[[], None]) -> None:
-        """Wait for something that the nodes say.
-
-        Args:
-            condition: Looked at whenever a node said something.
-            alive: Called ten times a second; raises to give up.
-        """
+        """Wait for a condition, checked with each report; `alive` runs ten times a second and raises to give up."""
         with self._changed:
             while not self._changed.wait_for(condition, 0.1):
                 if self._errors:

@@ -1,4 +1,4 @@
-"""What happens to a running system, as events made of what its plant and controller report. Knows no ROS."""
+"""Events of a running system, from the reports of its plant and controller. Knows no ROS."""
 
 from __future__ import annotations
 
@@ -33,18 +33,12 @@ class SystemEvents:
     """
 
     def __init__(self, emit: Emit) -> None:
-        """Begin with nothing known.
-
-        Args:
-            emit: Called with each event.
-        """
+        """Begin with nothing known; `emit` is called with each event."""
         self._emit = emit
         self._goals, self._goal_s = "0", 0.0
         self._refused = ("", "0")
         self._done = 0
-        self._inside_s: float | None = (
-            None  # since when the robot is at its goal; infinite once that is reported
-        )
+        self._inside_s: float | None = None  # since when the robot is at its goal; infinite once reported
         self._controller: tuple[str, str] | None = None
         self._swap = ""
         self._held = False
@@ -52,12 +46,9 @@ class SystemEvents:
         self._faults: dict[str, str] = {}
 
     def look(self, plant: Reported, controller: Reported, time_s: float) -> None:
-        """Compare the newest reports with those before.
+        """Compare the newest reports with those before; `time_s` is the robot's own time [s].
 
-        Args:
-            plant: Of the plant.
-            controller: Of the controller; empty values where it reports nothing.
-            time_s: The robot's own time [s].
+        A controller that reports nothing has empty values.
         """
         self._look_at_estop(plant, time_s)
         if controller.values:

@@ -1,4 +1,4 @@
-"""The rows of a system: every node of a plan, in the order of its start, with whom each one waits for.
+"""The rows of a system: every node of a plan, in the order of its start, and the subscribers that each waits for.
 
 `fulmar run`, `fulmar up`, the launch file, `evaluate --through ros`, the fault suite, re-runs through a node and the
 benchmarks start these rows, or some of them.

@@ -24,8 +24,8 @@ ARGUMENTS = {
     "policy": "folder of a policy bundle",
     "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
     "topic": "topic that the adapter takes, in the place of the file's",
-    "emulate": "true: with backend hardware, an emulator speaks for the device",
-    "goals": "a file of configs/goals, without .yaml, that a node of its own tells",
+    "emulate": "true: with backend hardware, an emulator stands in for the device",
+    "goals": "a file of configs/goals, without .yaml, that a node of its own publishes",
 }
 
 

@@ -118,7 +118,7 @@ def _diagonal(stds: Sequence[float]) -> np.ndarray:
 
 
 class ImuWriter:
-    """Inertial readings per REP-145, without an orientation; a specific force of NaN is one that nobody measures."""
+    """Inertial readings per REP-145, without an orientation; a specific force of NaN is not measured."""
 
     def __init__(self, robot: Robot, frames: Frames = PLAIN) -> None:
         """Fill in what never changes."""

@@ -32,7 +32,7 @@ from fulmar_ros.runtime import RequestExit, run_node
 WATCH_S = 0.1
 STATUS_PERIOD_S = 0.5
 FLUSH = Duration(seconds=0.3)
-FRAMES = ("odom", "map", "world")  # what motion captures call the room; all with Z up
+FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
 BODY_AXES = np.ix_((0, 1, 5), (0, 1, 5))  # of a 6 × 6 covariance: x, y and yaw
 
 
@@ -97,14 +97,14 @@ class EstimatorNode(Node):
             message.linear_acceleration_covariance[0] == -1.0
             or message.angular_velocity_covariance[0] == -1.0
         ):
-            return  # REP-145: it says itself that it has none
+            return  # REP-145: marks fields that are absent
         a, w = message.linear_acceleration, message.angular_velocity
         sample = ImuSample(np.array([a.x, a.y, a.z]), np.array([w.x, w.y, w.z]))
         with self._lock:
             self._take(self._estimator.see_imu(sample, stamp_ns(message.header.stamp)))
 
     def _take(self, problem: str) -> None:
-        """Publish what is believed now, if it is newer than what was; call with the lock held."""
+        """Publish the estimate, if it is newer than the last one; call with the lock held."""
         if not self._prior:
             take_priority_with_helpers(CONTROL_PRIORITY)  # a controller waits for us
             self._prior = True
@@ -153,7 +153,7 @@ class EstimatorNode(Node):
         self._health.publish("warn" if problem else "ok", problem or "estimating", values)
 
     def stop(self) -> None:
-        """Nothing to close: whoever hears no odometry stops by itself."""
+        """Wait for the last odometry to arrive; nodes that receive none stop by themselves."""
         self._publisher.wait_for_all_acked(FLUSH)
 
 

@@ -50,7 +50,7 @@ class EstopNode(Node):
     """Publishes ten times a second whether the button is pressed; nodes that no longer receive it stop the robot."""
 
     def __init__(self, _request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
-        """Begin to say it.
+        """Begin to publish.
 
         Args:
             cli_args: ROS arguments of this node alone, where it shares a process.
@@ -83,8 +83,8 @@ class EstopNode(Node):
         self.create_service(Trigger, ESTOP_TRIGGER, self._trigger)
         self.create_service(Trigger, ESTOP_RESET, self._reset)
         self._prior = False
-        # The first word comes with the first beat: one from here, before anybody spins us, would be followed by a
-        # silence that takes goals away.
+        # The first message comes with the first beat: one from here, before the node spins, would be followed by a
+        # silence that cancels goals.
         self.create_timer(1.0 / REPUBLISH_HZ, self._beat, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_command(self, source: str, message: JointState) -> None:
@@ -96,7 +96,7 @@ class EstopNode(Node):
         self._button.hear_command(VELOCITY_COMMAND.name, zero, time.monotonic_ns())
 
     def _on_estop(self, message: Bool, info: dict[str, Any]) -> None:
-        """Latch a press by any other publisher; what it says besides does not count."""
+        """Latch a press by any other publisher, whose other messages do not count."""
         if not message.data or self._is_own(info) or self._button.pressed:
             return
         self._button.press()
@@ -142,7 +142,7 @@ class EstopNode(Node):
             self._health.publish(level, words, {"pressed": str(pressed).lower()})
 
     def stop(self) -> None:
-        """Last word before the process ends: pressed. Silence would say the same, half a second later."""
+        """Publish a last press before the process ends; silence would do the same half a second later."""
         self._button.press()
         self._publish()
         self._publisher.wait_for_all_acked(FLUSH)

@@ -1,4 +1,4 @@
-"""The node `goals`: tells a robot, from a file, where to go or how to move, and watches how far it comes."""
+"""The node `goals`: publishes goals from a file, one after another, and reports progress."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
-PATIENCE_S = 3.0  # for the first odometry and for somebody who listens, before a person is told
+PATIENCE_S = 3.0  # for the first odometry and the first subscriber, before a warning
 WATCH_S = 0.1
 STATUS_PERIOD_S = 0.5  # at least 1 Hz
 FLUSH = Duration(seconds=0.5)
@@ -46,11 +46,11 @@ class GoalSettings:
     goals: str = "lab_pose"  # name of a file in configs/goals, or a path that ends in .yaml
     robot: str = "floating_platform"
     control_hz: float = 10.0  # goals come at most so often in the robot's own time [Hz]
-    as_path: bool = False  # tell all positions or poses at once
+    as_path: bool = False  # publish all positions or poses at once
     input_timeout_s: float = 0.5  # without usable odometry, before a robot shall stand still, at rate 1 [s]
     rate: float = 1.0  # seconds of the robot's own time a wall-clock second
-    lockstep: bool = False  # tell the goal with each odometry: plant and controller wait for it
-    stay: bool = False  # go on when everything is done, until told to stop
+    lockstep: bool = False  # publish the goal with each odometry: plant and controller wait for it
+    stay: bool = False  # go on when everything is done, until stopped
     # End with exit code 1 when so long after the start there is no usable odometry, or no subscriber; 0: wait [s].
     give_up_s: float = 0.0
 
@@ -92,7 +92,7 @@ class GoalNode(Node):
         self._title = goals.title
         self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
         self._request_exit = request_exit
-        self._gate = InputGate(robot.limits, frozen_after=0)  # whether a sensor is stuck, controllers judge
+        self._gate = InputGate(robot.limits, frozen_after=0)  # controllers check for stuck sensors
         self._lock = threading.Lock()
         self._sent: Goal | None = None
         self._newest: Measurement | None = None
@@ -103,9 +103,7 @@ class GoalNode(Node):
         self._said, self._said_at = "", 0.0
         self._problem, self._stale, self._over = "", False, False
         self._alone_checked = False
-        self._subscribers_checked = (
-            self._settings.stay
-        )  # whoever starts all nodes together knows that somebody will listen
+        self._subscribers_checked = self._settings.stay  # nodes that start together subscribe each other
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
         self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
@@ -127,9 +125,7 @@ class GoalNode(Node):
             if self._over or problem:
                 self._problem = problem or ""
                 if self._settings.lockstep and self._sent is not None and not self._over:
-                    self._publish_goal(
-                        self._sent, measurement.stamp_ns
-                    )  # others wait for a goal with this very stamp
+                    self._publish_goal(self._sent, measurement.stamp_ns)  # others wait for this stamp
                 return
             was_done = self._sequence.done
             self._resume(measurement)
@@ -181,7 +177,7 @@ class GoalNode(Node):
         if self._sequence.topic == "goal_path":
             return "done: one round is over; the controller goes round until another goal comes"
         if self._sequence.topic == "goal_velocity":
-            return "done: the robot is told to stand still"
+            return "done: the robot stands still"
         return "done: the robot stays until another goal comes"
 
     def _watch(self) -> None:
@@ -192,14 +188,12 @@ class GoalNode(Node):
             now = time.monotonic()
             limit_s = self._timeout_s if self._newest else PATIENCE_S
             late = now - self._usable_at > limit_s and not self._settings.lockstep
-            late = late and not (
-                self._newest is None and self._settings.give_up_s
-            )  # that ends with a line of its own
+            late = late and (self._newest is not None or not self._settings.give_up_s)  # that has its own end
             if late and not self._stale and not self._over:
                 self._stale = True
                 self._pause()
         if not self._subscribers_checked and now - self._began > PATIENCE_S:
-            self._subscribers_checked = True  # told once
+            self._subscribers_checked = True  # once
             if not self._settings.give_up_s and (alone := self._without_subscriber()):
                 self.get_logger().warning(alone)
 
@@ -229,11 +223,11 @@ class GoalNode(Node):
             self.get_logger().warning(f"waiting for odometry: {reason}")
             return
         stands = self._stand_still()
-        then = "the robot is told to stand still" if stands else "the goal stays as it is"
+        then = "the goal is standstill" if stands else "the goal stays as it is"
         self.get_logger().warning(f"no usable odometry for {self._timeout_s:g} s ({reason}): {then}")
 
     def _stand_still(self) -> bool:
-        """End a velocity that was told; other goals need no end."""
+        """End a velocity goal; other goals need no end."""
         if self._sequence.topic != "goal_velocity" or self._sent is None or self._newest is None:
             return False
         self._publish_goal(STANDSTILL, self._newest.stamp_ns)
@@ -254,7 +248,7 @@ class GoalNode(Node):
         return any(info.node_name != "recorder" for info in self.get_subscriptions_info_by_topic(topic))
 
     def stop(self) -> None:
-        """Last words: a robot that was told a velocity is told to stand still."""
+        """Publish standstill after a velocity goal."""
         with self._lock:
             if not self._over:
                 self._stand_still()
@@ -267,7 +261,7 @@ def _topic_of(task: str) -> str:
 
 
 def main() -> None:
-    """Tell goals until they are done, or until told to stop."""
+    """Publish goals until they are done, or until stopped."""
     sys.exit(run_node(GoalNode))
 
 

@@ -34,11 +34,11 @@ class PlantSettings:
     duration_s: float = 0.0  # simulated time after which the plant stops; 0: never [s]
     command_timeout_s: float = BY_RATE  # 0 switches the watchdog off
     answer_timeout_s: float = 5.0  # longest wait for a controller in lock step [s]
-    wait_for_subscribers: int = 0  # of odom, or of what an estimator is told, before the first step
+    wait_for_subscribers: int = 0  # of odom, or of an estimator's inputs, before the first step
     estimated: bool = False  # publish mocap/pose in the place of odom: an estimator makes odom of it
     mocap_hz: float = 0.0  # publish mocap/pose so often, also beside odom; 0: at every tick in its place [Hz]
     mocap_late_s: float = 0.0  # by which a pose is stamped and sent after its capture [s]
-    estop: bool = False  # nothing moves before an e-stop is heard
+    estop: bool = False  # nothing moves before a message of an e-stop
     autostart: bool = True
 
     def __post_init__(self) -> None:

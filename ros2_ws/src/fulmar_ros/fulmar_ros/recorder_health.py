@@ -1,4 +1,4 @@
-"""What a recorder says about itself on the diagnostics, once a second and so into the bag too."""
+"""Diagnostics of a recorder, once a second, and so in the bag too."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fulmar_ros.health import Health
 
 PERIOD_S = 1.0
 COMMANDERS = "command_publishers"  # key of the publishers of commands that the recorder is matched with
-LITTLE_ROOM = 200_000_000  # bytes free on the disk; below, it is told before it is full
+LITTLE_ROOM = 200_000_000  # bytes free on the disk; below, it is a warning
 
 
 class RecorderHealth:
@@ -35,9 +35,9 @@ class RecorderHealth:
             node: Publishes and keeps the time.
             robot: Name of the robot.
             directory: The bag; its disk is watched.
-            account: Asked once a second.
+            account: The account of the recording now.
             mode: What the recorder is doing, in a word or two.
-            commanders: Publishers of commands whose messages reach the recorder.
+            commanders: Number of publishers of commands that the recorder is matched with.
         """
         self._commanders = commanders
         self._account, self._mode, self._directory = account, mode, directory
@@ -65,15 +65,7 @@ class RecorderHealth:
 
 
 def status_of(account: Account, free_bytes: int) -> tuple[str, str]:
-    """Level and words for an account.
-
-    Args:
-        account: Of a recording that goes on.
-        free_bytes: Room on its disk.
-
-    Returns:
-        `ok`, `warn` or `error`, and what is wrong; empty if nothing is.
-    """
+    """Level (`ok`, `warn` or `error`) and problem, empty if there is none, of an account and the room on its disk."""
     dropped = sum(account.dropped.values())
     lost = f"; {dropped} messages were dropped" if dropped else ""
     if account.problem:

@@ -76,8 +76,8 @@ class RecorderNode(Node):
             lambda: self._mode,
             lambda: sum(each.get_publisher_count() for each in commands),
         )
-        told = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
-        sys.stdout.write(f"{told} {self._directory}\n")
+        doing = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
+        sys.stdout.write(f"{doing} {self._directory}\n")
         sys.stdout.flush()
 
     @property
@@ -118,7 +118,7 @@ class RecorderNode(Node):
         return {topic: wire.latest for wire, topic in self._topics.items() if wire.delivery == "latched"}
 
     def _new_ring(self) -> BagRing:
-        """A ring; that no bag could be written is told now, not at the fault.
+        """A ring; a folder that cannot be written is refused now, not at the fault.
 
         Raises:
             BagError: If it could not.
@@ -141,12 +141,12 @@ class RecorderNode(Node):
         return lambda data: put(topic, data, time.time_ns())
 
     def _attach_provenance(self) -> None:
-        """Tell the code and the packages; git and a slow disk may take seconds, in which messages come already."""
+        """Attach code version and packages; git and a slow disk may take seconds, while messages come already."""
         for name, data in attachments().items():
             self._thread.attach(name, data)
 
     def stop(self) -> int:
-        """Wait until nothing more comes, close the bag, and say what is in it."""
+        """Wait until no more messages come, close the bag, and print its content."""
         self._provenance.join(LONGEST_GOODBYE_S)
         deadline = time.monotonic() + LONGEST_GOODBYE_S
         before = -1
@@ -178,7 +178,7 @@ def _message_class(wire: Wire) -> type | None:
 
 
 def main() -> None:
-    """Record until told to stop."""
+    """Record until stopped."""
     sys.exit(run_node(RecorderNode))
 
 

@@ -1,7 +1,7 @@
-"""How every node process lives: start, spin, stop in order, and an exit code that says how it went.
+"""Life cycle of every node process: start, spin, orderly stop, and exit code.
 
 The only home of `rclpy.init` and of spinning. The executor spins in a thread of its own, so that the main
-thread is free for signals and for a control loop's last words.
+thread is free for signals and for the last messages of a control loop.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
 def end_with_parent() -> None:
     """Ask the kernel for SIGINT when the launcher that started us dies, so that no node is left behind.
 
-    Only for children that were told their launcher's id; a node that a person started outlives the shell as usual.
+    Only for children with their launcher's id in the environment; a node that a person started outlives the shell.
     """
     parent = os.environ.get("FULMAR_PARENT_PID", "")
     if parent.isdecimal():
@@ -133,7 +133,7 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
             # which burns a core and starves the timers. A finite wait in a loop does what spin() should.
             while not over.done():
                 executor.spin_until_future_complete(over, timeout_sec=SPIN_S)
-        except Exception as error:  # noqa: BLE001 - whatever a callback raises is the owner's to judge
+        except Exception as error:  # noqa: BLE001 - whatever a callback raises, the owner decides
             # The node may have been destroyed below a callback that took too long to end.
             if not (over.done() and isinstance(error, InvalidHandle)):
                 on_error(error)

@@ -1,4 +1,4 @@
-"""One commissioning from start to finish: driver up, wires pulsed, driver down, findings."""
+"""One commissioning: start the driver, pulse the wires, stop the driver, report the findings."""
 
 from __future__ import annotations
 
@@ -49,14 +49,7 @@ class Request:
 
 
 def commission(request: Request, say: Say) -> dict[str, Any]:
-    """Click or pulse every wire of a robot.
-
-    Args:
-        request: What to do.
-        say: Prints progress.
-
-    Returns:
-        Findings, as `fulmar commission --json` prints them.
+    """Click or pulse every wire of a robot; returns the findings as `fulmar commission --json` prints them.
 
     Raises:
         ConfigError: The hardware file is wrong, or another run uses this ROS domain.
@@ -167,32 +160,22 @@ def _findings(robot: Robot, hardware: Hardware, outcome: Outcome, *, flipped: bo
 
 
 def is_right(hardware: Hardware, emulated: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
-    """Whether the findings are what the emulated wiring is.
-
-    Args:
-        hardware: The file that the driver believed.
-        emulated: Parameters of the emulator.
-        found: Findings.
-    """
+    """Whether the findings are the emulated wiring, by the hardware file and the parameters of the emulator."""
     driver = hardware.driver
     names = actuator_names(load_robot(hardware.robot))
     dead = [int(wire) for wire in emulated.get("dead", [])]
     if isinstance(driver, GpioValves) or "inverted" in emulated:
-        inverted = emulated.get("active_low", getattr(driver, "active_low", None)) != getattr(
-            driver, "active_low", None
-        ) or bool(emulated.get("inverted"))
+        level = getattr(driver, "active_low", None)
+        inverted = emulated.get("active_low", level) != level or bool(emulated.get("inverted"))
         if inverted != found["inverted"]:
             return False
         if emulated.get("inverted"):
             return not found["success"]
-    truth = (
-        [names[thruster] for thruster in emulated["order"]]
-        if "order" in emulated
-        else [
-            ("-" if "-" in side else "") + names[SIDES.index(side.removeprefix("-"))]
-            for side in emulated["sides"]
-        ]
-    )
+    if "order" in emulated:
+        truth = [names[thruster] for thruster in emulated["order"]]
+    else:
+        sides = [("-" * ("-" in side), SIDES.index(side.removeprefix("-"))) for side in emulated["sides"]]
+        truth = [sign + names[side] for sign, side in sides]
     return all(
         wire["drives"] == (None if number in dead else truth[number])
         for number, wire in enumerate(found["wires"])
@@ -229,13 +212,7 @@ def _emulation(hardware: Hardware, folder: Path, request: Request) -> Emulation:
 
 
 def rewired(hardware: Hardware, wiring: str, seed: int) -> Mapping[str, Any]:
-    """Parameters of an emulator whose wiring is not that of the file.
-
-    Args:
-        hardware: The file.
-        wiring: One of WIRINGS.
-        seed: Which shuffle, which dead wire.
-    """
+    """Parameters of an emulator with one of WIRINGS; the seed draws the shuffle or the dead wire."""
     rng, count = random.Random(seed), len(wires_of(hardware))
     valves = hardware.opens_valves
     if wiring == "dead":

@@ -45,15 +45,9 @@ def wires_of(hardware: Hardware) -> list[Wire]:
 
 
 def command_of(robot: Robot, wire: Wire, level: float = 1.0) -> np.ndarray:
-    """The robot's command that gives one wire a positive value and the others none.
+    """The robot's command, shape (n,), that gives one wire a positive value and the others none.
 
-    Args:
-        robot: The robot.
-        wire: Which output.
-        level: Share of full thrust of a propeller; wheels and valves know one level.
-
-    Returns:
-        Shape (n,).
+    `level` is the share of full thrust of a propeller; wheels and valves have one level.
     """
     actuators = robot.actuators
     if isinstance(actuators, Thrusters):
@@ -78,15 +72,9 @@ def line_of(key: str, values: Sequence[object]) -> str:
 
 
 def with_line(text: str, key: str, values: Sequence[object]) -> str:
-    """A hardware file with another value of one key; everything else stays, comments too.
+    """Text of a hardware file with other values of `order` or `wiring`, below `driver`.
 
-    Args:
-        text: The file.
-        key: `order` or `wiring`, below `driver`.
-        values: Its new entries.
-
-    Returns:
-        The new text; the comment behind a replaced value goes, since it spoke of the old one.
+    Everything else stays, comments too, but for the comment behind the replaced value.
 
     Raises:
         ConfigError: The file is written in a way that no line can be replaced in.
