@@ -42,7 +42,7 @@ RequestExit = Callable[[int], None]
 
 
 def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | None = None) -> int:
-    """Build one node, spin it until it is told to stop, and stop it in order.
+    """Build one node, spin it until it is stopped, and stop it in order.
 
     SIGINT, SIGTERM, SIGQUIT and, unless `nohup` had it ignored, SIGHUP (the terminal or the ssh connection is gone) ask
     for an orderly end with exit code 0. A node may have a method `stop()`: it is
