@@ -40,7 +40,7 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         (
             ["run", "turtlebot2", "--task", "race_waypoints", "--controller", "classical", "--goal", "1,2,0"],
-            "the targets of task 'race_waypoints' cannot be said in one --goal",
+            "the targets of task 'race_waypoints' do not fit into one --goal",
         ),
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         (
@@ -50,7 +50,7 @@ def broken_configs(tmp_path, monkeypatch):
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
         ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
-        ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device neither waits nor hurries"),
+        ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device runs in real time"),
         (["commission", "turtlebot3"], "Did you mean 'turtlebot2'?"),
         (["commission", "turtlebot2"], "no valves to click: each pulse moves it. Give --yes"),
         (["commission", "zero_g_lab", "--write"], "--write and --out need --yes"),

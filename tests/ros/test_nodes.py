@@ -14,7 +14,6 @@ from rclpy.node import Node
 
 from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import (
-    RunPlan,
     controller_spec,
     emulator_spec,
     goals_spec,
@@ -23,6 +22,7 @@ from fulmar_bringup.node_table import (
     recorder_spec,
     run_goals_spec,
 )
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import ConfigError
