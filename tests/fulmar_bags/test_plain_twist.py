@@ -13,7 +13,7 @@ from fulmar_bags.control_steps import course_of
 from fulmar_bags.plain_twist import answers_within
 from fulmar_bags.received import ABSENT
 from fulmar_cli.main import app
-from fulmar_evaluation.report.bag_plots import write_pictures
+from fulmar_evaluation.report.bag_plots import write_bag_report
 from tests.foreign_bag import write_foreign
 
 
@@ -35,7 +35,7 @@ def test_rerun_compares_them(tmp_path):
 
 def test_a_plot_shows_them_under_their_topic(tmp_path):
     bag = open_bag(write_foreign(tmp_path / "bag", StoragePlugin.MCAP, commands=True))
-    page = write_pictures(bag, tmp_path / "plot.html").read_text()
+    page = write_bag_report(bag, tmp_path / "plot.html").read_text()
     assert "What the actuators did: /cmd_vel" in page
 
 

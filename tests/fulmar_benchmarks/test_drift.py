@@ -11,12 +11,19 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from fulmar_benchmarks.cells import BAD, GOOD
-from fulmar_benchmarks.drift.asked import ASKED, requirements
 from fulmar_benchmarks.drift.cells import path_lines, pose_lines, unmet
 from fulmar_benchmarks.drift.conditions import CONDITIONS, CONTROLLERS, PATHS, ROWS
-from fulmar_benchmarks.drift.drop import BANDS, band_of, drop_percent
-from fulmar_benchmarks.drift.published import FIGURES, TRACKING, published
 from fulmar_benchmarks.drift.tables import print_tables
+from fulmar_benchmarks.drift.targets import (
+    ASKED,
+    BANDS,
+    FIGURES,
+    TRACKING,
+    band_of,
+    drop_percent,
+    published,
+    requirements,
+)
 from fulmar_cli.main import app
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import UnknownNameError

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.drift.approach_bound import approach_bound
-from fulmar_benchmarks.drift.holdable_episodes import can_hold_episodes
+from fulmar_benchmarks.drift.bounds import approach_bound, can_hold_episodes
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
 from fulmar_core.errors import ConfigError

@@ -9,11 +9,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.outcomes import QUANTILES, Judged
 from fulmar_benchmarks.pairs import Pair
-from fulmar_benchmarks.roboran.campaign import Findings, document_of
+from fulmar_benchmarks.results import QUANTILES, PairResult
+from fulmar_benchmarks.roboran.campaign import CampaignResult, document_of
 from fulmar_benchmarks.roboran.document import pair_entry
-from fulmar_benchmarks.roboran.published import ROBOTS, TASKS
+from fulmar_benchmarks.roboran.targets import ROBOTS, TASKS
 from fulmar_benchmarks.unit import KEPT
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
@@ -53,7 +53,7 @@ class Page(HTMLParser):
         self.words.append(data)
 
 
-def outcome(robot, task, way, rng) -> Judged:
+def outcome(robot, task, way, rng) -> PairResult:
     """Numbers at random, of the right shapes."""
     the_robot, the_task = load_robot(robot), load_task(task)
     steps, dt = 60, 1.0
@@ -68,7 +68,7 @@ def outcome(robot, task, way, rng) -> Judged:
         "control_dt": dt, "control_hz": 1.0, "episode_s": 60.0, "wall_s": 1.0, "control_steps": 1, "seed": 1,
         "scenario": "nominal", "same_at_64_worlds": True, "thousand_steps_s": 1000.0, "bound": "a bound",
     }  # fmt: skip
-    return Judged(
+    return PairResult(
         about=about if task == "go_through_positions" else {k: v for k, v in about.items() if k != "bound"},
         succeeded=rng.uniform(size=EPISODES) < 0.97,
         figures=figures,
@@ -103,7 +103,7 @@ def findings():
         command="fulmar x",
         wall_s=1.0,
     )
-    return Findings(document, list(outcomes), outcomes)
+    return CampaignResult(document, list(outcomes), outcomes)
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +152,7 @@ def test_a_task_that_nobody_did_has_no_pictures(findings, tmp_path):
     pair = Pair("turtlebot2", "go_to_pose", "policy", reason="no policy is shipped")
     entries = [pair_entry(pair, {})]
     document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.1)
-    page = write_report(Findings(document, [pair], {pair: {}}), tmp_path)
+    page = write_report(CampaignResult(document, [pair], {pair: {}}), tmp_path)
     assert "no policy is shipped" in page.read_text()
     assert len(list((tmp_path / "pictures").iterdir())) == 1
 

@@ -13,7 +13,7 @@ from fulmar_bags.run_reader import read_run
 from fulmar_core.topics import ODOMETRY
 from fulmar_evaluation.report.actuator_plot import open_spans
 from fulmar_evaluation.report.bag_plots import _drawings
-from fulmar_evaluation.run_evaluation import judge
+from fulmar_evaluation.run_evaluation import evaluate_run
 from tests.fulmar_cli.bag_commands import BAGS, POLICY, answer, ask
 
 
@@ -33,7 +33,7 @@ def test_a_bag_without_what_was_applied_is_plotted_with_what_was_commanded(name)
     record = read_run(BAGS / name)
     assert not len(record.applied)
     np.testing.assert_array_equal(record.actuation.effort, record.commanded.effort)
-    assert judge(record).run.shares.any()
+    assert evaluate_run(record).run.shares.any()
     assert any(open_spans(record, row) for row in range(len(record.actuation.names)))
 
 

@@ -19,7 +19,7 @@ ASKED = ("mass", "yaw_inertia", "thrust")
 
 
 @pytest.fixture(scope="module")
-def judged(tmp_path_factory):
+def evaluated(tmp_path_factory):
     """A platform that drove for a minute with and without ballast: what the benchmark says, and its bags."""
     home = tmp_path_factory.mktemp("bags")
     return run_trial(

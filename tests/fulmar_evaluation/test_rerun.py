@@ -27,7 +27,7 @@ from fulmar_evaluation.rerun import live_node
 from fulmar_evaluation.rerun.calibration import calibrated_as
 from fulmar_evaluation.rerun.reference_bags import TOLERANCES
 from fulmar_evaluation.rerun.rerun import rerun
-from fulmar_evaluation.rerun.rerun_result import FIELDS, judge_answers
+from fulmar_evaluation.rerun.rerun_result import FIELDS, compare_answers
 from policy_server.controllers import Choice, load_controller
 from policy_server.shipped import shipped_policy
 from tests.foreign_bag import write_foreign
@@ -44,7 +44,7 @@ def answered(bag: Path, controller: str, source: str = "observations", course=No
     loaded = load_controller(controller, course.robot, course.task, Choice(hz, str(folder)))
     # Another processor rounds a sine otherwise, of which observations are made anew.
     limits = TOLERANCES if source == "odometry" else EXACT
-    return judge_answers(course, rerun(course, loaded, source=source), limits)
+    return compare_answers(course, rerun(course, loaded, source=source), limits)
 
 
 def ask(*words: str) -> tuple[int, dict]:

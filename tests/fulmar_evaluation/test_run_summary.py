@@ -15,7 +15,7 @@ from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import BagError
 from fulmar_core.rotation import yaw_of
 from fulmar_core.tasks import load_task
-from fulmar_evaluation.run_evaluation import _goals, judge
+from fulmar_evaluation.run_evaluation import _goals, evaluate_run
 from fulmar_evaluation.run_summary import summarise
 from tests.synthetic_run import Plan, write_run
 
@@ -54,12 +54,12 @@ def test_times_count_from_the_first_state_as_they_do_for_steps_in_metrics(reache
     position = np.hypot(*record.truth.position[:, :2].T)
     heading = np.abs(np.rad2deg(yaw_of(record.truth.quat_xyzw)))
     outside = np.flatnonzero((position > 0.1) | (heading > 10.0))
-    judgement = judge(record)
-    assert judgement.figure("time_to_target_s") == pytest.approx(0.02 * (outside[-1] + 1), abs=1e-6)
-    assert judgement.time_s[[0, -1]] == pytest.approx([0.02, 40.0])
-    assert judgement.duration_s == pytest.approx(40.0)
-    np.testing.assert_allclose(judgement.run.position_error[0], position[1:], rtol=1e-6)
-    np.testing.assert_allclose(judgement.run.actuators_in_use[0], record.applied.effort[:-1].mean(axis=1))
+    result = evaluate_run(record)
+    assert result.figure("time_to_target_s") == pytest.approx(0.02 * (outside[-1] + 1), abs=1e-6)
+    assert result.time_s[[0, -1]] == pytest.approx([0.02, 40.0])
+    assert result.duration_s == pytest.approx(40.0)
+    np.testing.assert_allclose(result.run.position_error[0], position[1:], rtol=1e-6)
+    np.testing.assert_allclose(result.run.actuators_in_use[0], record.applied.effort[:-1].mean(axis=1))
 
 
 def test_a_run_of_exactly_the_window_is_long_enough_whatever_its_stamps_round_to(reached):
@@ -69,9 +69,9 @@ def test_a_run_of_exactly_the_window_is_long_enough_whatever_its_stamps_round_to
     firsts = [first for first in at_goal if stamps[first + 200] - stamps[first] < 4.0]
     assert firsts, "some differences of stamps round to less than 4 s"
     window = slice(firsts[0], firsts[0] + 201)
-    assert judge(dataclasses.replace(record, truth=pick(record.truth, window))).success
+    assert evaluate_run(dataclasses.replace(record, truth=pick(record.truth, window))).success
     shorter = slice(firsts[0], firsts[0] + 200)
-    assert not judge(dataclasses.replace(record, truth=pick(record.truth, shorter))).success
+    assert not evaluate_run(dataclasses.replace(record, truth=pick(record.truth, shorter))).success
 
 
 def before_the_start(record, count):
@@ -141,10 +141,10 @@ def test_a_run_shorter_than_the_window_is_no_success(tmp_path):
 
 def test_leaving_the_tolerance_once_in_the_window_is_no_success(reached):
     record = read_run(reached)
-    assert judge(record).success
+    assert evaluate_run(record).success
     position = record.truth.position.copy()
     position[-100, 0] += 0.15
-    assert not judge(
+    assert not evaluate_run(
         dataclasses.replace(record, truth=dataclasses.replace(record.truth, position=position))
     ).success
 
@@ -156,7 +156,7 @@ def test_lost_samples_do_not_shift_the_window(reached):
     fields = {
         field.name: getattr(record.truth, field.name)[kept] for field in dataclasses.fields(record.truth)
     }
-    thinned = judge(dataclasses.replace(record, truth=type(record.truth)(**fields)))
+    thinned = evaluate_run(dataclasses.replace(record, truth=type(record.truth)(**fields)))
     assert thinned.duration_s == pytest.approx(40.0)
     assert thinned.run.control_dt == pytest.approx(0.02)
     assert thinned.success
@@ -219,7 +219,7 @@ def test_gates_are_counted_from_the_robot_s_own_way(tmp_path):
     plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "race_waypoints"}, duration_s=60.0)
     record = read_run(write_run(tmp_path / "bag", plan))
     as_gates = dataclasses.replace(record, info={**record.info, "task": "race_gates"})
-    assert judge(as_gates).figure("goals_reached") >= 1.0
+    assert evaluate_run(as_gates).figure("goals_reached") >= 1.0
 
 
 def test_a_goal_that_is_repeated_with_its_stamp_is_the_same_goal(reached):
@@ -237,8 +237,8 @@ def test_a_velocity_is_judged_against_the_target_of_its_time(tmp_path):
     plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "track_velocities"}, duration_s=30.0)
     record = read_run(write_run(tmp_path / "bag", plan))
     assert [goal.targets.shape for goal in record.goals] == [(1, 3)] * 3
-    judgement, summary = judge(record), summarise(record)
-    assert judgement.run.goals[0, [0, -1]].tolist() == [0.0, 2.0]
+    result, summary = evaluate_run(record), summarise(record)
+    assert result.run.goals[0, [0, -1]].tolist() == [0.0, 2.0]
     assert 0.0 < summary["velocity_error_m_s"] < 0.2
     assert 0.0 < summary["yaw_rate_error_deg_s"] < 20.0
     assert summary["final_position_error_m"] is summary["final_heading_error_deg"] is None

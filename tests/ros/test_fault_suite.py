@@ -10,9 +10,8 @@ import pytest
 from fulmar_cli.commands.faults import names_in
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_evaluation.faults import network_faults
-from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import request_of
-from fulmar_evaluation.faults.fault_result import Outcome, stopped
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
 from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults
 from tests.conftest import RosDomain
@@ -103,7 +102,7 @@ def test_a_fault_that_cannot_be_done_says_so_and_loses_no_other(ros_domain: RosD
 
     fault = Fault(impossible, begins=False)
     found = run_faults("turtlebot2", [fault, fault], lambda _done: None)
-    assert [finding.verdict for finding in found] == ["not done", "not done"]
+    assert [finding.status for finding in found] == ["not done", "not done"]
     assert not any(finding.passed for finding in found)
     assert found[0].reaction == "ZeroDivisionError: no way"
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.pools import ended_with_us, one_thread_each
+from fulmar_benchmarks.workers import ended_with_us, one_thread_each
 from tests.benchmarks.identification.trial import Trial, run_trial
 
 ASKED = ("mass", "yaw_inertia", "thrust")  # of platforms

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fulmar_benchmarks.bound_file import cached_bound
-from fulmar_benchmarks.outcomes import QUANTILES, Judged
-from fulmar_benchmarks.roboran.published import CONTROL_HZ, GOAL_STEPS
+from fulmar_benchmarks.results import QUANTILES, PairResult, cached_bound
+from fulmar_benchmarks.roboran.targets import CONTROL_HZ, GOAL_STEPS
 from fulmar_core.episode import Episode, episode_steps
 from fulmar_core.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.planar import wrapped
@@ -83,16 +82,16 @@ class Unit:
         steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
         return steps * STEP_COSTS[self.trial.through]
 
-    def done_before(self) -> Judged | None:
+    def done_before(self) -> PairResult | None:
         """The outcome of an earlier run with the same key, if there is one."""
         try:
-            judged = Judged.load(self.path)
+            judged = PairResult.load(self.path)
         except (OSError, ValueError, KeyError):
             return None
         return judged if judged.about.get("key") == self.key else None
 
 
-def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, Judged]:
+def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, PairResult]:
     """What is known of some units from earlier runs.
 
     Args:
@@ -109,7 +108,9 @@ def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, Judged]:
     return known
 
 
-def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None) -> Judged:
+def run_unit(
+    unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
+) -> PairResult:
     """Run and judge a unit, and keep the outcome in its file.
 
     Args:
@@ -141,7 +142,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         about["same_at_64_worlds"], about["compared_episodes"] = _same_with_few_worlds(unit.trial, figures)
     about["wall_s"] = time.monotonic() - began
     sample = drawn[slice(0, KEPT)]  # type: ignore[index]
-    outcome = Judged(
+    outcome = PairResult(
         about=about,
         succeeded=tally.succeeded,
         figures=figures,

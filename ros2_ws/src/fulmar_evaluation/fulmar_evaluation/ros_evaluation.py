@@ -235,7 +235,7 @@ def _episodes(
         episode = draw_episode(robot, task, scenario, seed=plan.seed, number=number)
         # The same instant twice would be the same goal: the clock moves on between episodes.
         plant.clock.advance(control_dt)
-        judge = Judge(task, episode.goal, control_dt)
+        counter = Judge(task, episode.goal, control_dt)
         truths: list[PlanarState] = []
         goals: list[Goal] = []
         commands: list[np.ndarray] = []
@@ -243,14 +243,14 @@ def _episodes(
         def on_step(
             sample: Sample,
             command: np.ndarray,
-            judge: Judge = judge,
+            counter: Judge = counter,
             truths: list[PlanarState] = truths,
             goals: list[Goal] = goals,
             commands: list[np.ndarray] = commands,
         ) -> None:
             assert sample.truth is not None
             truths.append(planar_of(sample.truth))
-            goals.append(judge.see(truths[-1], sample.things))
+            goals.append(counter.see(truths[-1], sample.things))
             commands.append(np.array(command))
 
         with _goal_told(plan, episode, plant, overseer, group, alive):

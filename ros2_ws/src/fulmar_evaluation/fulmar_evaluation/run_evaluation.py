@@ -24,7 +24,7 @@ LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its s
 
 
 @dataclass(frozen=True)
-class Judgement:
+class RunResult:
     """What the task says about a run; times count from its first state.
 
     As in `fulmar_core.metrics`, a step is the state at its end: the first state itself is none.
@@ -89,14 +89,14 @@ class Judgement:
         return float(value) if np.isfinite(value) else None
 
 
-def judge(record: RunRecord) -> Judgement | None:
+def evaluate_run(record: RunRecord) -> RunResult | None:
     """Judge a run by its task.
 
     Args:
         record: The run.
 
     Returns:
-        The judgement; None if the record has fewer than two states.
+        The result; None if the record has fewer than two states.
 
     Raises:
         BagError: The record names no task or no goal.
@@ -120,7 +120,7 @@ def judge(record: RunRecord) -> Judgement | None:
     run = Trajectories(
         **{name: np.swapaxes(getattr(columns, name), 0, 1) for name in COLUMNS}, control_dt=float(time_s[0])
     )
-    return Judgement(
+    return RunResult(
         robot=robot,
         task=task,
         targets=goals[-1].targets,
@@ -213,17 +213,17 @@ def _goals_at(
     unseen = np.stack((states.x, states.y, states.yaw), axis=-1)
     things = {thing.name: unseen for thing in task.things} | things
     counted: list[Goal] = []
-    number, before, judge = -1, 0.0, None
+    number, before, counter = -1, 0.0, None
     last = first
     for step, which in enumerate(newest):
-        if judge is None or which != number:
-            if judge is not None:  # what was reached so far counts on; of velocities, one more is over
-                before += float(judge.goal.done) + (task.goal_topic == "goal_velocity")
+        if counter is None or which != number:
+            if counter is not None:  # what was reached so far counts on; of velocities, one more is over
+                before += float(counter.goal.done) + (task.goal_topic == "goal_velocity")
             now = {name: pose[step] for name, pose in things.items()}
             begun = task.begun(Goal(given[which].targets, np.asarray(0.0), obstacles, now), last)
-            judge, number = Judge(task, begun, dt), which
+            counter, number = Judge(task, begun, dt), which
         last = states[step]
-        goal = judge.see(last, {name: pose[step] for name, pose in things.items()})
+        goal = counter.see(last, {name: pose[step] for name, pose in things.items()})
         discs = goal.obstacles if len(goal.obstacles) else np.zeros((1, 3))
         done = np.asarray(before + goal.done)
         counted.append(replace(goal, targets=goal.current[None], done=done, obstacles=discs))

@@ -11,7 +11,7 @@ from fulmar_bags.run_record import HealthSample, RunRecord
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_evaluation.run_beliefs import believed_dead, last_beliefs
-from fulmar_evaluation.run_evaluation import Judgement, judge
+from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from policy_server.controllers import EXTERNAL
 
 ASKED = ("robot", "task", "controller", "backend", "seed")
@@ -39,7 +39,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
     Raises:
         FulmarError: The record names no goal, or no task that is known here.
     """
-    judgement = judge(record)
+    result = evaluate_run(record)
     plant, controller = record.last_health("plant"), record.last_health("controller")
     period_error = _spread(controller, "period_error_ms")
     wall_hz = _number(controller, "control_rate_hz") or _wall_rate_hz(record)
@@ -47,12 +47,12 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         **{key: record.info.get(key) for key in ASKED},
         "name": record.info.get("name") or record.info.get("robot"),
         "steps": len(latencies_ms(record)) or _unanswering(record),
-        "duration_s": judgement.duration_s if judgement else 0.0,
-        "success": judgement is not None and judgement.success,
-        **{name: judgement.figure(name) if judgement else None for name in FIGURES},
-        "collided": None if judgement is None else bool(judgement.figures["collided"]),
-        "path_error_m": judgement.path_error_m if judgement else None,
-        "goals_progress": judgement.progress if judgement else None,
+        "duration_s": result.duration_s if result else 0.0,
+        "success": result is not None and result.success,
+        **{name: result.figure(name) if result else None for name in FIGURES},
+        "collided": None if result is None else bool(result.figures["collided"]),
+        "path_error_m": result.path_error_m if result else None,
+        "goals_progress": result.progress if result else None,
         "control_rate_hz": _own_rate_hz(record, wall_hz),
         "wall_control_rate_hz": wall_hz,
         "latency_ms": _known(_spread(plant, "latency_ms")) or percentiles(latencies_ms(record)),
@@ -60,7 +60,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "inference_ms": _spread(controller, "inference_ms"),
         "overruns": _total(plant, controller, "overruns"),
         "watchdog_trips": _total(plant, None, "watchdog_trips"),
-        "actuator_use": _use(judgement),
+        "actuator_use": _use(result),
         "estop_pressed": estop_pressed(record),
         "warnings": warnings_of(record),
         "believed_dead": believed_dead(record),
@@ -121,11 +121,11 @@ def _unanswering(record: RunRecord) -> int:
     return len(record.commanded) if external and not len(latencies_ms(record)) else 0
 
 
-def _use(judgement: Judgement | None) -> float | None:
+def _use(result: RunResult | None) -> float | None:
     """Mean share of actuators in use."""
-    if judgement is None or np.isnan(judgement.run.shares).any():
+    if result is None or np.isnan(result.run.shares).any():
         return None
-    return _finite(np.mean(judgement.run.actuators_in_use))
+    return _finite(np.mean(result.run.actuators_in_use))
 
 
 def _own_rate_hz(record: RunRecord, wall_hz: float | None) -> float | None:

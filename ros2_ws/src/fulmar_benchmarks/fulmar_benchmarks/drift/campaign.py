@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fulmar_benchmarks.drift.bounds import physics_of
 from fulmar_benchmarks.drift.conditions import (
     CONDITIONS,
     PATH_EPISODE_S,
@@ -19,12 +20,11 @@ from fulmar_benchmarks.drift.conditions import (
     ROBOT,
 )
 from fulmar_benchmarks.drift.document import document_of
-from fulmar_benchmarks.drift.physics import physics_of
 from fulmar_benchmarks.drift.unit import DriftUnit
-from fulmar_benchmarks.outcomes import Judged
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
+from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.unit import Unit, done_already
-from fulmar_benchmarks.work import Outcome, do_all
+from fulmar_benchmarks.workers import Outcome, do_all
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
@@ -50,11 +50,11 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Findings:
+class CampaignResult:
     """The document, and what pictures are drawn from."""
 
     document: dict[str, Any]
-    outcomes: dict[tuple[str, str], Judged]  # by row and controller
+    outcomes: dict[tuple[str, str], PairResult]  # by row and controller
 
 
 def run_drift(
@@ -62,7 +62,7 @@ def run_drift(
     *,
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
-) -> Findings:
+) -> CampaignResult:
     """Judge every controller in every row, but for what was judged before with the same code and configuration.
 
     Args:
@@ -113,7 +113,7 @@ def run_drift(
         },
         wall_s=time.monotonic() - began,
     )
-    return Findings(document, {key: one for key, one in found.items() if isinstance(one, Judged)})
+    return CampaignResult(document, {key: one for key, one in found.items() if isinstance(one, PairResult)})
 
 
 def _task_of_row(row: str) -> str:

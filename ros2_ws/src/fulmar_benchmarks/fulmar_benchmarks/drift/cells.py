@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fulmar_benchmarks.cells import BAD, GOOD, NOTHING
-from fulmar_benchmarks.drift.published import DIGITS, FIGURES
+from fulmar_benchmarks.drift.targets import DIGITS, FIGURES
 
 NAMES = {"policy": "policy", "lqr": "LQR", "lqr_drift": "LQR of DRIFT", "mpc": "MPC"}
 UNITS = {

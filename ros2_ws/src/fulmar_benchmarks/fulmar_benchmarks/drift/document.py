@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fulmar_benchmarks.drift.asked import requirements
+from fulmar_benchmarks.drift.bounds import Physics
 from fulmar_benchmarks.drift.conditions import CONDITIONS, PATHS
-from fulmar_benchmarks.drift.drop import band_of, drop_percent
-from fulmar_benchmarks.drift.physics import Physics
-from fulmar_benchmarks.drift.published import FIGURES, TRACKING, published
-from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.drift.targets import FIGURES, TRACKING, band_of, drop_percent, published, requirements
 from fulmar_benchmarks.pairs import Pair
+from fulmar_benchmarks.results import PairResult
 from fulmar_core.provenance import fulmar_version, git_revision
 
 if TYPE_CHECKING:
@@ -45,7 +43,7 @@ def document_of(
     request: Request,
     *,
     pairs: dict[Key, Pair],
-    found: dict[Key, Judged | str],
+    found: dict[Key, PairResult | str],
     physics: dict[str, Physics],
     wall_s: float,
 ) -> dict[str, Any]:
@@ -65,7 +63,7 @@ def document_of(
     }
     _add_drops(rows)
     checks = [check for row in rows for name in request.controllers for check in _checks(row, name, rows)]
-    judged = [one for one in found.values() if isinstance(one, Judged)]
+    judged = [one for one in found.values() if isinstance(one, PairResult)]
     steps = sum(one.about["control_steps"] for one in judged)
     busy_s = sum(one.about["wall_s"] for one in judged)
     return {
@@ -103,7 +101,7 @@ def _row(
     row: Any,
     request: Request,
     pairs: dict[Key, Pair],
-    found: dict[Key, Judged | str],
+    found: dict[Key, PairResult | str],
     physics: Physics | None,
 ) -> dict[str, Any]:
     told: dict[str, Any] = {"title": row.title, "kind": "path" if physics is None else "pose"}
@@ -125,9 +123,9 @@ def _row(
 
 
 def _entry(
-    row: str, name: str, physics: Physics | None, pair: Pair, outcome: Judged | str | None
+    row: str, name: str, physics: Physics | None, pair: Pair, outcome: PairResult | str | None
 ) -> dict[str, Any]:
-    judged = outcome if isinstance(outcome, Judged) else None
+    judged = outcome if isinstance(outcome, PairResult) else None
     entry: dict[str, Any] = {
         "status": "missing" if pair.missing else "failed" if judged is None else "judged",
         "reason": pair.reason or (outcome if isinstance(outcome, str) else None),

@@ -21,7 +21,7 @@ from fulmar_benchmarks.drift.cells import (
     unmet,
 )
 from fulmar_benchmarks.drift.conditions import PATH_EPISODE_S, PATH_EPISODES, RUN_UP_S
-from fulmar_benchmarks.drift.drop import BANDS
+from fulmar_benchmarks.drift.targets import BANDS
 
 _MARKS = {GOOD: (" ✓", "green"), BAD: (" ✗", "bold red"), "": ("", "")}
 _STYLES = {band.name: band.terminal for band in BANDS}

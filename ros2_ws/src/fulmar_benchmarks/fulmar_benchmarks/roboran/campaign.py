@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_benchmarks.outcomes import Judged
 from fulmar_benchmarks.pairs import Pair, find_pair, units_of
+from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import FORMAT, pair_entry
 from fulmar_benchmarks.unit import Unit, done_already
-from fulmar_benchmarks.work import Outcome, do_all
+from fulmar_benchmarks.workers import Outcome, do_all
 from fulmar_core.provenance import fulmar_version, git_revision
 from fulmar_evaluation.evaluation import BATCH_EPISODES
 from fulmar_evaluation.evaluation import EPISODES as JUDGED
@@ -38,12 +38,12 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Findings:
+class CampaignResult:
     """The document, and what pictures are drawn from."""
 
     document: dict[str, Any]
     pairs: list[Pair]
-    outcomes: dict[Pair, dict[str, Judged]]
+    outcomes: dict[Pair, dict[str, PairResult]]
 
 
 def run_benchmark(
@@ -51,7 +51,7 @@ def run_benchmark(
     *,
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
-) -> Findings:
+) -> CampaignResult:
     """Judge every pair, but for what was judged before with the same code, configuration and controller.
 
     Args:
@@ -104,10 +104,10 @@ def run_benchmark(
         wall_s=time.monotonic() - began,
     )
     judged = {
-        pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, Judged)}
+        pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, PairResult)}
         for pair, ways in by_pair.items()
     }
-    return Findings(document, pairs, judged)
+    return CampaignResult(document, pairs, judged)
 
 
 def document_of(

@@ -8,7 +8,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from fulmar_benchmarks.cells import BAD, GOOD, head, missing, rows, spoken
+from fulmar_benchmarks.cells import BAD, GOOD, spoken
+from fulmar_benchmarks.roboran.cells import head, missing, rows
 
 _MARKS = {GOOD: "[green]{} ✓[/]", BAD: "[bold red]{} ✗[/]", "": "{}"}
 _PLACES = {"batch": "the batch", "mujoco": "MuJoCo", "ros": "ROS"}

@@ -11,14 +11,14 @@ import numpy as np
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_core.errors import BagError
-from fulmar_evaluation.faults.observer import Witness
+from fulmar_evaluation.faults.observer import Observer
 
 TORN_S = 1.0  # a recorder that dies takes no more than so much with it
 IN_FLIGHT_S = 0.1  # so long before it hangs a message may be sent that it has not taken yet
 
 
 @dataclass(frozen=True)
-class Kept:
+class BagEvidence:
     """The bag, judged."""
 
     lost: int  # messages that came and are not in it
@@ -26,15 +26,15 @@ class Kept:
     words: str = ""  # what is wrong; empty if nothing is
 
 
-def kept_of(record: Path, witness: Witness, away: tuple[float, float] | None) -> Kept:
+def bag_evidence(record: Path, observer: Observer, away: tuple[float, float] | None) -> BagEvidence:
     """Compare a bag with what somebody else heard.
 
     Args:
         record: The bag, as it lies there after everybody has ended.
-        witness: Has heard what actuators did.
+        observer: Has heard what actuators did.
         away: From when to when a fault kept the recorder from its work; for ever, where it ended it [s].
     """
-    heard_s, heard_ns = witness.heard()
+    heard_s, heard_ns = observer.heard()
     from_s, to_s = away or (math.inf, math.inf)
     dead = away is not None and math.isinf(to_s)
     if dead:  # what comes after its end is nobody's loss
@@ -43,17 +43,17 @@ def kept_of(record: Path, witness: Witness, away: tuple[float, float] | None) ->
     try:
         bag = open_bag(record)
     except BagError as error:
-        return Kept(len(heard_ns), False, str(error))
-    found = stamps_ns(bag.of(witness.wire))
+        return BagEvidence(len(heard_ns), False, str(error))
+    found = stamps_ns(bag.of(observer.wire))
     if found is None or not len(found):
-        return Kept(len(heard_ns), False, f"it has nothing of {witness.wire.name}")
+        return BagEvidence(len(heard_ns), False, f"it has nothing of {observer.wire.name}")
     # A recorder may find the plant a little later than the bystander did.
     missing = (heard_ns >= found.min()) & ~np.isin(heard_ns, found)
     gaps = int(np.sum(missing & ~((heard_s >= from_s) & (heard_s < to_s))))
     dropped = sum((bag.recording.get("dropped") or {}).values())
     problems = [
-        *([f"lacks {gaps} of {witness.wire.name}"] if gaps else []),
+        *([f"lacks {gaps} of {observer.wire.name}"] if gaps else []),
         *([f"its recorder dropped {dropped}"] if dropped and not dead else []),
         *(() if dead else bag.warnings),
     ]
-    return Kept(int(np.sum(missing)) + dropped, not problems, "; ".join(problems))
+    return BagEvidence(int(np.sum(missing)) + dropped, not problems, "; ".join(problems))

@@ -12,17 +12,16 @@ from sensor_msgs.msg import JointState
 
 from fulmar_core.robot import Robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
+from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.fault_injector import delayed
-from fulmar_evaluation.faults.fault_result import STAYS_S, Outcome, stopped
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_ros.qos import publisher_qos
 
 STRANGER_S = 0.02  # between its commands
 # Until nodes on one computer know of a new publisher, and for the look of a tenth of a second
 DISCOVERY_S = 0.3
-COMMANDS = Surroundings(spoilt=None)
+COMMANDS = FaultEnvironment(intercepted=None)
 
 
 def commands_not_a_number(live: LiveSystem) -> Outcome:
@@ -47,7 +46,7 @@ def commands_late(live: LiveSystem) -> Outcome:
     """Each command comes long after its observation: nobody knows any more whether it would still be right."""
     since_s = live.until_it_moves()
     limit_s = live.silenced_s
-    live.spoiler.spoil = delayed(math.ceil((limit_s + STAYS_S / 4.0) / live.beat_s))
+    live.injector.change = delayed(math.ceil((limit_s + STAYS_S / 4.0) / live.beat_s))
     return stopped(live, since_s, limit_s)
 
 
@@ -82,7 +81,7 @@ def _nonsense(live: LiveSystem, names: list[str], values: list[float]) -> Outcom
     """Nonsense must not feed the watchdog, nor reach an actuator."""
     message = _message(live, names, values)
     since_s = live.until_it_moves()
-    live.spoiler.spoil = lambda _good: message
+    live.injector.change = lambda _good: message
     return stopped(live, since_s, live.silenced_s)
 
 

@@ -19,12 +19,14 @@ CORNERS_M = ((FAR_M, 0.0), (FAR_M, 1.0))  # where a node of goals sends it
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """What is unusual about a system; the usual one has an e-stop, and its odometry may be spoilt."""
+class FaultEnvironment:
+    """What is unusual about a system; the usual one has an e-stop, and its odometry may be intercepted."""
 
     guards: Mapping[str, Any] = field(default_factory=dict)  # beside the e-stop
-    spoilt: Wire | None = ODOMETRY  # the wire that passes through the spoiler; None: the robot's commands
-    answers_pass: bool = False  # the robot's commands, too, pass through a spoiler, of their own
+    intercepted: Wire | None = (
+        ODOMETRY  # the wire that passes through the injector; None: the robot's commands
+    )
+    answers_pass: bool = False  # the robot's commands, too, pass through a injector, of their own
     by_goal_node: bool = False  # a node of its own tells goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     scenario: str = "nominal"
@@ -33,10 +35,10 @@ class Surroundings:
     bundle: Callable[[Path], None] | None = None  # what is done to the bundle before the start
 
 
-USUAL = Surroundings()
+USUAL = FaultEnvironment()
 
 
-def request_of(robot: str, record: Path, about: Surroundings = USUAL) -> RunRequest:
+def request_of(robot: str, record: Path, about: FaultEnvironment = USUAL) -> RunRequest:
     """A robot that has far to go, with an e-stop.
 
     Args:

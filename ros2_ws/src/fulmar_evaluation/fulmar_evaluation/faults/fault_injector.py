@@ -1,4 +1,4 @@
-"""Stands between who publishes on a wire and who listens, and can spoil what passes."""
+"""Stands between who publishes on a wire and who listens, and can change what passes."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from fulmar_core.topics import COMMAND, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 KINDS = {ODOMETRY: Odometry, MOCAP: PoseStamped, COMMAND: JointState, VELOCITY_COMMAND: TwistStamped}
-Spoil = Callable[[Any], Any]  # a message to what is passed on in its place, or to None
+Injection = Callable[[Any], Any]  # a message to what is passed on in its place, or to None
 
 
 def source_of(wire: Wire) -> str:
     """Where messages of a wire come from before they are passed on."""
-    return f"unspoiled/{wire.name}"
+    return f"original/{wire.name}"
 
 
-def unspoiled(message: Any) -> Any:
+def unchanged(message: Any) -> Any:
     """As it came."""
     return message
 
@@ -32,23 +32,23 @@ def lost(_message: Any) -> None:
     """Nothing passes."""
 
 
-def delayed(periods: int) -> Spoil:
+def delayed(periods: int) -> Injection:
     """Everything comes later, by so many messages."""
     waiting: deque[Any] = deque()
 
-    def spoil(message: Any) -> Any:
+    def change(message: Any) -> Any:
         waiting.append(message)
         return waiting.popleft() if len(waiting) > periods else None
 
-    return spoil
+    return change
 
 
-class Spoiler:
-    """Passes messages on; `spoil` changes each, or swallows it by returning None."""
+class FaultInjector:
+    """Passes messages on; `change` changes each, or swallows it by returning None."""
 
     def __init__(self, node: Node, wire: Wire) -> None:
         """Begin as if it were not there."""
-        self.spoil: Spoil = unspoiled
+        self.change: Injection = unchanged
         kind, reliable = KINDS[wire], wire.delivery != "best_effort"
         self._publisher = node.create_publisher(kind, wire.name, publisher_qos(wire))
         node.create_subscription(
@@ -56,6 +56,6 @@ class Spoiler:
         )
 
     def _pass(self, message: Any) -> None:
-        spoilt = self.spoil(message)
-        if spoilt is not None:
-            self._publisher.publish(spoilt)
+        changed = self.change(message)
+        if changed is not None:
+            self._publisher.publish(changed)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 
 from fulmar_core.robot import Robot
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
-from fulmar_evaluation.faults.fault_result import Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault import Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.two_hosts import CUT, LOSSY, why_not
 
@@ -34,4 +33,6 @@ def _why_not(_robot: Robot) -> str:
     return why_not()
 
 
-NETWORK_FAULTS = tuple(Fault(do, Surroundings(two_hosts=True), _why_not) for do in (cable_cut, cable_lossy))
+NETWORK_FAULTS = tuple(
+    Fault(do, FaultEnvironment(two_hosts=True), _why_not) for do in (cable_cut, cable_lossy)
+)

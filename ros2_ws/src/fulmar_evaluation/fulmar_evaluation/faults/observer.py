@@ -23,7 +23,7 @@ NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)
-class Word:
+class Statement:
     """Something that a node said of itself."""
 
     heard_s: float  # monotonic clock [s]
@@ -38,7 +38,7 @@ class Word:
         return None if self.level == "ok" else (self.who, NUMBER.sub("#", self.text))
 
 
-class Witness:
+class Observer:
     """Listens, from a node that spins in a thread of its own."""
 
     def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
@@ -47,7 +47,7 @@ class Witness:
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
         self._applied: list[tuple[float, int, bool]] = []  # heard [s], stamp [ns], whether it moves
-        self._words: list[Word] = []
+        self._words: list[Statement] = []
         listen = node.create_subscription
         listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))
         for health in (DIAGNOSTICS, STATUS):
@@ -67,7 +67,7 @@ class Witness:
                 values = {pair.key: pair.value for pair in status.values}
                 who = status.name.partition(": ")[2]
                 self._words.append(
-                    Word(now_s, who, levels.get(status.level, "error"), status.message, values)
+                    Statement(now_s, who, levels.get(status.level, "error"), status.message, values)
                 )
 
     def moves(self) -> bool:
@@ -86,17 +86,17 @@ class Witness:
             times = np.array([heard_s for heard_s, _, _ in self._applied], dtype=float)
             return times, np.array([stamp for _, stamp, _ in self._applied], dtype=np.int64)
 
-    def words_since(self, since_s: float) -> list[Word]:
+    def statements_since(self, since_s: float) -> list[Statement]:
         """What was said from then on."""
         with self._lock:
             return [word for word in self._words if word.heard_s >= since_s]
 
-    def complaint_since(self, since_s: float) -> Word | None:
+    def complaint_since(self, since_s: float) -> Statement | None:
         """The first thing that a node said from then on which was wrong, and not its last word before."""
-        return first_complaint(self.words_since(0.0), since_s)
+        return first_complaint(self.statements_since(0.0), since_s)
 
 
-def first_complaint(words: list[Word], since_s: float) -> Word | None:
+def first_complaint(words: list[Statement], since_s: float) -> Statement | None:
     """The first thing that is wrong from a time on, and was not some node's last word before it."""
     standing = {word.who: word.complaint for word in words if word.heard_s < since_s}.values()
     new = (word for word in words if word.heard_s >= since_s and word.complaint is not None)

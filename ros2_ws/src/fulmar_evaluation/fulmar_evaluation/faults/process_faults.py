@@ -13,12 +13,11 @@ from fulmar_bringup.system import DEFAULT_ESTIMATOR
 from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_core.topics import MOCAP
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
+from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.fault_injector import lost
-from fulmar_evaluation.faults.fault_result import STAYS_S, WORDS_S, Outcome, stopped, went_on
 from fulmar_evaluation.faults.live_system import LiveSystem
-from fulmar_evaluation.faults.observer import Word, wait_for
+from fulmar_evaluation.faults.observer import Statement, wait_for
 
 ESTOP_S = TIMEOUT_NS / 1e9
 PAUSE_S = 2.0
@@ -59,7 +58,7 @@ def mocap_lost(live: LiveSystem) -> Outcome:
     """No pose comes any more: the estimator bridges a gap of moments, and then says what it lacks."""
     bridge_s = load_estimator(DEFAULT_ESTIMATOR).bridge_s
     since_s = live.until_it_moves()
-    live.spoiler.spoil = lost
+    live.injector.change = lost
     return stopped(live, since_s, bridge_s + live.watchdog_s + live.corrected_s)
 
 
@@ -86,9 +85,9 @@ def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
     live.send("plant", number)
     limit_s = live.watchdog_s + live.beat_s + live.tick_s
     time.sleep(limit_s + STAYS_S)
-    wait_for(lambda: live.witness.complaint_since(since_s) is not None, WORDS_S)
-    word = live.witness.complaint_since(since_s)
-    last_s = max((heard_s for heard_s, _ in live.witness.applied_since(since_s)), default=since_s) - since_s
+    wait_for(lambda: live.observer.complaint_since(since_s) is not None, WORDS_S)
+    word = live.observer.complaint_since(since_s)
+    last_s = max((heard_s for heard_s, _ in live.observer.applied_since(since_s)), default=since_s) - since_s
     passed = word is not None and last_s <= limit_s
     return Outcome(word.who if word else "", word.text if word else "", passed, last_s, limit_s)
 
@@ -154,8 +153,8 @@ def _launcher_on(live: LiveSystem, name: str) -> tuple[str, str]:
     return "launcher", f"{ended.text}; control goes on"
 
 
-def _complaint(live: LiveSystem, since_s: float) -> Word | None:
-    words = [word for word in live.witness.words_since(since_s) if word.who == "recorder"]
+def _complaint(live: LiveSystem, since_s: float) -> Statement | None:
+    words = [word for word in live.observer.statements_since(since_s) if word.who == "recorder"]
     return next((word for word in words if word.level != "ok"), None)
 
 
@@ -173,8 +172,8 @@ PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
 ESTIMATED = {"estimator": DEFAULT_ESTIMATOR}
 PROCESS_FAULTS = (
     *map(Fault, PLAIN),
-    Fault(goals_killed, Surroundings(by_goal_node=True)),
-    Fault(estimator_killed, Surroundings(ESTIMATED)),
-    Fault(estimator_hangs, Surroundings(ESTIMATED)),
-    Fault(mocap_lost, Surroundings(ESTIMATED, spoilt=MOCAP)),
+    Fault(goals_killed, FaultEnvironment(by_goal_node=True)),
+    Fault(estimator_killed, FaultEnvironment(ESTIMATED)),
+    Fault(estimator_hangs, FaultEnvironment(ESTIMATED)),
+    Fault(mocap_lost, FaultEnvironment(ESTIMATED, intercepted=MOCAP)),
 )

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from fulmar_bags.run_record import RunRecord
 from fulmar_evaluation.report.style import ALARM, FAINT, INK
-from fulmar_evaluation.report.view import View, judged
-from fulmar_evaluation.run_evaluation import Judgement
+from fulmar_evaluation.report.view import View, evaluated
+from fulmar_evaluation.run_evaluation import RunResult
 
 Span = tuple[float, float]  # begin and end, in simulated time since the first state [s]
 
@@ -57,8 +57,8 @@ def draw_actuators(axes: Axes, run: View) -> None:
     names = run.record.actuation.names
     if run.binary:
         _bars(axes, run, len(names))
-    elif run.judgement is not None:
-        _shares(axes, run, run.judgement)
+    elif run.result is not None:
+        _shares(axes, run, run.result)
     for begin, end in watchdog_spans(run.record):
         axes.axvspan(begin, end, facecolor=ALARM, alpha=0.14, linewidth=0)
         axes.text(
@@ -76,8 +76,8 @@ def draw_actuators(axes: Axes, run: View) -> None:
     axes.spines["left"].set_visible(False)
     for row in range(1, len(names)):
         axes.axhline(row + 0.5, color=FAINT, alpha=0.25, linewidth=0.6)
-    for _, judgement in judged([run]):
-        axes.set_xlim(0.0, judgement.duration_s)
+    for _, result in evaluated([run]):
+        axes.set_xlim(0.0, result.duration_s)
 
 
 def _bars(axes: Axes, run: View, count: int) -> None:
@@ -86,23 +86,21 @@ def _bars(axes: Axes, run: View, count: int) -> None:
         axes.broken_barh(bars, (row + 0.6, 0.8), facecolors=run.colour, linewidth=0)
 
 
-def _shares(axes: Axes, run: View, judgement: Judgement) -> None:
-    for row, share in enumerate(judgement.run.shares[0].T, start=1):
+def _shares(axes: Axes, run: View, result: RunResult) -> None:
+    for row, share in enumerate(result.run.shares[0].T, start=1):
         height = row - 0.42 * np.clip(share, -1.0, 1.0)  # rows count downwards
         axes.axhline(row, color=FAINT, linewidth=0.6)
-        axes.fill_between(
-            judgement.time_s, row, height, step="pre", color=run.colour, alpha=0.25, linewidth=0
-        )
-        axes.step(judgement.time_s, height, where="pre", color=run.colour, linewidth=0.9)
+        axes.fill_between(result.time_s, row, height, step="pre", color=run.colour, alpha=0.25, linewidth=0)
+        axes.step(result.time_s, height, where="pre", color=run.colour, linewidth=0.9)
 
 
 def draw_use(axes: Axes, runs: Sequence[View]) -> None:
     """Open-valve time, or time at full command, added up over the run."""
-    for run, judgement in judged(runs):
+    for run, result in evaluated(runs):
         count = len(run.record.actuation.names)
-        spent = np.cumsum(judgement.run.effort[0]) * count * judgement.run.control_dt
-        axes.plot(judgement.time_s, spent, color=run.colour, label=run.label)
+        spent = np.cumsum(result.run.effort[0]) * count * result.run.control_dt
+        axes.plot(result.time_s, spent, color=run.colour, label=run.label)
     axes.set_ylim(bottom=0.0)
-    axes.set_xlim(0.0, max((judgement.duration_s for _, judgement in judged(runs)), default=1.0))
+    axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))
     axes.set_xlabel("time [s]")
     axes.set_ylabel("open-valve time [s]" if all(run.binary for run in runs) else "time at full command [s]")

@@ -44,7 +44,7 @@ class Drawing:
     draw: Callable[[Axes], None]
 
 
-def write_pictures(
+def write_bag_report(
     bag: Bag, out: Path, odometry: str | None = None, *, note: str = "", force: bool = True
 ) -> Path:
     """Draw a bag.

@@ -11,8 +11,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 
 from fulmar_core.tasks.terms import Tolerance
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
-from fulmar_evaluation.report.view import View, judged
-from fulmar_evaluation.run_evaluation import Judgement
+from fulmar_evaluation.report.view import View, evaluated
+from fulmar_evaluation.run_evaluation import RunResult
 
 LENGTHS = {0.001: "1 mm", 0.01: "1 cm", 0.1: "10 cm", 1.0: "1 m", 10.0: "10 m"}
 ANGLES = {0.01: "0.01°", 0.1: "0.1°", 1.0: "1°", 10.0: "10°", 100.0: "100°"}
@@ -27,7 +27,7 @@ class Strip:
     label: str
     marks: dict[float, str]  # of the scale
     lowest: float
-    values: Callable[[Judgement], np.ndarray]
+    values: Callable[[RunResult], np.ndarray]
     tolerance: Callable[[Tolerance], float]  # 0: there is none
     limit: str  # what stands beside the line of the tolerance
 
@@ -73,7 +73,7 @@ def strips(runs: Sequence[View]) -> list[Strip]:
     return [
         strip
         for strip in STRIPS
-        if any(not np.isnan(strip.values(judgement)).all() for _, judgement in judged(runs))
+        if any(not np.isnan(strip.values(result)).all() for _, result in evaluated(runs))
     ] or list(STRIPS[:2])
 
 
@@ -87,11 +87,11 @@ def draw_progress(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> No
     for axes in rows[:-1]:
         axes.tick_params(labelbottom=False)
     rows[-1].set_xlabel("time [s]")
-    for _, judgement in judged(runs)[:1]:
-        hold_s = judgement.task.tolerance.hold_s
-        if hold_s > 0.0 and not judgement.counts:
+    for _, result in evaluated(runs)[:1]:
+        hold_s = result.task.tolerance.hold_s
+        if hold_s > 0.0 and not result.counts:
             rows[0].text(
-                0.5 * (judgement.window_start_s + judgement.duration_s),
+                0.5 * (result.window_start_s + result.duration_s),
                 1.02,
                 f"last {hold_s:g} s",
                 transform=rows[0].get_xaxis_transform(),
@@ -104,13 +104,13 @@ def draw_progress(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> No
 
 def counting(runs: Sequence[View]) -> bool:
     """Whether the task of the runs counts targets."""
-    return any(judgement.counts for _, judgement in judged(runs))
+    return any(result.counts for _, result in evaluated(runs))
 
 
 def _reached(axes: Axes, runs: Sequence[View]) -> None:
-    for run, judgement in judged(runs):
-        axes.step(judgement.time_s, judgement.run.goals[0], where="post", color=run.colour, label=run.label)
-        required = judgement.task.required
+    for run, result in evaluated(runs):
+        axes.step(result.time_s, result.run.goals[0], where="post", color=run.colour, label=run.label)
+        required = result.task.required
         if required is not None:
             _limit(axes, required, f"{required} make a success")
     quiet_grid(axes)
@@ -129,27 +129,27 @@ def _top(axes: Axes, strip: Strip, limits: list[float]) -> float:
 
 
 def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
-    for run, judgement in judged(runs):
-        axes.plot(judgement.time_s, strip.values(judgement), color=run.colour, linewidth=1.2, label=run.label)
+    for run, result in evaluated(runs):
+        axes.plot(result.time_s, strip.values(result), color=run.colour, linewidth=1.2, label=run.label)
     quiet_grid(axes)
     _span(axes, runs)
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(FixedLocator(list(strip.marks)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: strip.marks.get(value, "")))
     axes.yaxis.set_minor_locator(NullLocator())
-    limits = [strip.tolerance(judgement.task.tolerance) for _, judgement in judged(runs)[:1]]
+    limits = [strip.tolerance(result.task.tolerance) for _, result in evaluated(runs)[:1]]
     axes.set_ylim(strip.lowest, _top(axes, strip, limits))
     axes.set_ylabel(strip.label)
-    for _, judgement in judged(runs):
-        if not judgement.counts:
-            axes.axvspan(judgement.window_start_s, judgement.duration_s, color=FAINT, alpha=0.12, linewidth=0)
+    for _, result in evaluated(runs):
+        if not result.counts:
+            axes.axvspan(result.window_start_s, result.duration_s, color=FAINT, alpha=0.12, linewidth=0)
     for limit in limits:
         if limit > 0.0:
             _limit(axes, limit, f"tolerance {strip.limit.format(limit)}")
 
 
 def _span(axes: Axes, runs: Sequence[View]) -> None:
-    axes.set_xlim(0.0, max((judgement.duration_s for _, judgement in judged(runs)), default=1.0))
+    axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))
 
 
 def _limit(axes: Axes, value: float, label: str) -> None:

@@ -83,8 +83,8 @@ def page(runs: Sequence[View], drawn: Sequence[Picture], title: str, mark: str) 
 def _subtitle(runs: Sequence[View]) -> str:
     first = runs[0]
     parts = [str(first.summary["robot"] or "unknown robot").replace("_", " ")]
-    if first.judgement is not None:
-        parts.append(first.judgement.task.title)
+    if first.result is not None:
+        parts.append(first.result.task.title)
     parts.append(f"{first.summary['backend']} backend")
     if len(first.record.motion):
         parts.append(datetime.fromtimestamp(float(first.record.motion.log_s[0])).strftime("%-d %B %Y, %H:%M"))

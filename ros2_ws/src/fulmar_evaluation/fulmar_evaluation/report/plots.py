@@ -13,7 +13,7 @@ from fulmar_evaluation.report.error_plot import counting, draw_progress, strips
 from fulmar_evaluation.report.latency_plot import draw_latency
 from fulmar_evaluation.report.style import legend, quiet_grid
 from fulmar_evaluation.report.trajectory_plot import draw_close_up, draw_trajectory, has_place
-from fulmar_evaluation.report.view import View, judged
+from fulmar_evaluation.report.view import View, evaluated
 
 WIDTH = 6.2  # [inch]; set so that the type is readable on a phone and not shouting on a desk
 
@@ -30,7 +30,7 @@ class Picture:
 def pictures(runs: Sequence[View]) -> list[Picture]:
     """Draw everything that the runs have to show; call inside `house_style`."""
     drawn = [_trajectory(runs), _progress(runs), _actuators(runs), _use(runs), _latency(runs)]
-    return drawn if any(run.judgement for run in runs) else []
+    return drawn if any(run.result for run in runs) else []
 
 
 def overview(runs: Sequence[View], title: str) -> Figure:
@@ -61,7 +61,7 @@ def _rows(runs: Sequence[View]) -> int:
 
 def _trajectory(runs: Sequence[View]) -> Picture:
     figure = Figure(figsize=(WIDTH, 3.7), layout="constrained")
-    near = any(has_place(judgement) for _, judgement in judged(runs))
+    near = any(has_place(result) for _, result in evaluated(runs))
     if near:
         whole, close = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.75, 1.0)})
         draw_close_up(close, runs)
@@ -76,9 +76,9 @@ def _trajectory(runs: Sequence[View]) -> Picture:
     Circles show the robot's outline along the way; the stroke inside points where it is heading."""
     if any(len(run.record.obstacles) for run in runs):
         caption += " Grey discs are obstacles."
-    for name in dict.fromkeys(name for _, judgement in judged(runs) for name in judgement.things):
+    for name in dict.fromkeys(name for _, result in evaluated(runs) for name in result.things):
         caption += f" The dashed line is the way of the {name}, the square its end."
-    if any(len(judgement.path) for _, judgement in judged(runs)):
+    if any(len(result.path) for _, result in evaluated(runs)):
         caption += " The dashed line is the path that was to be followed."
     if counting(runs):
         caption += (

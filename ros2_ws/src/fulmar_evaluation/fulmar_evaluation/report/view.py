@@ -1,4 +1,4 @@
-"""One run made ready for drawing: record, judgement, summary, name and colour."""
+"""One run made ready for drawing: record, result, summary, name and colour."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from fulmar_bags.run_record import RunRecord
 from fulmar_evaluation.report.style import colours
-from fulmar_evaluation.run_evaluation import Judgement, judge
+from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from fulmar_evaluation.run_summary import latencies_ms, summarise
 
 SPOKEN = {
@@ -31,14 +31,14 @@ class View:
     label: str
     colour: str
     record: RunRecord
-    judgement: Judgement | None  # None: the record is too short to judge
+    result: RunResult | None  # None: the record is too short to judge
     summary: dict[str, Any]
     latencies_ms: np.ndarray
 
     @property
     def binary(self) -> bool:
         """Whether the actuators are valves, open or closed."""
-        return self.judgement is None or self.judgement.robot.actuators.binary
+        return self.result is None or self.result.robot.actuators.binary
 
 
 def views(records: Sequence[RunRecord]) -> list[View]:
@@ -55,11 +55,11 @@ def views(records: Sequence[RunRecord]) -> list[View]:
     if len(set(labels)) < len(labels):  # runs of one controller are told apart by their bags
         labels = [f"{label} ({record.path.name})" for label, record in zip(labels, records, strict=True)]
     return [
-        View(label, colour, record, judge(record), summarise(record), latencies_ms(record))
+        View(label, colour, record, evaluate_run(record), summarise(record), latencies_ms(record))
         for label, colour, record in zip(labels, colours(controllers), records, strict=True)
     ]
 
 
-def judged(runs: Sequence[View]) -> list[tuple[View, Judgement]]:
-    """Those runs that have a judgement, with it."""
-    return [(run, run.judgement) for run in runs if run.judgement is not None]
+def evaluated(runs: Sequence[View]) -> list[tuple[View, RunResult]]:
+    """Those runs that have a result, with it."""
+    return [(run, run.result) for run in runs if run.result is not None]

@@ -12,57 +12,55 @@ Row = tuple[str, str, list[str]]  # what, an explanation, and the cell of each r
 
 def verdict(run: View) -> tuple[str, str]:
     """One word and one or two sentences on how a run went."""
-    judgement = run.judgement
-    if judgement is None:
+    result = run.result
+    if result is None:
         return "No result", "The bag holds fewer than two states, so there is nothing to judge."
-    if not judgement.long_enough:
-        return "Missed", f"The run ended after {judgement.duration_s:.1f} s, too early to judge."
-    touched = " It touched an obstacle." if judgement.figures["collided"] else ""
-    if judgement.progress is not None:
+    if not result.long_enough:
+        return "Missed", f"The run ended after {result.duration_s:.1f} s, too early to judge."
+    touched = " It touched an obstacle." if result.figures["collided"] else ""
+    if result.progress is not None:
         path = run.summary["path_error_m"]
         way = "" if path is None else f" On average the robot was {_length(path)} from the path."
-        end = (
-            "there it stayed to the end" if judgement.success else "it was not where it should be at the end"
+        end = "there it stayed to the end" if result.success else "it was not where it should be at the end"
+        return ("Done" if result.success else "Missed"), (
+            f"Of the goal file: {result.progress} in {result.duration_s:.0f} s; {end}.{way}{touched}"
         )
-        return ("Done" if judgement.success else "Missed"), (
-            f"Of the goal file: {judgement.progress} in {judgement.duration_s:.0f} s; {end}.{way}{touched}"
-        )
-    if judgement.counts:
-        reached, required = run.summary["goals_reached"] or 0, judgement.task.required
-        word = "Reached" if judgement.success else "Missed"
+    if result.counts:
+        reached, required = run.summary["goals_reached"] or 0, result.task.required
+        word = "Reached" if result.success else "Missed"
         return word, (
-            f"The robot reached {reached:.0f} targets in {judgement.duration_s:.0f} s; "
+            f"The robot reached {reached:.0f} targets in {result.duration_s:.0f} s; "
             f"{required} make a success.{touched}"
         )
     if run.summary["velocity_error_m_s"] is not None:
-        return ("Kept" if judgement.success else "Missed"), (
-            f"Over {judgement.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off "
+        return ("Kept" if result.success else "Missed"), (
+            f"Over {result.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off "
             f"and the turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, "
             "changes of the target included."
         )
-    what, error = f"the {judgement.task.subject}", _length(run.summary["final_position_error_m"])
+    what, error = f"the {result.task.subject}", _length(run.summary["final_position_error_m"])
     if run.summary["final_heading_error_deg"] is not None:
         error += f" and {_value(run.summary['final_heading_error_deg'], '°', 1)}"
-    if judgement.success:
+    if result.success:
         return "Reached", (
-            f"The goal was reached after {judgement.figure('time_to_target_s'):.1f} s and held to the end. "
-            f"At the end of {judgement.duration_s:.0f} s {what} was {error} away."
+            f"The goal was reached after {result.figure('time_to_target_s'):.1f} s and held to the end. "
+            f"At the end of {result.duration_s:.0f} s {what} was {error} away."
         )
     return "Missed", (
-        f"{what.capitalize()} was not within the tolerance for all of the last {judgement.task.tolerance.hold_s:g} s. "
-        f"At the end of {judgement.duration_s:.0f} s it was {error} away.{touched}"
+        f"{what.capitalize()} was not within the tolerance for all of the last {result.task.tolerance.hold_s:g} s. "
+        f"At the end of {result.duration_s:.0f} s it was {error} away.{touched}"
     )
 
 
 def rule(runs: Sequence[View]) -> str:
     """What counts as success, for the first run that can be judged."""
     for run in runs:
-        if run.judgement is not None:
-            task, tolerance = run.judgement.task, run.judgement.task.tolerance
+        if run.result is not None:
+            task, tolerance = run.result.task, run.result.task.tolerance
             heading = f" and {tolerance.heading_deg:g}°" if tolerance.heading_deg > 0.0 else ""
-            if run.judgement.progress is not None:
+            if run.result.progress is not None:
                 return "A run counts as done if the goals of its file came to their end and the last one was kept."
-            if run.judgement.counts:
+            if run.result.counts:
                 return (
                     f"A target counts as reached within {100 * tolerance.position:g} cm{heading}, and a run that "
                     f"reaches {task.required} of them as a success."

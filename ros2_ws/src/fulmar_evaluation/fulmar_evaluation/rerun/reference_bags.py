@@ -28,7 +28,7 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
 )
 from fulmar_evaluation.rerun.replay_controllers import answers_of
-from fulmar_evaluation.rerun.rerun_result import judge_answers
+from fulmar_evaluation.rerun.rerun_result import compare_answers
 
 STEPS = 100  # control steps of each
 SEED = 11
@@ -173,4 +173,4 @@ def check_reference(path: Path) -> list[Field]:
     name = str((bag.info or {}).get("controller"))
     folder = shipped_policy(course.robot.name, course.task.name) if name == "policy" else None
     answers, _ = answers_of(course, name, str(folder or ""), "odometry")
-    return judge_answers(course, answers, TOLERANCES)
+    return compare_answers(course, answers, TOLERANCES)

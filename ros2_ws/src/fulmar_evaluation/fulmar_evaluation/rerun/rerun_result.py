@@ -16,7 +16,7 @@ FIELDS = ("decision", "observation", "action", "command")
 NUMBER = re.compile(r"-?[0-9]+([.][0-9]+)?")
 
 
-def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
+def compare_answers(course: Course, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
     """Compare every field that the bag has.
 
     Args:

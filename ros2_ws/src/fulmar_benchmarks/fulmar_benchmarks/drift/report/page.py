@@ -18,8 +18,8 @@ from fulmar_benchmarks.drift.cells import (
     spoken,
     unmet,
 )
-from fulmar_benchmarks.drift.drop import BANDS
 from fulmar_benchmarks.drift.tables import notes, verdict
+from fulmar_benchmarks.drift.targets import BANDS
 from fulmar_benchmarks.roboran.report.layout import origin, shown, whole_page
 from fulmar_evaluation.report.plots import Picture
 

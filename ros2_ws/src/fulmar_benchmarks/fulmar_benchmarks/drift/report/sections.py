@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_benchmarks.drift.campaign import Findings
+from fulmar_benchmarks.drift.campaign import CampaignResult
 from fulmar_benchmarks.drift.report.glance_plot import draw_glance
 from fulmar_benchmarks.drift.report.path_plot import draw_paths
 from fulmar_benchmarks.drift.report.start_plot import draw_starts
@@ -11,7 +11,7 @@ from fulmar_benchmarks.drift.report.view import views
 from fulmar_evaluation.report.plots import Picture
 
 
-def pictures(findings: Findings) -> dict[str, Picture]:
+def pictures(findings: CampaignResult) -> dict[str, Picture]:
     """By the names of their files; call inside `house_style`."""
     drawn: dict[str, Picture] = {}
     glance = draw_glance(findings.document)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.drift.campaign import Findings
+from fulmar_benchmarks.drift.campaign import CampaignResult
 from fulmar_benchmarks.drift.cells import spoken
-from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.results import PairResult
 from fulmar_evaluation.report.style import colours
 
 WIDTH = 9.2  # of a picture [inch]
@@ -23,7 +23,7 @@ class View:
     title: str  # of the row
     label: str  # of the controller
     colour: str
-    outcome: Judged
+    outcome: PairResult
 
     @property
     def time_s(self) -> np.ndarray:
@@ -32,7 +32,7 @@ class View:
         return float(self.outcome.about["control_dt"]) * np.arange(1, steps + 1)
 
 
-def views(findings: Findings, kind: str) -> dict[str, list[View]]:
+def views(findings: CampaignResult, kind: str) -> dict[str, list[View]]:
     """By row, every controller that was judged in it.
 
     Args:

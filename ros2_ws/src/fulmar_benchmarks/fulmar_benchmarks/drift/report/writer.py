@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fulmar_benchmarks.drift.campaign import Findings
+from fulmar_benchmarks.drift.campaign import CampaignResult
 from fulmar_benchmarks.drift.report.page import page
 from fulmar_benchmarks.drift.report.sections import pictures
 from fulmar_evaluation.report.plots import Picture
@@ -19,7 +19,7 @@ def _small(picture: Picture) -> bytes:
     return next((png for png in drawn if len(png) < LARGEST), as_png(picture.figure, dpi=60))
 
 
-def write_report(findings: Findings, out: Path) -> Path:
+def write_report(findings: CampaignResult, out: Path) -> Path:
     """Write `index.html`, which works offline, and every picture once more below `pictures/`.
 
     Args:

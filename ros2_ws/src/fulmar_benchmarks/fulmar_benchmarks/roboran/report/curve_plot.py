@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.required import LEAST
 from fulmar_benchmarks.roboran.report.view import View, panels
+from fulmar_benchmarks.roboran.targets import LEAST
 from fulmar_evaluation.report.style import DASHED, INK, quiet_grid
 
 

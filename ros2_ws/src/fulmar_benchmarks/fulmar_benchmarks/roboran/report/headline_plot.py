@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from fulmar_benchmarks.cells import head, spoken
+from fulmar_benchmarks.cells import spoken
+from fulmar_benchmarks.roboran.cells import head
 from fulmar_benchmarks.roboran.report.view import ROBOT_COLOURS, WIDTH
 from fulmar_evaluation.report.style import ALARM, FAINT, INK, PAPER, quiet_grid
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from fulmar_benchmarks.cells import BAD, GOOD, head, missing, rows, spoken
+from fulmar_benchmarks.cells import BAD, GOOD, spoken
+from fulmar_benchmarks.roboran.cells import head, missing, rows
 from fulmar_benchmarks.roboran.report.layout import origin, shown, whole_page
 from fulmar_benchmarks.roboran.tables import notes, verdict
 from fulmar_core.figures import FIGURES, SUCCESS

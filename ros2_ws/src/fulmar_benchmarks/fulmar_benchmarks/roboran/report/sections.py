@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.roboran.campaign import Findings
+from fulmar_benchmarks.roboran.campaign import CampaignResult
 from fulmar_benchmarks.roboran.report.curve_plot import curve_of, draw_curves
 from fulmar_benchmarks.roboran.report.headline_plot import draw_headline
 from fulmar_benchmarks.roboran.report.map_plot import draw_map
@@ -22,7 +22,7 @@ from fulmar_evaluation.report.plots import Picture
 Add = Callable[[str, str, str, Figure], None]  # name of the file, title, caption
 
 
-def headline(findings: Findings) -> Picture:
+def headline(findings: CampaignResult) -> Picture:
     """All pairs at a glance; call inside `house_style`."""
     caption = """
     The further right, the better. A filled dot is our success in the core's batch, a diamond the same in MuJoCo,
@@ -32,7 +32,7 @@ def headline(findings: Findings) -> Picture:
     return Picture("At a glance", _words(caption), draw_headline(findings.document))
 
 
-def pictures_of(findings: Findings, task: str) -> list[tuple[str, Picture]]:
+def pictures_of(findings: CampaignResult, task: str) -> list[tuple[str, Picture]]:
     """Pictures of one task with the names of their files; call inside `house_style`."""
     runs = views(findings, task)
     if not runs:

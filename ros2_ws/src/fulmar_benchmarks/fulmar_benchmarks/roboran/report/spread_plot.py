@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from fulmar_benchmarks.cells import WAYS
+from fulmar_benchmarks.roboran.cells import WAYS
 from fulmar_benchmarks.roboran.report.view import WIDTH, View
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
 

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from fulmar_benchmarks.roboran.published import CONTROL_HZ, GOAL_STEPS, thesis_row
 from fulmar_benchmarks.roboran.report.view import View, panels
+from fulmar_benchmarks.roboran.targets import CONTROL_HZ, GOAL_STEPS, thesis_row
 from fulmar_evaluation.report.error_plot import LENGTHS
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
 

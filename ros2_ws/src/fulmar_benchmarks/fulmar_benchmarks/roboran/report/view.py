@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.cells import head
-from fulmar_benchmarks.outcomes import Judged
-from fulmar_benchmarks.roboran.campaign import Findings
+from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.roboran.campaign import CampaignResult
+from fulmar_benchmarks.roboran.cells import head
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
 from fulmar_evaluation.report.style import INK, OTHER_COLOURS
@@ -28,7 +28,7 @@ class View:
 
     entry: dict[str, Any]  # of the document
     training: dict[str, Any]  # how the policy was made; empty for a classical controller
-    outcomes: dict[str, Judged]  # by way
+    outcomes: dict[str, PairResult]  # by way
     colour: str
 
     @property
@@ -37,7 +37,7 @@ class View:
         return head(self.entry)
 
     @property
-    def main(self) -> Judged:
+    def main(self) -> PairResult:
         """What is drawn where one way is enough: the batch, if there is one."""
         return next(iter(self.outcomes.values()))
 
@@ -57,7 +57,7 @@ class View:
         return float(self.main.about["control_dt"])
 
 
-def views(findings: Findings, task: str) -> list[View]:
+def views(findings: CampaignResult, task: str) -> list[View]:
     """Pairs of one task that have figures: of each robot its policy, else its classical controller."""
     chosen: dict[str, View] = {}
     spare = iter(OTHER_COLOURS)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fulmar_benchmarks.roboran.campaign import Findings
+from fulmar_benchmarks.roboran.campaign import CampaignResult
 from fulmar_benchmarks.roboran.report.page import page
 from fulmar_benchmarks.roboran.report.sections import headline, pictures_of
 from fulmar_evaluation.report.style import as_png, house_style
 
 
-def write_report(findings: Findings, out: Path) -> Path:
+def write_report(findings: CampaignResult, out: Path) -> Path:
     """Write `index.html`, which works offline, and every picture once more below `pictures/`.
 
     Args:

@@ -1,23 +1,73 @@
-"""Units of work done by several processes at once, with their progress told and their faults kept apart."""
+"""Pool of worker processes: progress, failures per unit, an end with the parent."""
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from fulmar_benchmarks.outcomes import Judged
-from fulmar_benchmarks.pools import begin_worker, counted, ended_with_us, one_thread_each
-from fulmar_benchmarks.unit import Unit, judge
+from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.unit import Unit, run_unit
+from fulmar_bringup.environment import environment
 from fulmar_core.errors import RunFailed
+from fulmar_core.parent_watch import end_with
 
 if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool
 
-Outcome = Judged | str  # a sentence where a unit failed
+
+_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+
+
+def one_thread_each() -> contextlib.AbstractContextManager[None]:
+    """Have the processes that are started meanwhile compute in one thread."""
+    return environment(_ONE_THREAD)
+
+
+@contextlib.contextmanager
+def ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
+    """Wait for the workers; after an error or Ctrl-C, end them."""
+    try:
+        yield pool
+    except BaseException:
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+_counts: Any = None
+
+
+def begin_worker(counts: Any, parent: int) -> None:
+    """Begin a process of a pool.
+
+    Args:
+        counts: Shared numbers, one for each piece of work; see `counted`.
+        parent: Process whose pool it is; without it we end, as nobody would take what we do.
+    """
+    global _counts
+    _counts = counts
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends its children
+    end_with(parent, signal.SIGTERM)
+
+
+def counted(index: int) -> Callable[[int], None]:
+    """What tells the parent how much of a piece of work is done, in a process that `begin_worker` began."""
+
+    def progress(done: int) -> None:
+        _counts[index] = done
+
+    return progress
+
+
+Outcome = PairResult | str  # a sentence where a unit failed
 Done = Callable[[Unit, Outcome], None]
 
 
@@ -101,6 +151,6 @@ def _work(unit: Unit, index: int) -> Outcome:
 
 def _outcome_of(unit: Unit, progress: Callable[[int], None], pool: RosPool | None = None) -> Outcome:
     try:
-        return judge(unit, progress, pool=pool)
+        return run_unit(unit, progress, pool=pool)
     except Exception as error:  # noqa: BLE001 - the fault of one pair must not cost the others their figures
         return f"{type(error).__name__}: {error}"

@@ -1,8 +1,9 @@
-"""An air bearing that does not carry the robot yet when everything else is ready."""
+"""Faults of hardware: a late air bearing, a driver that dies or hangs."""
 
 from __future__ import annotations
 
 import math
+import signal
 import time
 
 from nav_msgs.msg import Odometry
@@ -12,12 +13,14 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import BEARING_OFF
 from fulmar_core.topics import AIR_BEARING, TRUTH
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import FAR_M, Surroundings
-from fulmar_evaluation.faults.fault_result import Outcome
+from fulmar_evaluation.faults.fault import Fault, Outcome
+from fulmar_evaluation.faults.fault_environment import FAR_M, FaultEnvironment
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
+from fulmar_evaluation.faults.process_faults import signalled
 from fulmar_ros.qos import subscriber_qos
+from hardware_drivers.settings import KingfisherNmea, Kobuki, hardware_of, load_hardware
+from sim_nodes.emulators import kingfisher, kobuki
 
 SCENARIO = "bearing_late"
 MARGIN_S = 5.0  # a run begins up to so long after everything is ready
@@ -37,15 +40,15 @@ def bearing_late(live: LiveSystem) -> Outcome:
         place = message.pose.pose.position
         distance[0] = math.hypot(place.x - FAR_M, place.y)
 
-    subscribe, witness = live.bystander.create_subscription, live.witness
+    subscribe, observer = live.bystander.create_subscription, live.observer
     subscribe(Bool, AIR_BEARING.name, on_air, subscriber_qos(AIR_BEARING))
     subscribe(Odometry, TRUTH.name, on_truth, subscriber_qos(TRUTH))
     live.begin()
-    moved = wait_for(witness.moves, load_scenario(SCENARIO).bearing_late_s[1] + MARGIN_S)
+    moved = wait_for(observer.moves, load_scenario(SCENARIO).bearing_late_s[1] + MARGIN_S)
     off_s = next((heard_s for heard_s, on in air if not on), None)
     on_s = next((heard_s for heard_s, on in air if on), math.inf)
-    first_s = next((heard_s for heard_s, moves in witness.applied_since(0.0) if moves), math.inf)
-    said = next((word for word in witness.words_since(0.0) if word.text == BEARING_OFF), None)
+    first_s = next((heard_s for heard_s, moves in observer.applied_since(0.0) if moves), math.inf)
+    said = next((word for word in observer.statements_since(0.0) if word.text == BEARING_OFF), None)
     if not moved or off_s is None or said is None:
         return Outcome(
             "", "no valve opened" if not moved else "nothing said that the air bearing is off", False
@@ -60,8 +63,41 @@ def bearing_late(live: LiveSystem) -> Outcome:
     return Outcome(said.who, words, passed=reached)
 
 
-def _why_not(robot: Robot) -> str:
+def _without_bearing(robot: Robot) -> str:
     return "" if robot.air_bearing else f"'{robot.name}' has no air bearing"
 
 
-BEARING_FAULTS = (Fault(bearing_late, Surroundings(scenario=SCENARIO), _why_not, begins=False),)
+# What a device waits for its driver before it stops by itself [s].
+OWN_TIMEOUT_S = {Kobuki: kobuki.TIMEOUT_S, KingfisherNmea: kingfisher.TIMEOUT_S}
+REPORTS_S = 0.05  # an emulator moves and is heard at its own beat
+
+
+def driver_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that owns the device: the device's own watchdog stops it."""
+    return _driver(live, signal.SIGKILL)
+
+
+def driver_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the same."""
+    return _driver(live, signal.SIGSTOP)
+
+
+def _driver(live: LiveSystem, number: signal.Signals) -> Outcome:
+    own_s = OWN_TIMEOUT_S[type(load_hardware(live.plan.hardware).driver)]
+    return signalled(live, "plant", number, own_s + live.tick_s + REPORTS_S)
+
+
+def _without_watchdog(robot: Robot) -> str:
+    files = hardware_of(robot.name)
+    if not files:
+        return f"there is no driver for '{robot.name}'"
+    if type(load_hardware(files[0]).driver) not in OWN_TIMEOUT_S:
+        return "its device has no watchdog of its own: only hardware can close the valves then"
+    return ""
+
+
+HARDWARE_FAULTS = (
+    Fault(driver_killed, FaultEnvironment(emulated=True), _without_watchdog),
+    Fault(driver_hangs, FaultEnvironment(emulated=True), _without_watchdog),
+    Fault(bearing_late, FaultEnvironment(scenario=SCENARIO), _without_bearing, begins=False),
+)

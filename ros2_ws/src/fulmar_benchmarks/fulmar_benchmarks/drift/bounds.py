@@ -13,13 +13,19 @@ line comes up to the bound within one control step (`tests/fulmar_benchmarks/tes
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.disturbances.outside import outside_wrench
 from fulmar_core.disturbances.world import World
-from fulmar_core.episode import Episode
+from fulmar_core.episode import Episode, episode_steps
 from fulmar_core.errors import ConfigError
+from fulmar_core.holdability import LEAST_MARGIN, hold_margin
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import Robot
+from fulmar_evaluation.evaluation import Trial
 
 # Directions about the line to the goal that are tried; the strictest counts [rad].
 DIRECTIONS = np.deg2rad(np.arange(-60.0, 61.0, 5.0))
@@ -97,3 +103,58 @@ def _changing_force(world: World, distance: np.ndarray, goal: np.ndarray) -> np.
     reach = np.hypot(goal[:, 0], goal[:, 1]) + 2.0 * distance + np.hypot(world.anchor_x, world.anchor_y)
     line = world.tether_stiffness * (reach + np.hypot(world.tether_x, world.tether_y))
     return np.asarray(np.sqrt(2.0) * world.wave_force + world.kick + line)
+
+
+def can_hold_episodes(robot: Robot, drawn: Episode) -> np.ndarray:
+    """Whether the goal pose of each episode can be held in its own world.
+
+    Args:
+        robot: A planar robot with thrusters.
+        drawn: Episodes whose goals have a heading, as `draw_episodes` gives them.
+
+    Returns:
+        Truth values, shape (episodes,).
+
+    Raises:
+        ConfigError: The robot has no thrusters.
+    """
+    goal = np.asarray(drawn.goal.current, dtype=float)
+    there = at_rest(goal[:, 0], goal[:, 1], goal[:, 2])
+    # At the beginning nothing kicks; kicks come and go, and no pose is lost for them.
+    fx, fy, torque = outside_wrench(there, drawn.world, np.zeros(len(goal)), robot.timing.physics_dt)
+    working = (drawn.world.alive * drawn.world.gain).T
+    known: dict[bytes, bool] = {}  # most episodes of a condition differ in the lost valves alone
+    able = np.zeros(len(goal), dtype=bool)
+    for i in range(len(goal)):
+        force = np.array([fx[i], fy[i]])
+        told = np.array([*working[i], *force, torque[i], goal[i, 2] if force.any() else 0.0])
+        key = told.tobytes()
+        if key not in known:
+            known[key] = (
+                hold_margin(robot, working[i], force, float(torque[i]), float(goal[i, 2])) > LEAST_MARGIN
+            )
+        able[i] = known[key]
+    return able
+
+
+RADII = {"PT5": 0.05, "PT2": 0.02, "PT1": 0.01}  # [m]
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Bounds and feasibility of some episodes."""
+
+    bounds: dict[str, np.ndarray]  # most of PT5, PT2 and PT1, shapes (episodes,) [%]
+    can_hold: np.ndarray  # whether the goal's pose can be held there, shape (episodes,)
+
+
+def physics_of(trial: Trial) -> Physics:
+    """Bound and decide every episode of a trial that goes to poses."""
+    robot, drawn = trial.robot, trial.drawn(np.arange(trial.episodes))
+    dt = robot.timing.substeps(trial.plan.control_hz) * robot.timing.physics_dt
+    steps = episode_steps(trial.task, dt)
+    bounds = {
+        name: approach_bound(robot, drawn, radius=radius, steps=steps, control_dt=dt)
+        for name, radius in RADII.items()
+    }
+    return Physics(bounds, can_hold_episodes(robot, drawn))

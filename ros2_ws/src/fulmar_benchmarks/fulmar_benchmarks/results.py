@@ -1,22 +1,27 @@
-"""What is kept of many episodes of one pair: figures of each, a few paths, and errors over time."""
+"""Results of one pair and waypoint bounds, kept in .npz files."""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import fulmar_evaluation.bounds
 from fulmar_core.atomic_write import whole_file
+from fulmar_core.episode import Episode
+from fulmar_evaluation.evaluation import Trial
+from fulmar_evaluation.waypoint_score import WaypointBound, waypoint_bound
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of what is kept over time
 FIGURE, MORE = "figure:", "more:"  # prefixes of figures and of further arrays in a file
 
 
 @dataclass(frozen=True)
-class Judged:
+class PairResult:
     """One robot, task and controller in one way of running."""
 
     about: dict[str, Any]  # JSON-ready: what was run, and what is told in words
@@ -41,7 +46,7 @@ class Judged:
             np.savez_compressed(file, about=np.array(json.dumps(self.about)), **arrays)
 
     @classmethod
-    def load(cls, path: Path) -> Judged:
+    def load(cls, path: Path) -> PairResult:
         """Read what `save` wrote.
 
         Raises:
@@ -62,4 +67,42 @@ class Judged:
             )
 
 
-_ARRAYS = tuple(each.name for each in fields(Judged) if each.name not in ("about", "figures", "more"))
+_ARRAYS = tuple(each.name for each in fields(PairResult) if each.name not in ("about", "figures", "more"))
+
+
+def cached_bound(trial: Trial, drawn: Episode, duration_s: float, folder: Path) -> WaypointBound:
+    """The bound of some episodes, from a file if an earlier run left it there.
+
+    Args:
+        trial: Its robot and task are meant.
+        drawn: The episodes.
+        duration_s: How long they last [s].
+        folder: Where files are kept.
+    """
+    path = folder / f"{trial.plan.robot}_{trial.plan.task}_bound_{_key(trial, drawn, duration_s)}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            fastest = file["goals_at_top_speed"] if "goals_at_top_speed" in file.files else None
+            return WaypointBound(file["goals"], fastest, str(file["name"]), str(file["rule"]))
+    except (OSError, ValueError, KeyError):
+        pass
+    bound = waypoint_bound(trial.robot, trial.task, drawn, duration_s)
+    kept: dict[str, Any] = {"goals": bound.goals, "name": np.array(bound.name), "rule": np.array(bound.rule)}
+    if bound.goals_at_top_speed is not None:
+        kept["goals_at_top_speed"] = bound.goals_at_top_speed
+    folder.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as file:
+        np.savez(file, **kept)
+    return bound
+
+
+def _key(trial: Trial, drawn: Episode, duration_s: float) -> str:
+    """Hash of everything that a bound depends on: robot, tolerance, places, and the code."""
+    digest = hashlib.sha256()
+    told = {"robot": asdict(trial.robot), "tolerance": asdict(trial.task.tolerance), "duration_s": duration_s}
+    digest.update(json.dumps(told, sort_keys=True, default=str).encode())
+    for array in (drawn.start.x, drawn.start.y, drawn.start.yaw, drawn.goal.targets):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    for path in sorted(Path(str(fulmar_evaluation.bounds.__file__)).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

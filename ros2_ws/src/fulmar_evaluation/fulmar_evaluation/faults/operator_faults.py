@@ -1,4 +1,4 @@
-"""What becomes of a robot that a person drives when the node between them dies."""
+"""Faults of operator inputs: a volatile e-stop publisher, a teleoperation node that dies."""
 
 from __future__ import annotations
 
@@ -7,17 +7,40 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import rclpy
 from sensor_msgs.msg import Joy
+from std_msgs.msg import Bool
 
 from fulmar_core.errors import RunFailed
 from fulmar_core.teleop import JoyLayout
-from fulmar_core.topics import JOY
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
-from fulmar_evaluation.faults.fault_result import Outcome, stopped
+from fulmar_core.topics import ESTOP, JOY
+from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.qos import publisher_qos
+
+DEFAULT_QOS = 10  # a depth alone: reliable and volatile
+NODES = 4  # plant, controller, e-stop node and recorder subscribe the e-stop
+MATCH_S = 10.0
+
+
+def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
+    """One message; the e-stop node, which goes on publishing, must not end it."""
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
+    try:
+        publisher = node.create_publisher(Bool, ESTOP.name, DEFAULT_QOS)
+        # A volatile publisher matches one of the two subscriptions of each node.
+        if not wait_for(lambda: publisher.get_subscription_count() >= NODES, MATCH_S):
+            raise RunFailed(f"fewer than {NODES} nodes subscribe {publisher.topic_name} within {MATCH_S:g} s")
+        since_s = live.until_it_moves()
+        # The very next tick may be safe: a state that still moves the robot must be on record, at most two ticks old.
+        wait_for(lambda: any(moves for _, moves in live.observer.applied_since(since_s)), STAYS_S)
+        publisher.publish(Bool(data=True))
+        return stopped(live, since_s, live.silenced_s)
+    finally:
+        node.destroy_node()
+
 
 GAMEPAD_S = 0.05  # between its messages
 TAKES_S = 10.0  # for a hand to be heard, on a busy machine
@@ -46,7 +69,7 @@ def _hand(live: LiveSystem, number: signal.Signals) -> Outcome:
 
 
 def _commanded_by(live: LiveSystem) -> str:
-    words = [word for word in live.witness.words_since(0.0) if word.who == "plant"]
+    words = [word for word in live.observer.statements_since(0.0) if word.who == "plant"]
     return words[-1].values.get("commanded_by", "") if words else ""
 
 
@@ -71,4 +94,8 @@ def _held_gamepad(live: LiveSystem) -> Iterator[None]:
         thread.join()
 
 
-HAND_FAULTS = tuple(Fault(do, Surroundings(by_hand=True)) for do in (teleop_killed, teleop_hangs))
+OPERATOR_FAULTS = (
+    Fault(estop_pressed_once_by_a_volatile_publisher),
+    Fault(teleop_killed, FaultEnvironment(by_hand=True)),
+    Fault(teleop_hangs, FaultEnvironment(by_hand=True)),
+)
