@@ -24,7 +24,7 @@ from fulmar_core.policy_bundle import NETWORK, Golden, read_golden, read_passpor
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY
 from fulmar_evaluation.rerun import live_node
-from fulmar_evaluation.rerun.calibration import calibrated_as
+from fulmar_evaluation.rerun.embedded_configs import calibrated_as
 from fulmar_evaluation.rerun.reference_bags import TOLERANCES
 from fulmar_evaluation.rerun.rerun import rerun
 from fulmar_evaluation.rerun.rerun_result import FIELDS, compare_answers

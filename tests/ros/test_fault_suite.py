@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_cli.commands.faults import names_in
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_evaluation.faults import network_faults
+from fulmar_evaluation.faults import command_faults
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
@@ -57,7 +57,7 @@ def test_a_robot_has_the_faults_that_mean_something_to_it():
 
 
 def test_faults_that_need_root_are_left_out_and_refused_where_there_is_none(monkeypatch) -> None:
-    monkeypatch.setattr(network_faults, "why_not", lambda: "two hosts need root")
+    monkeypatch.setattr(command_faults, "why_not", lambda: "two hosts need root")
     possible, skipped = faults_of("turtlebot2")
     assert not {"cable_cut", "cable_lossy"} & {fault.name for fault in possible}
     assert {one.name for one in skipped if one.reason == "two hosts need root"} == {
