@@ -13,7 +13,7 @@ from fulmar_bags.control_steps import course_of
 from fulmar_bags.plain_twist import answers_within
 from fulmar_bags.received import ABSENT
 from fulmar_cli.main import app
-from fulmar_evaluation.report.bag_plots import write_bag_report
+from fulmar_evaluation.report.bag_report import write_bag_report
 from tests.foreign_bag import write_foreign
 
 

@@ -13,7 +13,7 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_reader import read_any_run
 from fulmar_core.errors import BagError
-from fulmar_evaluation.report.sources import check_overwrite, default_report, source_mark
+from fulmar_evaluation.report.writer import check_overwrite, default_report, source_mark
 from fulmar_evaluation.run_evaluation import evaluate_run
 from tests.foreign_bag import write_foreign
 from tests.fulmar_cli.bag_commands import LQR, POLICY

@@ -33,7 +33,7 @@ def plot(
     without: its path, its speed, its actuators, and how late its messages came.
     """
     require("matplotlib")
-    from fulmar_evaluation.report.bag_plots import write_bag_report
+    from fulmar_evaluation.report.bag_report import write_bag_report
     from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries
 
     opened = open_and_warn(bag)

@@ -1,4 +1,4 @@
-"""How a run went over time, by what its task asks: errors of place, heading and motion, or targets reached."""
+"""Errors of position, heading and motion over time, or targets reached, as the task asks."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator
 
 from fulmar_core.tasks.terms import Tolerance
-from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
-from fulmar_evaluation.report.view import View, evaluated
+from fulmar_evaluation.report.drawing import ANGLES, LENGTHS, limit_line, log_scale
+from fulmar_evaluation.report.run_view import View, evaluated
+from fulmar_evaluation.report.style import FAINT, quiet_grid
 from fulmar_evaluation.run_evaluation import RunResult
 
-LENGTHS = {0.001: "1 mm", 0.01: "1 cm", 0.1: "10 cm", 1.0: "1 m", 10.0: "10 m"}
-ANGLES = {0.01: "0.01°", 0.1: "0.1°", 1.0: "1°", 10.0: "10°", 100.0: "100°"}
 SPEEDS = {0.001: "1 mm/s", 0.01: "1 cm/s", 0.1: "10 cm/s", 1.0: "1 m/s", 10.0: "10 m/s"}
 TURN_RATES = {0.01: "0.01°/s", 0.1: "0.1°/s", 1.0: "1°/s", 10.0: "10°/s", 100.0: "100°/s"}
 
@@ -29,43 +28,28 @@ class Strip:
     lowest: float
     values: Callable[[RunResult], np.ndarray]
     tolerance: Callable[[Tolerance], float]  # 0: there is none
-    limit: str  # what stands beside the line of the tolerance
+    unit: str  # of the tolerance
 
 
 STRIPS = (
+    Strip("distance to goal", LENGTHS, 2e-3, lambda r: r.run.position_error[0], lambda t: t.position, "m"),
     Strip(
-        "distance to goal",
-        LENGTHS,
-        2e-3,
-        lambda j: j.run.position_error[0],
-        lambda t: t.position,
-        "{:g} m",
+        "heading error", ANGLES, 2e-2, lambda r: _deg(r.run.heading_error[0]), lambda t: t.heading_deg, "°"
     ),
-    Strip(
-        "heading error",
-        ANGLES,
-        2e-2,
-        lambda j: np.abs(np.rad2deg(j.run.heading_error[0])),
-        lambda t: t.heading_deg,
-        "{:g}°",
-    ),
-    Strip(
-        "velocity error",
-        SPEEDS,
-        2e-3,
-        lambda j: j.run.velocity_error[0],
-        lambda t: t.velocity,
-        "{:g} m/s",
-    ),
+    Strip("velocity error", SPEEDS, 2e-3, lambda r: r.run.velocity_error[0], lambda t: t.velocity, "m/s"),
     Strip(
         "turn rate error",
         TURN_RATES,
         2e-2,
-        lambda j: np.abs(np.rad2deg(j.run.yaw_rate_error[0])),
+        lambda r: _deg(r.run.yaw_rate_error[0]),
         lambda t: t.yaw_rate_deg,
-        "{:g}°/s",
+        "°/s",
     ),
 )
+
+
+def _deg(angle: np.ndarray) -> np.ndarray:
+    return np.asarray(np.abs(np.rad2deg(angle)))
 
 
 def strips(runs: Sequence[View]) -> list[Strip]:
@@ -112,7 +96,7 @@ def _reached(axes: Axes, runs: Sequence[View]) -> None:
         axes.step(result.time_s, result.run.goals[0], where="post", color=run.colour, label=run.label)
         required = result.task.required
         if required is not None:
-            _limit(axes, required, f"{required} make a success")
+            limit_line(axes, required, f"{required} make a success")
     quiet_grid(axes)
     _span(axes, runs)
     axes.set_ylim(bottom=0.0)
@@ -133,10 +117,7 @@ def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
         axes.plot(result.time_s, strip.values(result), color=run.colour, linewidth=1.2, label=run.label)
     quiet_grid(axes)
     _span(axes, runs)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(FixedLocator(list(strip.marks)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: strip.marks.get(value, "")))
-    axes.yaxis.set_minor_locator(NullLocator())
+    log_scale(axes.yaxis, strip.marks)
     limits = [strip.tolerance(result.task.tolerance) for _, result in evaluated(runs)[:1]]
     axes.set_ylim(strip.lowest, _top(axes, strip, limits))
     axes.set_ylabel(strip.label)
@@ -145,13 +126,9 @@ def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
             axes.axvspan(result.window_start_s, result.duration_s, color=FAINT, alpha=0.12, linewidth=0)
     for limit in limits:
         if limit > 0.0:
-            _limit(axes, limit, f"tolerance {strip.limit.format(limit)}")
+            space = " " if strip.unit.startswith("m") else ""
+            limit_line(axes, limit, f"tolerance {limit:g}{space}{strip.unit}")
 
 
 def _span(axes: Axes, runs: Sequence[View]) -> None:
     axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))
-
-
-def _limit(axes: Axes, value: float, label: str) -> None:
-    axes.axhline(value, color=INK, linestyle=DASHED, linewidth=1.0)
-    axes.text(0.005, value, label, transform=axes.get_yaxis_transform(), va="bottom", fontsize=8.5, color=INK)

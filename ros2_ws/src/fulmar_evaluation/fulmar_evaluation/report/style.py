@@ -106,7 +106,7 @@ def as_svg(figure: Figure) -> str:
 
 
 def as_png(figure: Figure, mark: str = "", *, dpi: int = 130) -> bytes:
-    """A figure as a picture file on white, with the mark of `report.sources` where one is given."""
+    """A figure as a picture file on white, with the mark of `report.writer` where one is given."""
     stream = BytesIO()
     metadata = {"Source": mark} if mark else {}
     figure.savefig(stream, format="png", dpi=dpi, facecolor="white", metadata=metadata)

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from fulmar_core.rotation import yaw_of
+from fulmar_evaluation.report.drawing import draw_body, draw_discs, draw_goal, spaced
+from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
-from fulmar_evaluation.report.view import View, evaluated
 from fulmar_evaluation.run_evaluation import RunResult
 
 OUTLINES = 5  # of the body along the path
@@ -18,7 +19,7 @@ CLOSE_UP = 2.4  # half width of the close look, in tolerances
 
 
 def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
-    """Paths, start, targets, what stands about, and the outline of the body at some instants."""
+    """Paths, start, targets, obstacles, and the outline of the body at some instants."""
     quiet_grid(axes)
     axes.set_aspect("equal")
     for order, (run, result) in enumerate(evaluated(runs)):
@@ -26,13 +27,12 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
         xy = motion.position[result.samples, :2]
         axes.plot(*xy.T, color=run.colour, label=run.label, zorder=4)
         radius = result.robot.body.radius
-        for index in _instants(xy):
+        for index in spaced(xy, OUTLINES):
             yaw = float(yaw_of(motion.quat_xyzw[result.samples[index]]))
-            _body(axes, xy[index], yaw, radius, run.colour)
+            draw_body(axes, np.append(xy[index], yaw), result.robot.body, run.colour)
         if order == 0:
             _word(axes, "start", xy[0], radius, va="bottom")
-            for x, y, disc in run.record.obstacles:
-                axes.add_patch(Circle((x, y), disc, facecolor=FAINT, alpha=0.55, linewidth=0, zorder=3))
+            draw_discs(axes, run.record.obstacles)
         for x, y, _ in (pose.T for pose in result.things.values()):
             axes.plot(x, y, color=run.colour, linestyle=DASHED, linewidth=1.2, zorder=4)
             axes.plot(x[-1], y[-1], "s", color=run.colour, markersize=5, zorder=6)
@@ -42,7 +42,7 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
             _waypoints(axes, result, named=order == 0)
         elif has_place(result):
             for target in _given(result):
-                _goal(axes, result, target, radius)
+                draw_goal(axes, target, result.task.tolerance, arrow=1.6 * radius)
             if order == 0:
                 _word(axes, "goal", result.targets[-1, :2], -radius, va="top")
     axes.set_xlabel("x [m]")
@@ -103,40 +103,7 @@ def _waypoints(axes: Axes, result: RunResult, *, named: bool) -> None:
             )
 
 
-def _instants(xy: np.ndarray) -> list[int]:
-    """Samples that are evenly spaced along the path."""
-    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))))
-    return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], OUTLINES))).clip(0, len(xy) - 1).tolist()
-
-
-def _body(axes: Axes, centre: np.ndarray, yaw: float, radius: float, colour: str) -> None:
-    axes.add_patch(Circle(tuple(centre), radius, facecolor=colour, alpha=0.10, zorder=2))
-    axes.add_patch(
-        Circle(tuple(centre), radius, fill=False, edgecolor=colour, alpha=0.6, linewidth=0.9, zorder=3)
-    )
-    nose = centre + radius * np.array([np.cos(yaw), np.sin(yaw)])
-    axes.plot(*np.stack((centre, nose)).T, color=colour, linewidth=1.4, alpha=0.8, zorder=3)
-
-
 def _given(result: RunResult) -> np.ndarray:
     """Every place that was a goal at some time, in their order, shape (k, 3)."""
     changed = np.any(np.diff(result.aims, axis=0, prepend=np.nan) != 0.0, axis=1)
     return result.aims[changed]
-
-
-def _goal(axes: Axes, result: RunResult, target: np.ndarray, radius: float) -> None:
-    x, y, yaw = target
-    tolerance = result.task.tolerance
-    axes.add_patch(
-        Circle((x, y), tolerance.position, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=6)
-    )
-    if tolerance.heading_deg > 0.0:
-        tip = (x + 1.6 * radius * np.cos(yaw), y + 1.6 * radius * np.sin(yaw))
-        axes.plot(*tip, linestyle="none")  # makes room: arrows beyond the axes are not drawn
-        axes.annotate(
-            "",
-            tip,
-            (x, y),
-            arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0},
-            zorder=7,
-        )

@@ -1,22 +1,80 @@
-"""What a report says about a run, in plain language and in figures."""
+"""One run prepared for a report: its record, result and colour, its sentences and its table."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from fulmar_evaluation.report.view import View
+import numpy as np
 
-Row = tuple[str, str, list[str]]  # what, an explanation, and the cell of each run
+from fulmar_bags.run_record import RunRecord
+from fulmar_evaluation.report.style import colours
+from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
+from fulmar_evaluation.run_summary import latencies_ms, summarise
+
+SPOKEN = {
+    "lqr": "LQR",
+    "mpc": "MPC",
+    "lqr_drift": "DRIFT's LQR",
+    "policy": "policy",
+    "classical": "classical law",
+    "excite": "excitation",
+    "external": "external controller",
+}
 
 
-def verdict(run: View) -> tuple[str, str]:
+Row = tuple[str, str, list[str]]  # quantity, explanation, and the cell of each run
+
+
+@dataclass(frozen=True)
+class View:
+    """Everything that a plot or a sentence about one run needs."""
+
+    label: str
+    colour: str
+    record: RunRecord
+    result: RunResult | None  # None: the record is too short to evaluate
+    summary: dict[str, Any]
+    latencies_ms: np.ndarray
+
+    @property
+    def binary(self) -> bool:
+        """Whether the actuators are valves, open or closed."""
+        return self.result is None or self.result.robot.actuators.binary
+
+
+def views(records: Sequence[RunRecord]) -> list[View]:
+    """Prepare runs for one report.
+
+    Args:
+        records: At least one.
+
+    Raises:
+        FulmarError: A record names no task or goal.
+    """
+    controllers = [str(record.info.get("controller", "unknown")) for record in records]
+    labels = [SPOKEN.get(name, name) for name in controllers]
+    if len(set(labels)) < len(labels):  # the bag's name separates runs of one controller
+        labels = [f"{label} ({record.path.name})" for label, record in zip(labels, records, strict=True)]
+    return [
+        View(label, colour, record, evaluate_run(record), summarise(record), latencies_ms(record))
+        for label, colour, record in zip(labels, colours(controllers), records, strict=True)
+    ]
+
+
+def evaluated(runs: Sequence[View]) -> list[tuple[View, RunResult]]:
+    """Those runs that have a result, with it."""
+    return [(run, run.result) for run in runs if run.result is not None]
+
+
+def result_of(run: View) -> tuple[str, str]:
     """One word and one or two sentences on how a run went."""
     result = run.result
     if result is None:
-        return "No result", "The bag holds fewer than two states, so there is nothing to judge."
+        return "No result", "The bag holds fewer than two states, so there is nothing to evaluate."
     if not result.long_enough:
-        return "Missed", f"The run ended after {result.duration_s:.1f} s, too early to judge."
+        return "Missed", f"The run ended after {result.duration_s:.1f} s, too early to evaluate."
     touched = " It touched an obstacle." if result.figures["collided"] else ""
     if result.progress is not None:
         path = run.summary["path_error_m"]
@@ -53,7 +111,7 @@ def verdict(run: View) -> tuple[str, str]:
 
 
 def rule(runs: Sequence[View]) -> str:
-    """What counts as success, for the first run that can be judged."""
+    """What counts as success, for the first run that has a result."""
     for run in runs:
         if run.result is not None:
             task, tolerance = run.result.task, run.result.task.tolerance
@@ -77,7 +135,7 @@ def rule(runs: Sequence[View]) -> str:
     return ""
 
 
-def table(runs: Sequence[View]) -> list[Row]:
+def table_rows(runs: Sequence[View]) -> list[Row]:
     """The figures of every run, one row each."""
 
     def row(what: str, why: str, cell: Callable[[dict[str, Any]], str]) -> Row:

@@ -1,6 +1,6 @@
-"""Pictures of a bag that names no task: where it went, how fast, what its actuators did, how late its messages came.
+"""Report of a bag that names no task: path, speed, actuator commands, delays and rates.
 
-Runs of Fulmar have a task and a goal, and `fulmar_evaluation.report` draws them.
+Runs of Fulmar have a task and a goal; `run_report` draws them.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ from fulmar_bags.contents import Bag
 from fulmar_bags.decode import Odometries, Vectors, joint_vectors, odometries, twist_vectors
 from fulmar_bags.figures import describe
 from fulmar_bags.plain_twist import TYPE, plain_vectors
-from fulmar_core.errors import ConfigError
-from fulmar_evaluation.report.page import STYLE
-from fulmar_evaluation.report.sources import check_overwrite, source_mark
-from fulmar_evaluation.report.style import CONTROLLER_COLOURS, as_png, as_svg, house_style, legend, quiet_grid
+from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
+from fulmar_evaluation.report.style import CONTROLLER_COLOURS, legend, quiet_grid
+from fulmar_evaluation.report.writer import write_document
 
 WIDTH = 6.2  # [inch]
 COLOUR = CONTROLLER_COLOURS["policy"]
@@ -36,7 +35,7 @@ MOST_ACTUATORS = 16
 
 @dataclass(frozen=True)
 class Drawing:
-    """One picture with its words."""
+    """One plot before it is drawn."""
 
     title: str
     caption: str
@@ -51,33 +50,26 @@ def write_bag_report(
 
     Args:
         bag: Any bag with odometry.
-        out: A `.html` page that works offline, or a `.png` picture. Its folder is made.
+        out: A `.html` page that works offline, or a `.png` image. Its folder is made.
         odometry: Topic, where there are several.
         note: A sentence for the page.
         force: Replace whatever file is there; False: only a report of the same bag.
 
     Raises:
         BagError: The bag holds no odometry.
-        ConfigError: Another kind of file was asked for, or a file of something else is there.
-        OSError: It cannot be written.
+        ConfigError: As `write_document` says.
     """
-    if out.suffix not in (".html", ".png"):
-        raise ConfigError(f"{out}: a plot is a .html page or a .png picture. Give such a name.")
-    mark = source_mark([bag.path])
-    if not force:
-        check_overwrite(out, mark)
     topic = bag.odometry(odometry)
-    drawings = _drawings(bag, odometries(topic))
-    title = f"{bag.path.name}: {topic.name}"
-    with house_style():
-        data = (
-            as_png(_sheet(drawings, title), mark)
-            if out.suffix == ".png"
-            else _page(drawings, title, mark, [note] if note else [], describe(bag)["topics"]).encode()
-        )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_bytes(data)
-    return out
+    drawings, title = _drawings(bag, odometries(topic)), f"{bag.path.name}: {topic.name}"
+
+    def page(mark: str) -> str:
+        parts: list[Part] = [f"<p>{escape(note)}</p>"] if note else []
+        parts += [Plot(each.title, each.caption, _sheet([each], WIDTH)) for each in drawings]
+        return html_page(title, [*parts, *_rates(describe(bag)["topics"])], mark=mark)
+
+    return write_document(
+        out, [bag.path], page=page, sheet=lambda: _sheet(drawings, WIDTH + 1.0, title), force=force
+    )
 
 
 def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
@@ -107,7 +99,7 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
         axes.set_ylabel("delay [ms]")
 
     found = [
-        Drawing("The path, seen from above", "As the odometry tells it.", 4.0, path),
+        Drawing("The path, seen from above", "As the odometry reports it.", 4.0, path),
         Drawing("How fast", "Speed and turn rate in the body's frame.", 2.2, pace),
     ]
     for topic in bag.topics.values():
@@ -152,51 +144,29 @@ def _actuators(name: str, vectors: Vectors, time_s: np.ndarray) -> Drawing:
     return Drawing(f"What the actuators did: {name}", caption, 0.8 + 0.28 * len(vectors.names), draw)
 
 
-def _sheet(drawings: Sequence[Drawing], title: str) -> Figure:
+def _sheet(drawings: Sequence[Drawing], width: float, title: str = "") -> Figure:
+    """Drawings below one another; with a title over the sheet, each has its own."""
     heights = [drawing.height for drawing in drawings]
-    figure = Figure(figsize=(WIDTH + 1.0, sum(heights)), layout="constrained")
-    for axes, drawing in zip(figure.subplots(len(drawings), 1, height_ratios=heights), drawings, strict=True):
-        drawing.draw(axes)
-        axes.set_title(drawing.title)
-        quiet_grid(axes)
-    figure.suptitle(title, fontweight="bold")
+    figure = Figure(figsize=(width, sum(heights)), layout="constrained")
+    axes = figure.subplots(len(drawings), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for one, drawing in zip(axes, drawings, strict=True):
+        drawing.draw(one)
+        one.set_title(drawing.title if title else "")
+        quiet_grid(one)
+    if title:
+        figure.suptitle(title, fontweight="bold")
     return figure
 
 
-def _rates(topics: Sequence[dict[str, Any]]) -> str:
+def _rates(topics: Sequence[dict[str, Any]]) -> list[str]:
     """Counts, rates and gaps of the topics as a table."""
-    rows = "".join(
-        f"<tr><td>{escape(topic['name'])}</td><td>{topic['count']}</td>"
-        f"<td>{'–' if topic['rate_hz'] is None else format(topic['rate_hz'], '.2f')}</td>"
-        f"<td>{'–' if topic['longest_gap_s'] is None else format(topic['longest_gap_s'], '.3f')}</td></tr>"
+
+    def number(value: float | None, digits: int) -> str:
+        return "–" if value is None else f"{value:.{digits}f}"
+
+    heads = cells(("topic", "messages", "rate [Hz]", "longest gap [s]"), "th")
+    rows = [
+        (topic["name"], str(topic["count"]), number(topic["rate_hz"], 2), number(topic["longest_gap_s"], 3))
         for topic in topics
-    )
-    heads = "".join(f"<th>{head}</th>" for head in ("topic", "messages", "rate [Hz]", "longest gap [s]"))
-    return f'<h2>Rates</h2><div class="scroll"><table><tr>{heads}</tr>{rows}</table></div>'
-
-
-def _page(
-    drawings: Sequence[Drawing],
-    title: str,
-    mark: str,
-    notes: Sequence[str],
-    topics: Sequence[dict[str, Any]],
-) -> str:
-    parts = [f"<p>{escape(note)}</p>" for note in notes]
-    for drawing in drawings:
-        figure = Figure(figsize=(WIDTH, drawing.height), layout="constrained")
-        axes = figure.subplots()
-        drawing.draw(axes)
-        quiet_grid(axes)
-        parts.append(
-            f"<h2>{escape(drawing.title)}</h2><figure>{as_svg(figure)}</figure>"
-            f'<p class="faint">{escape(drawing.caption)}</p>'
-        )
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<meta name="fulmar-source" content="{escape(mark)}">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
-        + "\n".join([*parts, _rates(topics)])
-        + "\n</body></html>\n"
-    )
+    ]
+    return ["<h2>Rates</h2>", table([heads], (f"<tr>{cells(row)}</tr>" for row in rows))]
