@@ -157,19 +157,19 @@ def test_a_task_that_nobody_did_has_no_pictures(findings, tmp_path):
     assert len(list((tmp_path / "pictures").iterdir())) == 1
 
 
-@pytest.mark.parametrize("picture", ["draw_courses", "draw_scenes_with_obstacles"])
-def test_ways_are_seen_whole_unless_they_lead_far_away(findings, picture):
-    from fulmar_benchmarks.roboran.report import scene_picture
+@pytest.mark.parametrize("plot", ["draw_waypoint_paths", "draw_scenes_with_obstacles"])
+def test_ways_are_seen_whole_unless_they_lead_far_away(findings, plot):
+    from fulmar_benchmarks.roboran.report import path_plots
     from fulmar_benchmarks.roboran.report.view import views
 
-    task = "go_through_positions" if picture == "draw_courses" else "go_to_position_with_obstacles"
+    task = "go_through_positions" if plot == "draw_waypoint_paths" else "go_to_position_with_obstacles"
     runs = views(findings, task)
     near, far = (
         replace(run.main, paths=run.main.paths + shift)
         for run, shift in zip(runs[:2], (2.5, 60.0), strict=True)
     )
     runs = [replace(run, outcomes={"batch": main}) for run, main in zip(runs[:2], (near, far), strict=True)]
-    axes = getattr(scene_picture, picture)(runs).axes
+    axes = getattr(path_plots, plot)(runs).axes
     for one in axes:
         (left, right), (low, high) = one.get_xlim(), one.get_ylim()
         ways = np.concatenate([line.get_xydata() for line in one.lines])
@@ -180,10 +180,10 @@ def test_ways_are_seen_whole_unless_they_lead_far_away(findings, picture):
 
 @pytest.mark.parametrize("low", [0.2, 0.5, 0.81, 0.9])
 def test_the_overview_marks_its_scale_where_its_numbers_say(findings, low):
-    from fulmar_benchmarks.roboran.report.headline_plot import draw_headline
+    from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
 
     entries = [entry | {"judged": {"batch": low}} for entry in findings.document["pairs"][:1]]
-    figure = draw_headline(findings.document | {"pairs": entries})
+    figure = draw_glance(findings.document | {"pairs": entries})
     figure.canvas.draw()
     (axes,) = figure.axes
     for at, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):

@@ -15,6 +15,7 @@ SPOKEN = {
     "go_to_position_with_obstacles": "Go to position with obstacles",
 }
 GOOD, BAD = "good", "bad"
+MARKS = {GOOD: " ✓", BAD: " ✗", "": ""}  # behind a cell of that tone
 NOTHING = "–"
 
 

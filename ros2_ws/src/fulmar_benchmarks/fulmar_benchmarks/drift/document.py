@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -190,13 +189,10 @@ def _checks(row: str, controller: str, rows: dict[str, Any]) -> list[dict[str, A
             "controller": controller,
             "figure": asked.figure,
             "better": "more" if asked.at_least else "less",
-            **{
-                key: value
-                for key, value in dataclasses.asdict(
-                    asked.verdict(figures[asked.figure]["mean"] if figures else None)
-                ).items()
-                if key != "name"
-            },
+            "measured": check.measured,
+            "limit": check.limit,
+            "met": check.met,
         }
         for asked in requirements(row, controller)
+        for check in (asked.check(figures[asked.figure]["mean"] if figures else None),)
     ]

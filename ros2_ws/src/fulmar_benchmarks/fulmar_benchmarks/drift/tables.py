@@ -30,7 +30,7 @@ _WIDTH = 170  # where nobody looks at a terminal, lines need not fit one
 
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
-    """Print both tables, what their figures are, what is not met, and the verdict.
+    """Print both tables, what their figures are, what is not met, and the conclusion.
 
     Args:
         document: Of `document_of`.
@@ -45,11 +45,11 @@ def print_tables(document: dict[str, Any], output: Console) -> None:
         wide.print(_table("Paths followed at 0.2 m/s", PATH_HEADS, paths))
     for line in [*missing(document), *unmet(document)]:
         wide.print(line, markup=False, style="yellow", soft_wrap=True)
-    for line in [*notes(document), verdict(document)]:
+    for line in [*notes(document), conclusion(document)]:
         wide.print(line, markup=False, soft_wrap=True)
 
 
-def verdict(document: dict[str, Any]) -> str:
+def conclusion(document: dict[str, Any]) -> str:
     """One sentence on what was asked and met."""
     asked, met, open_ = document["asked"], document["met"], document["open"]
     return f"{met} of {asked} figures that are asked for are met" + (

@@ -102,7 +102,7 @@ class Requirement:
         """Whether more is better."""
         return BETTER.get(self.figure, "less") == "more"
 
-    def verdict(self, measured: float | None) -> Check:
+    def check(self, measured: float | None) -> Check:
         """Compare with a measurement; None where there is none."""
         met = None
         if measured is not None:

@@ -17,7 +17,7 @@ _WIDTH = 140  # where nobody looks at a terminal, lines need not fit one
 
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
-    """Print one table a task, what the figures are, and the verdict.
+    """Print one table a task, what the figures are, and the conclusion.
 
     Args:
         document: Of `roboran`.
@@ -35,10 +35,10 @@ def print_tables(document: dict[str, Any], output: Console) -> None:
                 wide.print(f"{spoken(task)}, {missing(entry)}", markup=False, style="yellow", soft_wrap=True)
     for line in notes(document):
         wide.print(line, markup=False, soft_wrap=True)
-    wide.print(verdict(document), markup=False, soft_wrap=True)
+    wide.print(conclusion(document), markup=False, soft_wrap=True)
 
 
-def verdict(document: dict[str, Any]) -> str:
+def conclusion(document: dict[str, Any]) -> str:
     """One sentence on what was asked and met."""
     asked, met, open_ = document["asked"], document["met"], document["open"]
     return f"{met} of {asked} pairs meet everything that is asked of them" + (

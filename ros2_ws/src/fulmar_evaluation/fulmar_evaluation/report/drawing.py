@@ -46,7 +46,8 @@ def log_scale(axis: Axis, marks: dict[float, str] | Sequence[float]) -> None:
         marks: The values, with their labels where these are more than the number.
     """
     labels = marks if isinstance(marks, dict) else {value: f"{value:g}" for value in marks}
-    getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
+    axes = axis.axes
+    (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
     axis.set_major_locator(FixedLocator(list(labels)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, "")))
     axis.set_minor_locator(NullLocator())
@@ -105,7 +106,7 @@ def draw_goal(axes: Axes, goal: np.ndarray, tolerance: Tolerance, *, arrow: floa
     axes.add_patch(
         Circle((x, y), tolerance.position, facecolor=PAPER, edgecolor=edge, linewidth=1.0, zorder=6)
     )
-    if tolerance.heading_deg > 0.0:
+    if arrow and tolerance.heading_deg > 0.0:
         tip = (x + arrow * np.cos(yaw), y + arrow * np.sin(yaw))
         axes.plot(*tip, linestyle="none")  # makes room: arrows beyond the axes are not drawn
         look = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}

@@ -1,4 +1,4 @@
-"""Everything at a glance: what was reached, what was asked, what is published, and the bound."""
+"""All conditions at a glance: our means, what is required, what is published, and the bound."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fulmar_benchmarks.drift.cells import spoken
-from fulmar_benchmarks.drift.report.view import WIDTH
+from fulmar_evaluation.report.drawing import WIDTH, key, ring
 from fulmar_evaluation.report.style import FAINT, INK, colours, quiet_grid
 
 SHOWN = ("PT5", "PT2", "PT1", "OT5")
@@ -17,7 +17,7 @@ _APART = 0.34  # between the controllers of one row, of the distance of two rows
 
 
 def draw_glance(document: dict[str, Any]) -> Figure | None:
-    """One row a condition, one column a figure; None where no condition was judged."""
+    """One row a condition, one column a figure; None where no condition has a result."""
     rows = {
         name: row
         for name, row in document["rows"].items()
@@ -34,15 +34,14 @@ def draw_glance(document: dict[str, Any]) -> Figure | None:
     }
     shade = colours(names)
     for one, shown in zip(axes, SHOWN, strict=True):
-        for at, (row, told) in enumerate(rows.items()):
+        for at, (row, known) in enumerate(rows.items()):
             one.axhspan(at - 0.5, at + 0.5, color=FAINT, alpha=0.09 * (at % 2), linewidth=0)
-            if shown in told["bound"]:
-                one.plot(
-                    [told["bound"][shown]["mean"]] * 2, [at - 0.45, at + 0.45], color=FAINT, linewidth=1.2
-                )
+            if shown in known["bound"]:
+                most = known["bound"][shown]["mean"]
+                one.plot([most] * 2, [at - 0.45, at + 0.45], color=FAINT, linewidth=1.2)
             for index, (name, colour) in enumerate(zip(names, shade, strict=True)):
                 y = at + _APART * (index - 0.5 * (len(names) - 1)) * 2.0 / max(len(names), 2)
-                _mark(one, y, told["controllers"][name], shown, colour, asked.get((row, name, shown)))
+                _mark(one, y, known["controllers"][name], shown, colour, asked.get((row, name, shown)))
         one.set_title(f"{shown} [%]", loc="left")
         one.set_xlim(-3.0, 103.0)
         quiet_grid(one)
@@ -51,14 +50,12 @@ def draw_glance(document: dict[str, Any]) -> Figure | None:
     axes[0].set_ylim(len(rows) - 0.5, -0.5)
     for one in axes:
         one.tick_params(axis="y", length=0.0)
-    figure.legend(handles=_key(names, shade), loc="outside upper left", ncols=len(names) + 3, fontsize=9)
+    key(figure, _key(names, shade), most=len(names) + 3)
     return figure
 
 
 def _mark(axes: Axes, y: float, entry: dict[str, Any], figure: str, colour: str, limit: float | None) -> None:
-    axes.plot(
-        entry["published"][figure], y, "o", color=colour, markerfacecolor="none", markersize=4.5, alpha=0.8
-    )
+    axes.plot(entry["published"][figure], y, **ring(colour, markersize=4.5, alpha=0.8))
     if entry["figures"]:
         ours = entry["figures"][figure]
         axes.plot([ours["p5"], ours["p95"]], [y, y], color=colour, linewidth=1.0, alpha=0.35)
@@ -72,10 +69,9 @@ def _key(names: list[str], shade: list[str]) -> list[Line2D]:
         Line2D([], [], color=colour, marker="o", linestyle="", label=spoken(name))
         for name, colour in zip(names, shade, strict=True)
     ]
-    look = {"linestyle": "", "color": INK}
     return [
         *lines,
-        Line2D([], [], marker="o", markerfacecolor="none", label="published", **look),
-        Line2D([], [], marker="|", markersize=9.0, label="asked", **look),
+        Line2D([], [], **ring(label="published")),
+        Line2D([], [], linestyle="", color=INK, marker="|", markersize=9.0, label="required"),
         Line2D([], [], color=FAINT, label="bound"),
     ]

@@ -1,4 +1,4 @@
-"""One controller in one row made ready for drawing."""
+"""One controller in one row prepared for drawing."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from fulmar_benchmarks.drift.campaign import CampaignResult
 from fulmar_benchmarks.drift.cells import spoken
 from fulmar_benchmarks.results import PairResult
 from fulmar_evaluation.report.style import colours
-
-WIDTH = 9.2  # of a picture [inch]
 
 
 @dataclass(frozen=True)
@@ -32,26 +30,22 @@ class View:
         return float(self.outcome.about["control_dt"]) * np.arange(1, steps + 1)
 
 
-def views(findings: CampaignResult, kind: str) -> dict[str, list[View]]:
-    """By row, every controller that was judged in it.
+def views(result: CampaignResult, kind: str) -> dict[str, list[View]]:
+    """By row, every controller that has a result in it.
 
     Args:
-        findings: Of the benchmark.
+        result: Of the benchmark.
         kind: pose or path.
     """
-    document: dict[str, Any] = findings.document
+    document: dict[str, Any] = result.document
     colour = dict(zip(document["controllers"], colours(document["controllers"]), strict=True))
     found = {
         name: [
             View(
-                name,
-                row["title"],
-                spoken(controller),
-                colour[controller],
-                findings.outcomes[name, controller],
+                name, row["title"], spoken(controller), colour[controller], result.outcomes[name, controller]
             )
             for controller in document["controllers"]
-            if (name, controller) in findings.outcomes
+            if (name, controller) in result.outcomes
         ]
         for name, row in document["rows"].items()
         if row["kind"] == kind

@@ -1,4 +1,4 @@
-"""Everything at a glance: what was reached, what was asked, what the thesis has."""
+"""All pairs at a glance: our success, what is required, what the thesis reports."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from matplotlib.ticker import MaxNLocator
 
 from fulmar_benchmarks.cells import spoken
 from fulmar_benchmarks.roboran.cells import head
-from fulmar_benchmarks.roboran.report.view import ROBOT_COLOURS, WIDTH
+from fulmar_benchmarks.roboran.report.view import ROBOT_COLOURS
+from fulmar_evaluation.report.drawing import WIDTH, key, ring
 from fulmar_evaluation.report.style import ALARM, FAINT, INK, PAPER, quiet_grid
 
 _ROW = 0.27  # height of a row [inch]
 
 
-def draw_headline(document: dict[str, Any]) -> Figure:
+def draw_glance(document: dict[str, Any]) -> Figure:
     """One row a pair, grouped by task."""
     groups = [
         (
@@ -37,14 +38,8 @@ def draw_headline(document: dict[str, Any]) -> Figure:
     at, ticks, labels = 0.0, [], []
     for task, entries in groups:
         share = entries[0]["judged_figure"] == "share_of_bound"
-        axes.text(
-            0.008,
-            at,
-            spoken(task) + (", share of the bound" if share else ", success"),
-            transform=axes.get_yaxis_transform(),
-            fontweight="bold",
-            va="center",
-        )
+        title = spoken(task) + (", share of the bound" if share else ", success")
+        _write(axes, at, title, fontweight="bold")
         for entry in entries:
             at += 1.0
             ticks.append(at)
@@ -55,13 +50,13 @@ def draw_headline(document: dict[str, Any]) -> Figure:
     low = _lowest(document)
     axes.set_xlim(low, 1.012)
     axes.set_yticks(ticks, labels)
-    axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))  # at whole percents, as they are told
+    axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))  # at whole percents, as they are printed
     axes.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
     quiet_grid(axes)
     axes.grid(False, axis="y")
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0.0)
-    figure.legend(handles=_KEY, loc="outside upper left", ncols=len(_KEY), fontsize=9)
+    key(figure, _KEY)
     return figure
 
 
@@ -79,60 +74,30 @@ def _row(axes: Any, at: float, entry: dict[str, Any]) -> None:
     colour = ROBOT_COLOURS.get(entry["robot"], INK)
     axes.axhline(at, color=FAINT, linewidth=0.5, alpha=0.35, zorder=1)
     if not entry["judged"]:
-        axes.text(
-            0.008,
-            at,
-            entry["status"],
-            transform=axes.get_yaxis_transform(),
-            color=ALARM,
-            va="center",
-            fontsize=8.5,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 1.0},
-        )
+        box = {"facecolor": PAPER, "edgecolor": "none", "pad": 1.0}
+        _write(axes, at, entry["status"], color=ALARM, fontsize=8.5, bbox=box)
     thesis = entry["thesis"]
     if thesis["success"] is not None and entry["judged_figure"] == "success_rate":
         low, high = thesis["success"] - thesis["success_std"], thesis["success"] + thesis["success_std"]
         axes.plot((max(low, 0.0), min(high, 1.0)), (at, at), color=FAINT, linewidth=5.0, alpha=0.35, zorder=2)
-        axes.plot(thesis["success"], at, "o", markerfacecolor="none", color=FAINT, markersize=6, zorder=3)
+        axes.plot(thesis["success"], at, **ring(FAINT, markersize=6, zorder=3))
     for check in entry["verdicts"]:
         if check["name"] == "batch":
             axes.plot(check["limit"], at, "|", color=INK, markersize=11, markeredgewidth=1.6, zorder=4)
-    for way, marker in (("mujoco", "D"), ("batch", "o")):
-        if way in entry["judged"]:
-            face = colour if way == "batch" else "none"
-            size = 6.5 if way == "batch" else 9.0
-            axes.plot(
-                entry["judged"][way],
-                at,
-                marker,
-                color=colour,
-                markerfacecolor=face,
-                markersize=size,
-                zorder=5,
-            )
+    if "mujoco" in entry["judged"]:
+        look = {"markerfacecolor": "none", "markersize": 9.0, "zorder": 5}
+        axes.plot(entry["judged"]["mujoco"], at, "D", color=colour, **look)
+    if "batch" in entry["judged"]:
+        axes.plot(entry["judged"]["batch"], at, "o", color=colour, markersize=6.5, zorder=5)
+
+
+def _write(axes: Any, at: float, text: str, **look: Any) -> None:
+    axes.text(0.008, at, text, transform=axes.get_yaxis_transform(), va="center", **look)
 
 
 _KEY = [
     Line2D([], [], linestyle="", marker="o", color=INK, markersize=6.5, label="ours, batch"),
-    Line2D(
-        [],
-        [],
-        linestyle="",
-        marker="D",
-        color=INK,
-        markerfacecolor="none",
-        markersize=7,
-        label="ours, MuJoCo",
-    ),
+    Line2D([], [], **ring(marker="D", markersize=7, label="ours, MuJoCo")),
     Line2D([], [], linestyle="", marker="|", color=INK, markersize=11, markeredgewidth=1.6, label="required"),
-    Line2D(
-        [],
-        [],
-        marker="o",
-        color=FAINT,
-        markerfacecolor="none",
-        linewidth=4,
-        alpha=0.7,
-        label="thesis ± seeds",
-    ),
+    Line2D([], [], **ring(FAINT, linestyle="-", linewidth=4, alpha=0.7, label="thesis ± seeds")),
 ]

@@ -1,4 +1,4 @@
-"""How figures are spread over the episodes, in the batch and in MuJoCo."""
+"""Distribution of results over episodes: a map over their starts, and cumulative shares."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from fulmar_benchmarks.roboran.cells import WAYS
-from fulmar_benchmarks.roboran.report.view import WIDTH, View
-from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
+from fulmar_benchmarks.roboran.report.view import View, note, panels
+from fulmar_benchmarks.unit import map_axes
+from fulmar_evaluation.report.drawing import WIDTH, colour_lines, key, log_scale
+from fulmar_evaluation.report.style import ALARM, DASHED, FAINT, INK, quiet_grid
 
+BINS = 8  # along each axis of the map
+FEWEST = 4  # episodes in a field that is drawn
+_LEAST_SCALE = 5.0  # [%]
 _LINES = {"batch": "-", "mujoco": DASHED, "ros": (0, (1, 1.5))}
 
 
@@ -68,16 +73,13 @@ def draw_spreads(runs: Sequence[View], task: str) -> Figure:
         if limit is not None:
             one.axvline(limit, color=INK, linewidth=1.0, alpha=0.7)
         if spread.ticks:
-            one.set_xscale("log")
+            log_scale(one.xaxis, spread.ticks)
             one.set_xlim(spread.ticks[0], None)
-            one.xaxis.set_major_locator(FixedLocator(spread.ticks))
-            one.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            one.xaxis.set_minor_locator(NullLocator())
         one.set_ylim(-2.0, 102.0)
         one.set_xlabel(spread.label)
         quiet_grid(one)
     axes[0].set_ylabel("episodes at or below [%]")
-    figure.legend(handles=_key(runs), loc="outside upper left", ncols=len(runs) + 3, fontsize=9)
+    key(figure, _key(runs))
     return figure
 
 
@@ -108,5 +110,56 @@ def _limit(run: View, figure: str) -> float | None:
 
 def _key(runs: Sequence[View]) -> list[Line2D]:
     ways = [way for way in WAYS if any(way in run.outcomes for run in runs)]
-    robots = [Line2D([], [], color=run.colour, label=run.label) for run in runs]
+    robots = colour_lines({run.label: run.colour for run in runs})
     return robots + [Line2D([], [], color=FAINT, linestyle=_LINES[way], label=WAYS[way]) for way in ways]
+
+
+def draw_map(runs: Sequence[View]) -> Figure:
+    """Share of failed episodes, or the mean share of the bound, in fields of a map."""
+    shares = "share_of_bound" in runs[0].main.figures
+    figure, axes = panels(runs, 3.4, lines=1, sharey=True)
+    drawn = [_fields(run, shares) for run in runs]
+    known = np.concatenate([field[np.isfinite(field)] for _, _, field in drawn])
+    top = 100.0 if shares else max(_LEAST_SCALE, float(known.max(initial=0.0)))
+    colours = _colours(shares)
+    for one, run, (x, y, field) in zip(axes[0], runs, drawn, strict=True):
+        mesh = one.pcolormesh(x, y, field.T, cmap=colours, vmin=0.0, vmax=top, rasterized=False)
+        mesh.set_edgecolor("face")
+        one.set_facecolor("none")
+        one.set_xlabel(map_axes(run.entry["task"])[0])
+        one.tick_params(length=3.0)
+        note(one, _summary(run, shares))
+    vertical = map_axes(runs[0].entry["task"])[1]
+    axes[0, 0].set_ylabel(vertical)
+    if "bearing" in vertical:
+        axes[0, 0].set_yticks((-180, -90, 0, 90, 180))
+    bar = figure.colorbar(mesh, ax=list(axes[0]), pad=0.02, aspect=18)
+    bar.set_label("mean share of the bound [%]" if shares else "failed episodes [%]")
+    bar.outline.set_edgecolor(FAINT)
+    return figure
+
+
+def _colours(shares: bool) -> LinearSegmentedColormap:
+    """From nothing to alarm; for shares of a bound the other way round."""
+    stops = ["#e9eef5", "#f4b6c8", ALARM, "#7a1237"]
+    return LinearSegmentedColormap.from_list("fields", list(reversed(stops)) if shares else stops)
+
+
+def _fields(run: View, shares: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Edges of the fields, and percent in each, NaN where too few episodes are."""
+    outcome = run.main
+    x, y = outcome.map_xy.T
+    values = outcome.figures["share_of_bound"] if shares else 1.0 - outcome.succeeded
+    low, high = np.min(outcome.map_xy, axis=0), np.max(outcome.map_xy, axis=0)
+    edges = [np.linspace(a, max(b, a + 1e-6), BINS + 1) for a, b in zip(low, high, strict=True)]
+    count, _, _ = np.histogram2d(x, y, bins=edges)
+    total, _, _ = np.histogram2d(x, y, bins=edges, weights=np.nan_to_num(values))
+    return edges[0], edges[1], np.where(count >= FEWEST, 100.0 * total / np.maximum(count, 1.0), np.nan)
+
+
+def _summary(run: View, shares: bool) -> str:
+    outcome = run.main
+    if shares:
+        return f"mean {100.0 * float(np.nanmean(outcome.figures['share_of_bound'])):.0f} %"
+    failed = int(np.count_nonzero(~outcome.succeeded))
+    return f"{failed:,} of {len(outcome.succeeded):,} failed"

@@ -1,17 +1,24 @@
-"""All trajectories over time: the middle one, and how far they spread (thesis Figure 3.5)."""
+"""All trajectories over time: median and spread (thesis Figure 3.5)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from fulmar_benchmarks.drift.report.view import WIDTH, View
-from fulmar_evaluation.report.error_plot import ANGLES, LENGTHS
-from fulmar_evaluation.report.style import DASHED, INK, quiet_grid
+from fulmar_benchmarks.drift.report.view import View
+from fulmar_evaluation.report.drawing import (
+    ANGLES,
+    LENGTHS,
+    WIDTH,
+    bands,
+    colour_lines,
+    key,
+    limit_line,
+    log_scale,
+)
+from fulmar_evaluation.report.style import quiet_grid
 
 LIMITS = {"distance_m": 0.05, "heading_error_deg": 5.0}  # of PT5 and OT5
 LABELS = {
@@ -31,7 +38,7 @@ def draw_row(runs: Sequence[View]) -> Figure:
         one.set_ylabel(LABELS[name])
     for one in axes[1]:
         one.set_xlabel("time [s]")
-    figure.legend(handles=key([runs]), loc="outside upper left", ncols=len(runs), fontsize=9)
+    controllers_key(figure, [runs])
     return figure
 
 
@@ -50,31 +57,21 @@ def draw_rows(by_row: dict[str, list[View]]) -> Figure:
         )  # fmt: skip
     for one in axes[-1]:
         one.set_xlabel("time [s]")
-    figure.legend(handles=key(by_row.values()), loc="outside upper left", ncols=6, fontsize=9)
+    controllers_key(figure, by_row.values())
     return figure
 
 
-def key(rows: object) -> list[Line2D]:
-    """One line for each controller that is drawn anywhere."""
-    named = {run.label: run.colour for runs in rows for run in runs}  # type: ignore[attr-defined]
-    return [Line2D([], [], color=colour, label=label) for label, colour in named.items()]
+def controllers_key(figure: Figure, rows: Iterable[Sequence[View]]) -> None:
+    """A legend with one line for each controller that is drawn anywhere."""
+    key(figure, colour_lines({run.label: run.colour for runs in rows for run in runs}))
 
 
 def _panel(axes: Axes, runs: Sequence[View], name: str, *, wide: bool) -> None:
     for run in runs:
-        low, lower, middle, upper, high = run.outcome.more[name]
-        time_s = run.time_s
-        axes.fill_between(time_s, low, high, color=run.colour, alpha=0.13, linewidth=0)
-        if wide:
-            axes.fill_between(time_s, lower, upper, color=run.colour, alpha=0.22, linewidth=0)
-        axes.plot(time_s, middle, color=run.colour, linewidth=1.4 if wide else 1.1)
+        bands(axes, run.time_s, run.outcome.more[name], run.colour, half=wide)
     if name in LIMITS:
-        axes.axhline(LIMITS[name], color=INK, linestyle=DASHED, linewidth=0.9)
-        axes.set_yscale("log")
-        ticks = LENGTHS if name == "distance_m" else ANGLES
-        axes.yaxis.set_major_locator(FixedLocator(list(ticks)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: ticks.get(value, "")))
-        axes.yaxis.set_minor_locator(NullLocator())
+        limit_line(axes, LIMITS[name])
+        log_scale(axes.yaxis, LENGTHS if name == "distance_m" else ANGLES)
         axes.set_ylim((2e-3, 8.0) if name == "distance_m" else (0.05, 250.0))
     else:
         axes.set_ylim(bottom=0.0)

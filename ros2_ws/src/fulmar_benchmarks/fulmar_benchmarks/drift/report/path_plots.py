@@ -1,4 +1,4 @@
-"""The same starts with every controller: the ways, and the errors below them (thesis Figure 3.14)."""
+"""Paths seen from above and errors over time: the same starts, and followed paths (thesis Figures 3.14 and 3.15)."""
 
 from __future__ import annotations
 
@@ -7,19 +7,28 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from fulmar_benchmarks.drift.report.time_plot import LIMITS, key
-from fulmar_benchmarks.drift.report.view import WIDTH, View
+from fulmar_benchmarks.drift.conditions import ROBOT, RUN_UP_S
+from fulmar_benchmarks.drift.report.time_plots import LIMITS, controllers_key
+from fulmar_benchmarks.drift.report.view import View
+from fulmar_core.goal_files import FollowedPath, load_goals
 from fulmar_core.planar import wrapped
-from fulmar_evaluation.report.error_plot import ANGLES, LENGTHS
-from fulmar_evaluation.report.style import DASHED, INK, PAPER, quiet_grid
+from fulmar_core.robot import load_robot
+from fulmar_evaluation.report.drawing import (
+    ANGLES,
+    LENGTHS,
+    WIDTH,
+    columns,
+    draw_body,
+    limit_line,
+    log_scale,
+)
+from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
 
 STARTS = (0, 1)  # numbers of episodes
 OUTLINE_EVERY_S = 8.0
-RADIUS = 0.31  # of the platform [m]
 HALF = 2.7  # half width of a panel: starts are at most 4 m away [m]
+EPISODE = 0  # of a path that is drawn
 
 
 def draw_starts(by_row: dict[str, list[View]], rows: Sequence[str]) -> Figure:
@@ -52,7 +61,7 @@ def draw_starts(by_row: dict[str, list[View]], rows: Sequence[str]) -> Figure:
         axes[:, 0], ("y from the goal [m]", "distance to goal", "heading error"), strict=True
     ):
         one.set_ylabel(label)
-    figure.legend(handles=key(by_row[row] for row in rows), loc="outside upper left", ncols=6, fontsize=9)
+    controllers_key(figure, [by_row[row] for row in rows])
     return figure
 
 
@@ -65,19 +74,12 @@ def errors(run: View, start: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _way(axes: Axes, run: View, start: int) -> None:
     outcome = run.outcome
-    way = np.concatenate((outcome.starts[start, None], outcome.paths[start])) - outcome.targets[start, 0] * [
-        1,
-        1,
-        0,
-    ]
+    way = np.concatenate((outcome.starts[start, None], outcome.paths[start]))
+    way = way - outcome.targets[start, 0] * [1, 1, 0]
     axes.plot(way[:, 0], way[:, 1], color=run.colour, linewidth=1.3, zorder=4)
     every = max(1, round(OUTLINE_EVERY_S / float(outcome.about["control_dt"])))
-    for x, y, yaw in way[: 4 * every : every]:
-        axes.add_patch(
-            Circle((x, y), RADIUS, facecolor="none", edgecolor=run.colour, linewidth=0.7, alpha=0.6)
-        )
-        tip = (x + RADIUS * np.cos(yaw), y + RADIUS * np.sin(yaw))
-        axes.plot(*zip((x, y), tip, strict=True), color=run.colour, linewidth=0.7, alpha=0.6)
+    for pose in way[: 4 * every : every]:
+        draw_body(axes, pose, load_robot(ROBOT).body, run.colour)
 
 
 def _place(axes: Axes, starts: Sequence[np.ndarray]) -> None:
@@ -92,10 +94,45 @@ def _place(axes: Axes, starts: Sequence[np.ndarray]) -> None:
 
 
 def _logarithmic(axes: Axes, ticks: dict[float, str], limits: tuple[float, float], tolerance: float) -> None:
-    axes.axhline(tolerance, color=INK, linestyle=DASHED, linewidth=0.9)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(FixedLocator(list(ticks)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: ticks.get(value, "")))
-    axes.yaxis.set_minor_locator(NullLocator())
+    limit_line(axes, tolerance)
+    log_scale(axes.yaxis, ticks)
     axes.set_ylim(*limits)
     quiet_grid(axes)
+
+
+def draw_paths(by_row: dict[str, list[View]]) -> Figure:
+    """One column a path: the first run of every controller."""
+    figure, axes = columns(len(by_row), 6.8, rows=3, height_ratios=(1.7, 1.0, 1.0))
+    for column, runs in zip(axes.T, by_row.values(), strict=True):
+        above, velocity, off = column
+        file = load_goals(runs[0].outcome.about["goals"])
+        assert isinstance(file, FollowedPath)
+        points = file.planner().points
+        loop = np.concatenate((points, points[:1]))
+        above.plot(*loop.T, color=INK, linestyle=DASHED, linewidth=1.0, zorder=5)
+        for run in runs:
+            outcome, look = run.outcome, {"color": run.colour, "linewidth": 0.9}
+            way = np.concatenate((outcome.starts[EPISODE, None], outcome.paths[EPISODE]))
+            above.plot(way[:, 0], way[:, 1], color=run.colour, linewidth=1.2)
+            velocity.plot(run.time_s, outcome.more["velocity_error_m_s"][EPISODE], **look)
+            off.plot(run.time_s, 100.0 * outcome.more["path_error_m"][EPISODE], **look)
+        above.plot(*runs[0].outcome.starts[EPISODE, :2], "o", color=INK, markersize=4.0, zorder=6)
+        above.set_title(runs[0].title, loc="left", fontweight="bold")
+        above.set_aspect("equal")
+        above.set_xlim(-1.95, 1.95)
+        above.set_ylim(-1.95, 1.95)
+        above.set_xlabel("x [m]")
+        for one in (velocity, off):
+            one.axvspan(0.0, RUN_UP_S, color=FAINT, alpha=0.15, linewidth=0)
+            one.set_xlim(0.0, runs[0].time_s[-1])
+        off.set_xlabel("time [s]")
+        off.set_ylim(0.0, off.get_ylim()[1])
+        for one in column:
+            quiet_grid(one)
+    fastest = max(one.get_ylim()[1] for one in axes[1])
+    for one in axes[1]:
+        one.set_ylim(0.0, fastest)
+    for one, label in zip(axes[:, 0], ("y [m]", "velocity error [m/s]", "off the path [cm]"), strict=True):
+        one.set_ylabel(label)
+    controllers_key(figure, by_row.values())
+    return figure

@@ -1,20 +1,56 @@
-"""Single episodes seen from above: obstacles to go around, waypoints to go through."""
+"""Paths seen from above: to a goal, around obstacles, through waypoints."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon
 
-from fulmar_benchmarks.roboran.report.view import View, panels, told
-from fulmar_evaluation.report.style import ALARM, FAINT, INK, PAPER, quiet_grid
+from fulmar_benchmarks.roboran.report.view import View, note, panels
+from fulmar_evaluation.report.drawing import draw_body, draw_discs, draw_goal, spaced
+from fulmar_evaluation.report.style import ALARM, DASHED, FAINT, PAPER, quiet_grid
 
-OUTLINES = 7  # of the body along a way
+HALF = 5.6  # half width of a panel with the goal in its middle [m]
+OUTLINES = 7  # of the body along a path
 MARGIN = 0.8  # around what is shown [m]
-AWAY = 3.0  # from what stands about that a way is followed: who is lost must not make all else small [m]
+AWAY = 3.0  # as far beyond start, goals and obstacles a path is shown, so that a lost robot shrinks nothing else [m]
+
+
+def draw_paths(runs: Sequence[View]) -> Figure:
+    """The first episodes of every pair, moved so that all goals coincide; where a heading counts, turned too."""
+    figure, axes = panels(runs, 3.6, lines=1, sharex=True, sharey=True)
+    for one, run in zip(axes[0], runs, strict=True):
+        outcome = run.main
+        ways = _about_the_goal(run)
+        reached = outcome.succeeded[: len(ways)]
+        for way, well in zip(ways, reached, strict=True):
+            colour = run.colour if well else ALARM
+            one.plot(*way.T, color=colour, linewidth=0.8, alpha=0.55 if well else 0.8, zorder=3 + (not well))
+            one.plot(*way[0], "o", color=colour, markersize=2.6, markeredgewidth=0.0, zorder=5)
+        draw_goal(one, np.zeros(3), run.task.tolerance, arrow=0.9)
+        note(one, f"{int(reached.sum())} of {len(reached)} stay at the goal")
+        one.set_aspect("equal")
+        one.set_xlim(-HALF, HALF)
+        one.set_ylim(-HALF, HALF)
+        one.set_xlabel("x from the goal [m]")
+        quiet_grid(one)
+    axes[0, 0].set_ylabel("y from the goal [m]")
+    return figure
+
+
+def _about_the_goal(run: View) -> np.ndarray:
+    """Ways with the goal at the origin, shape (kept, steps + 1, 2) [m]."""
+    outcome = run.main
+    way = np.concatenate((outcome.starts[:, None, :2], outcome.paths[:, :, :2]), axis=1)
+    offset = way - outcome.targets[:, :1, :2]
+    if not run.task.tolerance.heading_deg:
+        return offset
+    yaw = outcome.targets[:, :1, 2]
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.stack((c * offset[..., 0] + s * offset[..., 1], c * offset[..., 1] - s * offset[..., 0]), -1)
 
 
 def draw_scenes_with_obstacles(runs: Sequence[View]) -> Figure:
@@ -24,23 +60,19 @@ def draw_scenes_with_obstacles(runs: Sequence[View]) -> Figure:
         for one, episode in zip(axes[:, column], _two_episodes(run), strict=True):
             outcome = run.main
             well = bool(outcome.succeeded[episode])
-            for x, y, radius, *_ in outcome.obstacles[episode]:
-                if radius > 0.0:
-                    one.add_patch(Circle((x, y), radius, facecolor=FAINT, edgecolor=INK, linewidth=0.6))
+            draw_discs(one, outcome.obstacles[episode])
             _way(one, run, episode, run.colour if well else ALARM)
             goal = outcome.targets[episode, 0]
-            one.add_patch(
-                Circle(tuple(goal[:2]), run.task.tolerance.position, facecolor=PAPER, edgecolor=INK, zorder=6)
-            )
+            draw_goal(one, goal, run.task.tolerance, arrow=0.0)
             _name(one, goal, "goal")
-            told(one, f"episode {episode}: {'reached, nothing touched' if well else _fault(run, episode)}")
+            note(one, f"episode {episode}: {'reached, nothing touched' if well else _fault(run, episode)}")
             _finish(one, run, episode)
     for one in axes[:, 0]:
         one.set_ylabel("y [m]")
     return figure
 
 
-def draw_courses(runs: Sequence[View]) -> Figure:
+def draw_waypoint_paths(runs: Sequence[View]) -> Figure:
     """Of every pair the episode whose share of the bound is nearest to the median."""
     figure, axes = panels(runs, 3.8, lines=1)
     for one, run in zip(axes[0], runs, strict=True):
@@ -50,23 +82,15 @@ def draw_courses(runs: Sequence[View]) -> Figure:
         episode = int(np.nanargmin(np.abs(kept - np.nanmedian(shares))))
         places = outcome.targets[episode, :, :2]
         loop = np.concatenate((places, places[:1]))
-        one.plot(*loop.T, color=FAINT, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
+        one.plot(*loop.T, color=FAINT, linewidth=0.8, linestyle=DASHED, zorder=2)
         done = int(outcome.goals[episode, -1])
         for index, (x, y) in enumerate(places):
-            one.add_patch(
-                Circle(
-                    (x, y),
-                    run.task.tolerance.position,
-                    facecolor=PAPER,
-                    edgecolor=run.colour if index < done else FAINT,
-                    linewidth=1.2,
-                    zorder=6,
-                )
-            )
+            edge = run.colour if index < done else FAINT
+            draw_goal(one, np.array((x, y, 0.0)), run.task.tolerance, arrow=0.0, edge=edge)
             one.text(x, y, str(index + 1), ha="center", va="center", fontsize=7, zorder=7)
         _way(one, run, episode, run.colour)
         most = outcome.figures.get("goals_bound")
-        told(one, f"{done} reached" if most is None else f"{done} reached, bound {int(most[episode])}")
+        note(one, f"{done} reached" if most is None else f"{done} reached, bound {int(most[episode])}")
         _finish(one, run, episode)
     axes[0, 0].set_ylabel("y [m]")
     return figure
@@ -91,50 +115,19 @@ def _way(axes: Axes, run: View, episode: int, colour: str) -> None:
     outcome = run.main
     way = np.concatenate((outcome.starts[episode, None], outcome.paths[episode]))
     axes.plot(*way[:, :2].T, color=colour, linewidth=1.4, zorder=4)
-    length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1))))
-    instants = np.searchsorted(length, np.linspace(0.0, length[-1], OUTLINES)).clip(0, len(way) - 1)
-    for x, y, yaw in way[np.unique(instants)]:
-        _outline(axes, run, x, y, yaw, colour)
+    for index in spaced(way[:, :2], OUTLINES):
+        draw_body(axes, way[index], run.robot.body, colour)
     _name(axes, way[0], "start")
 
 
-def _outline(axes: Axes, run: View, x: float, y: float, yaw: float, colour: str) -> None:
-    body = run.robot.body
-    look = {"facecolor": colour, "alpha": 0.13, "zorder": 3}
-    if body.footprint is None:
-        axes.add_patch(Circle((x, y), body.radius, **look))
-        nose = body.radius
-    else:
-        ahead, aside = 0.5 * body.footprint[0], 0.5 * body.footprint[1]
-        corners = np.array([(ahead, aside), (-ahead, aside), (-ahead, -aside), (ahead, -aside)])
-        turn = np.array([(np.cos(yaw), np.sin(yaw)), (-np.sin(yaw), np.cos(yaw))])
-        axes.add_patch(Polygon(corners @ turn + (x, y), **look))
-        nose = ahead
-    axes.plot(
-        (x, x + nose * np.cos(yaw)),
-        (y, y + nose * np.sin(yaw)),
-        color=colour,
-        linewidth=1.0,
-        alpha=0.7,
-        zorder=5,
-    )
-
-
 def _name(axes: Axes, place: np.ndarray, text: str) -> None:
-    axes.annotate(
-        text,
-        (place[0], place[1]),
-        (0, -13),
-        textcoords="offset points",
-        ha="center",
-        fontsize=8.5,
-        bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
-        zorder=8,
-    )
+    box = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.8}
+    look: dict[str, Any] = {"ha": "center", "fontsize": 8.5, "bbox": box, "zorder": 8}
+    axes.annotate(text, (place[0], place[1]), (0, -13), textcoords="offset points", **look)
 
 
 def _finish(axes: Axes, run: View, episode: int) -> None:
-    """Show what stands about, and the way, unless it leads far away."""
+    """Show obstacles and targets, and the path, unless it leads far away."""
     outcome = run.main
     there = outcome.obstacles[episode][outcome.obstacles[episode][:, 2] > 0.0, :2]
     places = np.concatenate((outcome.starts[episode, None, :2], outcome.targets[episode, :, :2], there))
