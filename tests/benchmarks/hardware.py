@@ -81,8 +81,7 @@ def hardware(
         typer.Option(metavar="S", min=5.0, help="Length of an episode; the task's own by default."),
     ] = None,
     jobs: Annotated[
-        int,
-        typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each."),
+        int, typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each.")
     ] = 3,
     out: Annotated[
         Path | None,

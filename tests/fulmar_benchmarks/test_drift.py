@@ -150,8 +150,8 @@ def test_published_tables_have_every_row_and_every_scenario_exists():
 def test_a_figure_meets_what_is_asked_on_its_own_side_of_the_limit():
     gas = next(one for one in requirements("ideal", "policy") if one.figure == "AAS")
     place = next(one for one in requirements("ideal", "policy") if one.figure == "PT5")
-    assert (gas.verdict(0.09).met, gas.verdict(0.0901).met) == (True, False)
-    assert (place.verdict(80.0).met, place.verdict(79.96).met, place.verdict(None).met) == (True, False, None)
+    assert (gas.check(0.09).met, gas.check(0.0901).met) == (True, False)
+    assert (place.check(80.0).met, place.check(79.96).met, place.check(None).met) == (True, False, None)
 
 
 def test_the_table_marks_what_is_met_and_colours_what_is_lost(document):

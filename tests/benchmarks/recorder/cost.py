@@ -46,12 +46,7 @@ TURNS = (True, False, False, True)  # drift of the machine falls on both alike
 
 
 def cost_of_recording(
-    plan: RunPlan,
-    *,
-    stretches: int,
-    stretch_s: float,
-    out: Path,
-    progress: Callable[[], None],
+    plan: RunPlan, *, stretches: int, stretch_s: float, out: Path, progress: Callable[[], None]
 ) -> dict[str, Any]:
     """Measure.
 

@@ -65,18 +65,10 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
             )
         elif part == "lockstep":
             found[part] = lost_in_lock_step(
-                ROBOT,
-                control_hz=asked.lockstep_hz,
-                simulated_s=asked.lockstep_s,
-                out=asked.out,
+                ROBOT, control_hz=asked.lockstep_hz, simulated_s=asked.lockstep_s, out=asked.out
             )
         else:
-            found[part] = killed(
-                plan,
-                kills=asked.kills,
-                out=asked.out,
-                progress=lambda: progress("kills"),
-            )
+            found[part] = killed(plan, kills=asked.kills, out=asked.out, progress=lambda: progress("kills"))
     return {
         **found,
         "passed": all(figures["passed"] for figures in found.values()),

@@ -44,11 +44,7 @@ def killed(plan: RunPlan, *, kills: int, out: Path, progress: Callable[[], None]
             out / f"killed_{first + i}": replace(plan, recording=SHORT_FILES) if i % 2 else plan
             for i in range(count)
         }
-        with (
-            own_domain(),
-            traffic(plan) as source,
-            recorders(plans) as alive,
-        ):
+        with own_domain(), traffic(plan) as source, recorders(plans) as alive:
             source.wait_for(count)
             source.start()
             moments = sorted(draw.uniform(0.0, LONGEST_S) for _ in alive)

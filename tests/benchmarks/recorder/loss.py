@@ -18,11 +18,7 @@ LAST_S = 0.5  # for the last messages to arrive
 
 
 def lost_in_real_time(
-    plan: RunPlan,
-    *,
-    seconds: float,
-    out: Path,
-    progress: Callable[[float], None],
+    plan: RunPlan, *, seconds: float, out: Path, progress: Callable[[float], None]
 ) -> dict[str, Any]:
     """Record traffic.
 
@@ -36,11 +32,7 @@ def lost_in_real_time(
         Figures by name, ready for JSON.
     """
     bag = out / "real_time"
-    with (
-        own_domain(),
-        traffic(plan) as source,
-        recorders({bag: plan}) as (recorder,),
-    ):
+    with own_domain(), traffic(plan) as source, recorders({bag: plan}) as (recorder,):
         source.wait_for(1)
         source.start()
         began = time.monotonic()

@@ -65,10 +65,7 @@ class Trial:
 
 
 def runs_of(
-    trial: Trial,
-    progress: Progress = lambda steps: None,
-    *,
-    pool: RosPool | None = None,
+    trial: Trial, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
 ) -> Iterator[Trajectories]:
     """Run the episodes of a trial, in their order.
 

@@ -9,12 +9,7 @@ from fulmar_benchmarks.cells import BAD, GOOD, NOTHING
 from fulmar_benchmarks.drift.targets import DIGITS, FIGURES
 
 NAMES = {"policy": "policy", "lqr": "LQR", "lqr_drift": "LQR of DRIFT", "mpc": "MPC"}
-UNITS = {
-    **{name: "%" for name in FIGURES if name[1] == "T"},
-    "ALV": "m/s",
-    "AAV": "rad/s",
-    "AAS": "",
-}
+UNITS = {**{name: "%" for name in FIGURES if name[1] == "T"}, "ALV": "m/s", "AAV": "rad/s", "AAS": ""}
 
 
 @dataclass(frozen=True)
@@ -98,13 +93,7 @@ def path_lines(document: dict[str, Any]) -> list[Line]:
     return lines
 
 
-PATH_HEADS = (
-    "velocity error [m/s]",
-    "under way [m/s]",
-    "off the path [m]",
-    "at most [m]",
-    "AAS",
-)
+PATH_HEADS = ("velocity error [m/s]", "under way [m/s]", "off the path [m]", "at most [m]", "AAS")
 
 
 def pose_heads() -> tuple[str, ...]:

@@ -7,12 +7,7 @@ from typing import Any
 
 from fulmar_benchmarks.cells import BAD, GOOD, NOTHING, Cell, spoken
 
-LAWS = {
-    "lqr": "LQR",
-    "polar": "polar law",
-    "line_of_sight": "line of sight",
-    "pure_pursuit": "pure pursuit",
-}
+LAWS = {"lqr": "LQR", "polar": "polar law", "line_of_sight": "line of sight", "pure_pursuit": "pure pursuit"}
 WAYS = {"batch": "batch", "mujoco": "MuJoCo", "ros": "ROS"}
 
 

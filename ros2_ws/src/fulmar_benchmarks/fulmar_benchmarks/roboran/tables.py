@@ -54,7 +54,7 @@ def notes(document: dict[str, Any]) -> list[str]:
     lines = [
         f"{ways}; scenario {document['scenario']}, seed {document['seed']}. In brackets: the thesis (Tables 4.6 and "
         "4.7, its times from control steps at 10 Hz; its control variation is another sum). Figures below the line of "
-        "training are means over the episodes of the first way.",
+        "training are means over the episodes of the first way."
     ]
     seen: dict[str, str] = {}
     for entry in document["pairs"]:

@@ -114,8 +114,8 @@ def draw_goal(axes: Axes, goal: np.ndarray, tolerance: Tolerance, *, arrow: floa
 
 
 def draw_discs(axes: Axes, discs: Iterable[np.ndarray]) -> None:
-    """Obstacles (x, y, radius) [m]."""
-    for x, y, radius in discs:
+    """Obstacles (x, y, radius [m], whatever else); a radius of 0 is none."""
+    for x, y, radius, *_ in discs:
         if radius > 0.0:
             axes.add_patch(Circle((x, y), radius, facecolor=FAINT, alpha=0.55, linewidth=0, zorder=2))
 

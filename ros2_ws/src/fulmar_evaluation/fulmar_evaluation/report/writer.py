@@ -19,12 +19,7 @@ LARGEST = 480_000  # of a single plot [bytes]
 
 
 def write_document(
-    out: Path,
-    bags: Sequence[Path],
-    *,
-    page: Callable[[str], str],
-    sheet: Callable[[], Figure],
-    force: bool,
+    out: Path, bags: Sequence[Path], *, page: Callable[[str], str], sheet: Callable[[], Figure], force: bool
 ) -> Path:
     """Write a report of bags.
 

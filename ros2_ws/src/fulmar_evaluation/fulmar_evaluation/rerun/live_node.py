@@ -337,12 +337,7 @@ def _tell(
     streamed: bool,
 ) -> None:
     """Publish what was told before a step, as the very bytes that were recorded, and wait until it is known."""
-    publishers = {
-        "bearing": wires.bearing,
-        "obstacles": wires.obstacles,
-        "goals": wires.goal,
-        **wires.things,
-    }
+    publishers = {"bearing": wires.bearing, "obstacles": wires.obstacles, "goals": wires.goal, **wires.things}
     echoes = {"obstacles": "obstacles_stamp_ns", "goals": "goal_stamp_ns"}
     for name, publisher in publishers.items():
         for each in told[name].get(step, ()):

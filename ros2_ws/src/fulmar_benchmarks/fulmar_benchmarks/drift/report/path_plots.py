@@ -14,15 +14,7 @@ from fulmar_benchmarks.drift.report.view import View
 from fulmar_core.goal_files import FollowedPath, load_goals
 from fulmar_core.planar import wrapped
 from fulmar_core.robot import load_robot
-from fulmar_evaluation.report.drawing import (
-    ANGLES,
-    LENGTHS,
-    WIDTH,
-    columns,
-    draw_body,
-    limit_line,
-    log_scale,
-)
+from fulmar_evaluation.report.drawing import ANGLES, LENGTHS, WIDTH, columns, draw_body, limit_line, log_scale
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
 
 STARTS = (0, 1)  # numbers of episodes
