@@ -12,15 +12,16 @@ from fulmar_core.robot import load_robot
 from tests.benchmarks.estimator.comparison import (
     DELAY_LIMIT_S,
     MEAN,
+    POSES,
     RATES_HZ,
     RMSE_SHARE_LIMIT,
     WITH_IMU,
+    ThirtyPoses,
     compare,
     tell_by_mean,
     verdict,
 )
 from tests.benchmarks.estimator.drive import TICK_S, Drive, drives
-from tests.benchmarks.estimator.thirty_poses import POSES, ThirtyPoses
 
 pytest.importorskip("filterpy")
 ROBOT = load_robot("floating_platform")

@@ -16,11 +16,10 @@ import pytest
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_core.topics import ODOMETRY
-from fulmar_evaluation.faults.bag_evidence import bag_evidence
 from fulmar_evaluation.faults.fault import stopped
 from fulmar_evaluation.faults.fault_environment import USUAL, request_of
 from fulmar_evaluation.faults.live_system import LiveSystem
-from fulmar_evaluation.faults.observer import Statement, first_complaint
+from fulmar_evaluation.faults.observer import Statement, bag_evidence, first_complaint
 
 BAG = Path(__file__).parents[1] / "replay/bags/floating_platform_go_to_pose_lqr"
 FAULT_S = 100.0

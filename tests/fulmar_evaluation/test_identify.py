@@ -11,9 +11,8 @@ from fulmar_core.robot import load_robot
 
 pytest.importorskip("mujoco")
 
-from tests.benchmarks.identification.campaign import document_of, run_identification
+from tests.benchmarks.identification.campaign import Trial, document_of, run_identification, run_trial
 from tests.benchmarks.identification.machines import draw_machine
-from tests.benchmarks.identification.trial import Trial, run_trial
 
 ASKED = ("mass", "yaw_inertia", "thrust")
 

@@ -1,7 +1,8 @@
-"""What each estimator tells at every tick, and how far that is from the truth."""
+"""Estimates at every tick of each method, and their errors."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
@@ -13,7 +14,29 @@ from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw
 from fulmar_core.sensors.imu import ImuSample
 from tests.benchmarks.estimator.drive import TICK_S, Drive
-from tests.benchmarks.estimator.thirty_poses import ThirtyPoses
+
+POSES = 30
+
+
+class ThirtyPoses:
+    """The mean over a buffer."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._poses: deque[tuple[float, np.ndarray]] = deque(maxlen=POSES)
+
+    def see_pose(self, time_s: float, pose: np.ndarray) -> None:
+        """Note a pose (x [m], y [m], continuous yaw [rad]), captured at a time [s]."""
+        self._poses.append((time_s, pose))
+
+    def motion(self) -> np.ndarray | None:
+        """Velocity in the world [m/s] and turn rate [rad/s], shape (3,); None before the buffer is full."""
+        if len(self._poses) < POSES:
+            return None
+        (first_s, first), (last_s, last) = self._poses[0], self._poses[-1]
+        mean_difference = (last - first) / (POSES - 1)
+        return np.asarray(mean_difference / ((last_s - first_s) / POSES))
+
 
 MEAN, POSES_ALONE, WITH_IMU = "mean of 30 poses", "Fulmar, poses alone", "Fulmar, poses and inertial unit"
 SETTLE_S = 2.0  # before anything is judged: every method has its buffer full then

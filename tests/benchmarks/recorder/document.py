@@ -11,9 +11,7 @@ from typing import Any
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.provenance import fulmar_version, git_revision
 from tests.benchmarks.recorder.cost import cost_of_recording
-from tests.benchmarks.recorder.kills import killed
-from tests.benchmarks.recorder.lockstep import lost_in_lock_step
-from tests.benchmarks.recorder.loss import lost_in_real_time
+from tests.benchmarks.recorder.loss import killed, lost_in_lock_step, lost_in_real_time
 
 ROBOT = "floating_platform"
 PARTS = ("cost", "loss", "lockstep", "kills")

@@ -79,7 +79,7 @@ def roboran(
     from fulmar_benchmarks.pairs import KINDS
     from fulmar_benchmarks.results import PairResult
     from fulmar_benchmarks.roboran.campaign import EPISODES, Request, run_benchmark
-    from fulmar_benchmarks.roboran.tables import print_tables
+    from fulmar_benchmarks.roboran.cells import print_tables
     from fulmar_benchmarks.roboran.targets import ROBOTS, TASKS
     from fulmar_benchmarks.unit import Unit
     from fulmar_cli.extras import require

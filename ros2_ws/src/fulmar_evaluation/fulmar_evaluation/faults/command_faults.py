@@ -14,8 +14,7 @@ from sensor_msgs.msg import JointState
 from fulmar_core.robot import Robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped, went_on
-from fulmar_evaluation.faults.fault_environment import FaultEnvironment
-from fulmar_evaluation.faults.fault_injector import delayed
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment, delayed
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.two_hosts import CUT, LOSSY, why_not
 from fulmar_ros.qos import publisher_qos

@@ -32,8 +32,7 @@ from fulmar_core.topics import (
     Wire,
     command_wire,
 )
-from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment
-from fulmar_evaluation.faults.fault_injector import FaultInjector, source_of
+from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment, FaultInjector, source_of
 from fulmar_evaluation.faults.observer import Observer, wait_for
 from fulmar_evaluation.faults.two_hosts import TwoHosts
 from fulmar_ros.runtime import spinning

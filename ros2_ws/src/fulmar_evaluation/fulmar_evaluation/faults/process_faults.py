@@ -14,8 +14,7 @@ from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_core.topics import MOCAP
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
-from fulmar_evaluation.faults.fault_environment import FaultEnvironment
-from fulmar_evaluation.faults.fault_injector import lost
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import Statement, wait_for
 

@@ -14,13 +14,13 @@ from fulmar_bringup.environment import environment
 from fulmar_bringup.system import Guards, default_hardware, modules_of
 from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.robot import load_robot
-from fulmar_evaluation.faults.bag_evidence import BagEvidence, bag_evidence
 from fulmar_evaluation.faults.command_faults import CABLE_FAULTS, COMMAND_FAULTS
 from fulmar_evaluation.faults.fault import Fault, FaultResult, Outcome
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.hardware_faults import HARDWARE_FAULTS
 from fulmar_evaluation.faults.input_faults import INPUT_FAULTS
 from fulmar_evaluation.faults.live_system import NothingShown, live_system
+from fulmar_evaluation.faults.observer import BagEvidence, bag_evidence
 from fulmar_evaluation.faults.operator_faults import OPERATOR_FAULTS
 from fulmar_evaluation.faults.policy_faults import POLICY_FAULTS
 from fulmar_evaluation.faults.process_faults import PROCESS_FAULTS

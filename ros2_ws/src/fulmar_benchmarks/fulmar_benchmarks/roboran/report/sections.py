@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from fulmar_benchmarks.cells import MARKS, spoken
 from fulmar_benchmarks.roboran.campaign import CampaignResult
-from fulmar_benchmarks.roboran.cells import head, missing, rows
+from fulmar_benchmarks.roboran.cells import conclusion, head, missing, notes, rows
 from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
 from fulmar_benchmarks.roboran.report.path_plots import (
     draw_paths,
@@ -27,7 +27,6 @@ from fulmar_benchmarks.roboran.report.time_plots import (
     draw_velocities,
 )
 from fulmar_benchmarks.roboran.report.view import View, views
-from fulmar_benchmarks.roboran.tables import conclusion, notes
 from fulmar_core.figures import FIGURES, SUCCESS
 from fulmar_core.metrics import counts_targets
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table
