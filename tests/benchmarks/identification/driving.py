@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,12 @@ from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import stack_goals
 from fulmar_core.planar import PlanarState, at_rest, planar_of, stack_planar
 from fulmar_core.robot import Robot
+from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task
+from fulmar_core.topics import ACTUATORS_STATE, ODOMETRY
 from sim_nodes.mujoco_backend import MujocoBackend
 from tests.benchmarks.identification.machines import Leg, Machine
-from tests.benchmarks.sample_bag import SampleBag
+from tests.synthetic_run import NS, RunMessages
 
 TASK = "go_to_position"
 SETTLED_S = 4.0  # of no more change: dozens of time constants
@@ -52,17 +55,27 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
     loop = ControlLoop(nominal, task, controller)
     loop.begin(stack_goals([goal]))
     dt, substeps = nominal.timing.physics_dt, nominal.timing.substeps(controller.control_hz)
-    with SampleBag(folder, nominal) as bag:
-        bag.odometry(sample.measured, 0.0)
+    bag = RunMessages(folder, nominal, {"robot": nominal.name}, (ODOMETRY, ACTUATORS_STATE))
+
+    def measured(state: RigidBodyState, time_s: float) -> None:
+        bag.odometry(ODOMETRY.name, state, time_s, _log_ns(time_s))
+
+    with contextlib.closing(bag.writer):
+        measured(sample.measured, 0.0)
         for tick in range(round(duration_s / dt)):
             if tick % substeps == 0:
-                measured = stack_planar([planar_of(sample.measured)])
-                command = loop.step(measured, round(1e9 * tick * dt)).command[0]
-                bag.applied(command, tick * dt)
+                state = stack_planar([planar_of(sample.measured)])
+                command = loop.step(state, round(1e9 * tick * dt)).command[0]
+                bag.joints(ACTUATORS_STATE.name, command, tick * dt, _log_ns(tick * dt))
             sample = backend.step(command)
-            bag.odometry(sample.measured, (tick + 1) * dt)
+            measured(sample.measured, (tick + 1) * dt)
     backend.close()
     return folder
+
+
+def _log_ns(time_s: float) -> int:
+    """As the stamps of `RunMessages`: a second after the epoch, since a stamp of 0 means none."""
+    return round((time_s + 1.0) * NS)
 
 
 def speeds_of_wheels(machine: Machine) -> dict[str, float]:

@@ -45,37 +45,31 @@ class ThesisRow:
         return None if self.time_to_target_steps is None else self.time_to_target_steps / CONTROL_HZ
 
 
+# (success, its deviation, distance, heading, time, velocity, yaw rate, control variation, goals, training)
+_TABLE: dict[str, dict[str, tuple[float | None, ...]]] = {
+    "go_to_position": {
+        "floating_platform": (0.94, 0.04, 0.05, None, 87.05, None, None, 0.62, None, 7.35),
+        "kingfisher": (0.59, 0.29, 1.06, None, 176.11, None, None, 0.75, None, 13.91),
+        "turtlebot2": (0.99, 0.01, 0.07, None, 92.60, None, None, 0.43, None, 11.55),
+    },
+    "go_to_pose": {
+        "floating_platform": (0.99, 0.01, 0.02, 0.78, 92.38, None, None, 0.69, None, 5.46),
+        "kingfisher": (0.66, 0.09, 0.23, 7.07, 126.80, None, None, 0.48, None, None),
+        "turtlebot2": (0.84, 0.04, 0.14, 4.39, 131.49, None, None, 0.63, None, 11.53),
+    },
+    "track_velocities": {
+        "floating_platform": (0.93, 0.18, None, None, None, 0.05, 0.03, 0.45, None, 5.08),
+        "kingfisher": (0.48, 0.03, None, None, None, 0.03, 0.24, 0.62, None, 13.47),
+        "turtlebot2": (0.77, 0.01, None, None, None, 0.02, 0.11, 0.15, None, 11.28),
+    },
+    "go_through_positions": {
+        "floating_platform": (1.00, 0.00, 2.35, None, 65.18, None, None, 0.32, 13.57, 5.51),
+        "kingfisher": (1.00, 0.00, 2.41, None, 93.29, None, None, 0.43, 10.70, 13.47),
+        "turtlebot2": (1.00, 0.00, 1.79, None, 101.50, None, None, 0.13, 11.01, 11.20),
+    },
+}
 TABLE = {
-    ("go_to_position", "floating_platform"): ThesisRow(
-        0.94, 0.04, 0.05, None, 87.05, None, None, 0.62, None, 7.35
-    ),
-    ("go_to_position", "kingfisher"): ThesisRow(
-        0.59, 0.29, 1.06, None, 176.11, None, None, 0.75, None, 13.91
-    ),
-    ("go_to_position", "turtlebot2"): ThesisRow(0.99, 0.01, 0.07, None, 92.60, None, None, 0.43, None, 11.55),
-    ("go_to_pose", "floating_platform"): ThesisRow(
-        0.99, 0.01, 0.02, 0.78, 92.38, None, None, 0.69, None, 5.46
-    ),
-    ("go_to_pose", "kingfisher"): ThesisRow(0.66, 0.09, 0.23, 7.07, 126.80, None, None, 0.48, None, None),
-    ("go_to_pose", "turtlebot2"): ThesisRow(0.84, 0.04, 0.14, 4.39, 131.49, None, None, 0.63, None, 11.53),
-    ("track_velocities", "floating_platform"): ThesisRow(
-        0.93, 0.18, None, None, None, 0.05, 0.03, 0.45, None, 5.08
-    ),
-    ("track_velocities", "kingfisher"): ThesisRow(
-        0.48, 0.03, None, None, None, 0.03, 0.24, 0.62, None, 13.47
-    ),
-    ("track_velocities", "turtlebot2"): ThesisRow(
-        0.77, 0.01, None, None, None, 0.02, 0.11, 0.15, None, 11.28
-    ),
-    ("go_through_positions", "floating_platform"): ThesisRow(
-        1.00, 0.00, 2.35, None, 65.18, None, None, 0.32, 13.57, 5.51
-    ),
-    ("go_through_positions", "kingfisher"): ThesisRow(
-        1.00, 0.00, 2.41, None, 93.29, None, None, 0.43, 10.70, 13.47
-    ),
-    ("go_through_positions", "turtlebot2"): ThesisRow(
-        1.00, 0.00, 1.79, None, 101.50, None, None, 0.13, 11.01, 11.20
-    ),
+    (task, robot): ThesisRow(*values) for task, robots in _TABLE.items() for robot, values in robots.items()
 }
 
 
