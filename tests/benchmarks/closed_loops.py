@@ -98,7 +98,7 @@ def measure(
     Args:
         cases: What to run.
         campaign: How.
-        progress: Told how many episodes are over.
+        progress: Called with how many episodes are over.
 
     Returns:
         Figures of each case, ready for JSON.

@@ -15,9 +15,9 @@ from fulmar_benchmarks.drift.cells import path_lines, pose_lines, unmet
 from fulmar_benchmarks.drift.conditions import CONDITIONS, CONTROLLERS, PATHS, ROWS
 from fulmar_benchmarks.drift.tables import print_tables
 from fulmar_benchmarks.drift.targets import (
-    ASKED,
     BANDS,
     FIGURES,
+    REQUIRED,
     TRACKING,
     band_of,
     drop_percent,
@@ -96,7 +96,7 @@ def test_a_controller_that_cannot_drive_is_told_with_its_reason(tmp_path):
     result = run(words, "--policy", str(tmp_path / "none"), "--out", str(tmp_path))
     assert result.exit_code == 0, result.output
     assert "policy: missing: no policy is shipped" in result.stdout
-    assert "0 of 7 figures that are asked for are met; 7 could not be judged." in result.stdout
+    assert "0 of 7 figures that are asked for are met; 7 could not be evaluated." in result.stdout
     assert run(f"{words} --check", "--policy", str(tmp_path / "none"), "--out", str(tmp_path)).exit_code == 1
 
 
@@ -143,8 +143,8 @@ def test_published_tables_have_every_row_and_every_scenario_exists():
     assert [published("torque", name)[0] for name in ("policy", "lqr")] == ["RL", "LQR"]
     assert published("torque", "mpc") == published("torque", "lqr") != published("torque", "policy")
     assert set(TRACKING) == {path.name for path in PATHS}
-    assert all(row in ROWS for rows in ASKED.values() for row in rows)
-    assert set(ASKED) == set(CONTROLLERS)
+    assert all(row in ROWS for rows in REQUIRED.values() for row in rows)
+    assert set(REQUIRED) == set(CONTROLLERS)
 
 
 def test_a_figure_meets_what_is_asked_on_its_own_side_of_the_limit():

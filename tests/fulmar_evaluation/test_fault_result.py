@@ -25,8 +25,8 @@ BAG = Path(__file__).parents[1] / "replay/bags/floating_platform_go_to_pose_lqr"
 FAULT_S = 100.0
 
 
-def word(heard_s: float, text: str, who: str = "plant") -> Statement:
-    return Statement(heard_s, who, "ok" if text == "running" else "error", text, {})
+def word(received_s: float, text: str, who: str = "plant") -> Statement:
+    return Statement(received_s, who, "ok" if text == "running" else "error", text, {})
 
 
 def test_what_was_wrong_before_a_fault_is_not_noticed_by_it_whatever_its_figures():

@@ -55,7 +55,7 @@ def cost_of_recording(
         stretches: With a recorder, and as many without, >= 1.
         stretch_s: Length of each [s].
         out: Folder of the bags.
-        progress: Told of each stretch.
+        progress: Called after each stretch.
 
     Returns:
         Figures by name, ready for JSON.

@@ -42,7 +42,7 @@ def lost_in_real_time(
         plan: Whose wires.
         seconds: How long.
         out: Folder of the bag.
-        progress: Told how long it has gone on [s].
+        progress: Called with how long it has gone on [s].
 
     Returns:
         Figures by name, ready for JSON.
@@ -148,7 +148,7 @@ def killed(plan: RunPlan, *, kills: int, out: Path, progress: Callable[[], None]
         plan: Whose wires.
         kills: How many, >= 1.
         out: Folder of the bags.
-        progress: Told of each.
+        progress: Called after each.
 
     Returns:
         Figures by name, ready for JSON.

@@ -26,7 +26,7 @@ def spoken(name: str) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """What is written, and how it compares with what is asked."""
+    """What is written, and how it compares with what is required."""
 
     text: str
     tone: str = ""  # GOOD, BAD, or nothing to say

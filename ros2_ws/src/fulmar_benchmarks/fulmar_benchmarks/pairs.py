@@ -1,4 +1,4 @@
-"""Which pairs are judged, with which controllers, and what their outcomes depend on."""
+"""Pairs to evaluate, their controllers, and what their outcomes depend on."""
 
 from __future__ import annotations
 
@@ -100,9 +100,9 @@ def with_law(robot: str, task: str, name: str) -> Pair:
         controller = load_controller(name, the_robot, the_task, choice)
     except ConfigError as error:
         return Pair(robot, task, "classical", reason=str(error))
-    told = controller.metadata()
+    found = controller.metadata()
     law = str(getattr(controller, "law", name))
-    return Pair(robot, task, "classical", name, law=law, sha256=str(told["sha256"]))
+    return Pair(robot, task, "classical", name, law=law, sha256=str(found["sha256"]))
 
 
 def units_of(

@@ -24,7 +24,7 @@ FIGURE, MORE = "figure:", "more:"  # prefixes of figures and of further arrays i
 class PairResult:
     """One robot, task and controller in one way of running."""
 
-    about: dict[str, Any]  # JSON-ready: what was run, and what is told in words
+    about: dict[str, Any]  # JSON-ready: what was run, and what is said in words
     succeeded: np.ndarray  # (episodes,) truth values
     figures: dict[str, np.ndarray]  # (episodes,) by the names of `fulmar_core.figures`
     map_xy: np.ndarray  # (episodes, 2) where an episode lies in the map of successes
@@ -99,8 +99,12 @@ def cached_bound(trial: Trial, drawn: Episode, duration_s: float, folder: Path) 
 def _key(trial: Trial, drawn: Episode, duration_s: float) -> str:
     """Hash of everything that a bound depends on: robot, tolerance, places, and the code."""
     digest = hashlib.sha256()
-    told = {"robot": asdict(trial.robot), "tolerance": asdict(trial.task.tolerance), "duration_s": duration_s}
-    digest.update(json.dumps(told, sort_keys=True, default=str).encode())
+    parts = {
+        "robot": asdict(trial.robot),
+        "tolerance": asdict(trial.task.tolerance),
+        "duration_s": duration_s,
+    }
+    digest.update(json.dumps(parts, sort_keys=True, default=str).encode())
     for array in (drawn.start.x, drawn.start.y, drawn.start.yaw, drawn.goal.targets):
         digest.update(np.ascontiguousarray(array).tobytes())
     for path in sorted(Path(str(fulmar_evaluation.bounds.__file__)).parent.glob("*.py")):

@@ -1,4 +1,4 @@
-"""One unit of work of a benchmark: run a pair in one way, judge it, keep what tables and pictures need."""
+"""One unit of work of a benchmark: run a pair in one way, evaluate it, keep what tables and plots need."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ class Unit:
         """Hash of everything that the outcome depends on; not of where it runs."""
         trial = self.trial
         plan = asdict(replace(trial.plan, policy=""))
-        told = {"plan": plan, "through": trial.through, "episodes": trial.episodes, "defines": self.defines}
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        parts = {"plan": plan, "through": trial.through, "episodes": trial.episodes, "defines": self.defines}
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
     @property
     def path(self) -> Path:
@@ -85,10 +85,10 @@ class Unit:
     def done_before(self) -> PairResult | None:
         """The outcome of an earlier run with the same key, if there is one."""
         try:
-            judged = PairResult.load(self.path)
+            result = PairResult.load(self.path)
         except (OSError, ValueError, KeyError):
             return None
-        return judged if judged.about.get("key") == self.key else None
+        return result if result.about.get("key") == self.key else None
 
 
 def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, PairResult]:
@@ -111,11 +111,11 @@ def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, PairResult
 def run_unit(
     unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
 ) -> PairResult:
-    """Run and judge a unit, and keep the outcome in its file.
+    """Run and evaluate a unit, and keep the outcome in its file.
 
     Args:
         unit: What to do.
-        progress: Told how many steps have been done, of `cost`.
+        progress: Called with how many steps have been done, of `cost`.
         pool: Processes that stay for one unit after another, through ros.
 
     Returns:

@@ -59,7 +59,7 @@ def begin_worker(counts: Any, parent: int) -> None:
 
 
 def counted(index: int) -> Callable[[int], None]:
-    """What tells the parent how much of a piece of work is done, in a process that `begin_worker` began."""
+    """A callback that reports progress to the parent, in a process that `begin_worker` began."""
 
     def progress(done: int) -> None:
         _counts[index] = done
@@ -79,7 +79,7 @@ def do_all(
     Args:
         units: What to do.
         jobs: Processes at once.
-        progress: Told how much is done, of the sum of their costs.
+        progress: Called with how much is done, of the sum of their costs.
         on_done: Called as each unit ends.
 
     Returns:
@@ -105,7 +105,7 @@ def do_all(
 
 
 def _beyond(done: float, progress: Callable[[float], None]) -> Callable[[float], None]:
-    """Progress of one unit, told as that of all, of which some is done."""
+    """Progress of one unit as that of all, of which some is done."""
     return lambda steps: progress(done + steps)
 
 

@@ -80,7 +80,7 @@ class RunResult:
 
     @property
     def window_start_s(self) -> float:
-        """Where the closing window begins, which success is judged in [s]."""
+        """Where the closing window begins, in which success is decided [s]."""
         return max(0.0, self.duration_s - self.task.tolerance.hold_s)
 
     def figure(self, name: str) -> float | None:
@@ -90,7 +90,7 @@ class RunResult:
 
 
 def evaluate_run(record: RunRecord) -> RunResult | None:
-    """Judge a run by its task.
+    """Evaluate a run by its task.
 
     Args:
         record: The run.
@@ -136,12 +136,12 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
 
 
 def _of_goal_file(record: RunRecord) -> dict[str, Any]:
-    """What the node that tells goals from a file said last, and the path of that file."""
+    """What the goal node reported last, and the path of that file."""
     said = record.last_health("goals")
     asked = bool(record.info.get("goals"))
     finished = said is not None and said.values.get("mode") == "finished"
     return {
-        "progress": (said.values.get("progress", "") if said else "nothing was told") if asked else None,
+        "progress": (said.values.get("progress", "") if said else "nothing was reported") if asked else None,
         "unfinished": asked and not finished and not record.info.get("endless"),
         "path": np.array(record.info.get("path") or np.empty((0, 2)), dtype=float).reshape(-1, 2),
     }
@@ -178,7 +178,7 @@ def _goals(record: RunRecord, task: Task) -> list[GivenGoal]:
 def _newest(record: RunRecord, task: Task, given: list[GivenGoal]) -> np.ndarray:
     """Which of the goals counts at each state, shape (n,).
 
-    Places count from when they came. Velocities, and whatever a goal node tells, are stamped with the time when they
+    Places count from when they came. Velocities, and goals of a goal node, are stamped with the time when they
     begin; messages of one time need not come into the bag in their order.
     """
     motion = record.motion
@@ -208,7 +208,7 @@ def _goals_at(
     things: dict[str, np.ndarray],
     dt: float,
 ) -> Goal:
-    """The goal that a judge counts at each step: its current target alone, shape (n,)."""
+    """The goal that counts at each step: its current target alone, shape (n,)."""
     # A thing without a message counts as being where the robot is.
     unseen = np.stack((states.x, states.y, states.yaw), axis=-1)
     things = {thing.name: unseen for thing in task.things} | things

@@ -127,8 +127,8 @@ def can_hold_episodes(robot: Robot, drawn: Episode) -> np.ndarray:
     able = np.zeros(len(goal), dtype=bool)
     for i in range(len(goal)):
         force = np.array([fx[i], fy[i]])
-        told = np.array([*working[i], *force, torque[i], goal[i, 2] if force.any() else 0.0])
-        key = told.tobytes()
+        parts = np.array([*working[i], *force, torque[i], goal[i, 2] if force.any() else 0.0])
+        key = parts.tobytes()
         if key not in known:
             known[key] = (
                 hold_margin(robot, working[i], force, float(torque[i]), float(goal[i, 2])) > LEAST_MARGIN

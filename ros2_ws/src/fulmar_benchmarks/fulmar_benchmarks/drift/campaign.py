@@ -34,7 +34,7 @@ from policy_server.shipped import policies_directory
 
 @dataclass(frozen=True)
 class Request:
-    """What to judge."""
+    """What to evaluate."""
 
     rows: Sequence[str]
     controllers: Sequence[str]
@@ -45,13 +45,13 @@ class Request:
     policy: Path | None = None  # bundle for the pose; the shipped one by default
     tracking_policy: Path | None = None  # bundle for the paths; the shipped one by default
     jobs: int = 2
-    fresh: bool = False  # judge again what was judged before
+    fresh: bool = False  # evaluate again what was evaluated before
     command: str = ""  # for the record
 
 
 @dataclass(frozen=True)
 class CampaignResult:
-    """The document, and what pictures are drawn from."""
+    """The document, and what plots are drawn from."""
 
     document: dict[str, Any]
     outcomes: dict[tuple[str, str], PairResult]  # by row and controller
@@ -63,12 +63,12 @@ def run_drift(
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
 ) -> CampaignResult:
-    """Judge every controller in every row, but for what was judged before with the same code and configuration.
+    """Evaluate every controller in every row, but for what was evaluated before with the same code and configuration.
 
     Args:
-        request: What to judge.
-        progress: Told how much is done, and of how much.
-        on_done: Told of each unit: its outcome, and whether it was there before.
+        request: What to evaluate.
+        progress: Called with how much is done, and of how much.
+        on_done: Called with each unit, its outcome, and whether it was there before.
 
     Returns:
         What was found.

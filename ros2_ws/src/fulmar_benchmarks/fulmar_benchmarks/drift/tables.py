@@ -50,10 +50,10 @@ def print_tables(document: dict[str, Any], output: Console) -> None:
 
 
 def conclusion(document: dict[str, Any]) -> str:
-    """One sentence on what was asked and met."""
+    """One sentence on what was required and met."""
     asked, met, open_ = document["asked"], document["met"], document["open"]
-    return f"{met} of {asked} figures that are asked for are met" + (
-        f"; {open_} could not be judged." if open_ else "."
+    return f"{met} of {asked} figures that are required are met" + (
+        f"; {open_} could not be evaluated." if open_ else "."
     )
 
 
@@ -78,7 +78,7 @@ def notes(document: dict[str, Any]) -> list[str]:
         )
     if document["steps_per_s"]:
         lines.append(
-            f"{document['control_steps']:,} control steps, {document['steps_per_s']:,.0f} a second while judging."
+            f"{document['control_steps']:,} control steps, {document['steps_per_s']:,.0f} a second while evaluating."
         )
     return lines
 

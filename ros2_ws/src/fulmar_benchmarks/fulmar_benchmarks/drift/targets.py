@@ -58,7 +58,7 @@ def published(row: str, controller: str) -> tuple[str, dict[str, float]]:
 
 
 # Percent of the time, at least; AAS and velocity errors [m/s], at most. Of unrounded means.
-ASKED: dict[str, dict[str, dict[str, float]]] = {
+REQUIRED: dict[str, dict[str, dict[str, float]]] = {
     "policy": {
         "ideal": {"PT5": 80, "PT2": 78, "PT1": 62, "OT5": 96, "OT2": 92, "OT1": 80, "AAS": 0.09},
         "velocity_noise_4": {"PT5": 79, "PT2": 65, "OT5": 96},
@@ -90,7 +90,7 @@ ASKED: dict[str, dict[str, dict[str, float]]] = {
 
 @dataclass(frozen=True)
 class Requirement:
-    """One cell of the table of what is asked."""
+    """One cell of the table of requirements."""
 
     row: str
     controller: str
@@ -111,8 +111,8 @@ class Requirement:
 
 
 def requirements(row: str, controller: str) -> list[Requirement]:
-    """What is asked of a controller in a row; nothing of most."""
-    limits: Mapping[str, float] = ASKED.get(controller, {}).get(row, {})
+    """Requirements for a controller in a row; nothing of most."""
+    limits: Mapping[str, float] = REQUIRED.get(controller, {}).get(row, {})
     return [Requirement(row, controller, figure, limit) for figure, limit in limits.items()]
 
 
@@ -139,7 +139,7 @@ def drop_percent(figure: str, value: float, ideal: float) -> float | None:
     """How much worse a figure is than under ideal conditions.
 
     Args:
-        figure: Its name, which tells whether more or less is better.
+        figure: Its name, which says whether more or less is better.
         value: Under the condition.
         ideal: Under ideal ones.
 

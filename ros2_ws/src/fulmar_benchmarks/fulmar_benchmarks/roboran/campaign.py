@@ -1,4 +1,4 @@
-"""The benchmark after thesis Table 4.7: every pair judged, one document."""
+"""The benchmark after thesis Table 4.7: every pair evaluated, one document."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EPISODES = {"batch": BATCH_EPISODES, "mujoco": JUDGED, "ros": 16}
 
 @dataclass(frozen=True)
 class Request:
-    """What to judge."""
+    """What to evaluate."""
 
     robots: Sequence[str]
     tasks: Sequence[str]
@@ -33,13 +33,13 @@ class Request:
     folder: Path  # outcomes are kept below it
     policies: Path | None = None  # folder of bundles; the shipped ones by default
     jobs: int = 2
-    fresh: bool = False  # judge again what was judged before
+    fresh: bool = False  # evaluate again what was evaluated before
     command: str = ""  # for the record
 
 
 @dataclass(frozen=True)
 class CampaignResult:
-    """The document, and what pictures are drawn from."""
+    """The document, and what plots are drawn from."""
 
     document: dict[str, Any]
     pairs: list[Pair]
@@ -52,12 +52,12 @@ def run_benchmark(
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
 ) -> CampaignResult:
-    """Judge every pair, but for what was judged before with the same code, configuration and controller.
+    """Evaluate every pair, but for what was evaluated before with the same code, configuration and controller.
 
     Args:
-        request: What to judge.
-        progress: Told how much is done, and of how much.
-        on_done: Told of each unit: its outcome, and whether it was there before.
+        request: What to evaluate.
+        progress: Called with how much is done, and of how much.
+        on_done: Called with each unit, its outcome, and whether it was there before.
 
     Returns:
         What was found.

@@ -192,10 +192,10 @@ def print_tables(document: dict[str, Any], output: Console) -> None:
 
 
 def conclusion(document: dict[str, Any]) -> str:
-    """One sentence on what was asked and met."""
+    """One sentence on what was required and met."""
     asked, met, open_ = document["asked"], document["met"], document["open"]
-    return f"{met} of {asked} pairs meet everything that is asked of them" + (
-        f"; {open_} could not be judged in full." if open_ else "."
+    return f"{met} of {asked} pairs meet every requirement" + (
+        f"; {open_} could not be evaluated in full." if open_ else "."
     )
 
 

@@ -19,11 +19,11 @@ Z95 = 1.96
 
 
 def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, Any]:
-    """What is told about one pair.
+    """The entry of one pair.
 
     Args:
         pair: The pair.
-        outcomes: By way: what was judged, or why it could not be.
+        outcomes: By way: results, or why there is none.
 
     Returns:
         An entry of `pairs`; docs/evaluation.md names its keys.
@@ -91,7 +91,7 @@ def _value(outcome: PairResult, figure: str, episodes: int | None = None) -> flo
 
 
 def _on_mujocos_episodes(judged: dict[str, PairResult], figure: str) -> float | None:
-    """The judged figure of the batch on the very episodes that MuJoCo ran."""
+    """The main figure of the batch on the very episodes that MuJoCo ran."""
     if not {"batch", "mujoco"} <= set(judged):
         return None
     return _value(judged["batch"], figure, len(judged["mujoco"].succeeded))

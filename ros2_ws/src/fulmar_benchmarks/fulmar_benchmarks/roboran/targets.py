@@ -34,7 +34,7 @@ class ThesisRow:
     heading_error: float | None = None  # [deg]
     time_to_target_steps: float | None = None  # printed as seconds
     velocity_error: float | None = None  # [m/s]
-    yaw_rate_error: float | None = None  # taken as [rad/s]; no unit is told
+    yaw_rate_error: float | None = None  # taken as [rad/s]; no unit is given
     control_variation: float | None = None  # [-]
     goals: float | None = None  # over 1,000 control steps
     training_min: float | None = None  # on an RTX 4090 [min]
@@ -78,11 +78,11 @@ def thesis_row(robot: str, task: str) -> ThesisRow:
     return TABLE.get((task, robot), ThesisRow())
 
 
-WAY_GAP = 0.02  # most between batch and MuJoCo, in the judged figure
+WAY_GAP = 0.02  # most between batch and MuJoCo, in the main figure
 LONGEST_TRAINING_S = 300.0  # on two cores
 SHORTEST_TRAINING_S = {("floating_platform", "go_to_pose"): 60.0}  # start-up included
 
-# Least value of the judged figure, in batch and in MuJoCo alike.
+# Least value of the main figure, in batch and in MuJoCo alike.
 LEAST = {
     "go_to_position": {"floating_platform": 0.99, "kingfisher": 0.95, "turtlebot2": 0.99},
     "go_to_pose": {"floating_platform": 0.99, "kingfisher": 0.90, "turtlebot2": 0.97},
@@ -93,24 +93,24 @@ LEAST = {
 
 
 def main_figure(task: str) -> str:
-    """Which figure is judged: the mean share of the bound where waypoints are counted, else success."""
+    """The main figure of a task: the mean share of the bound where waypoints are counted, else success."""
     return "share_of_bound" if task == "go_through_positions" else "success_rate"
 
 
 def checks_of(
     robot: str, task: str, judged: dict[str, float], *, same: bool | None, training_s: float | None
 ) -> list[Check]:
-    """Compare a pair with what is asked of it.
+    """Compare a pair with what is required of it.
 
     Args:
         robot: Name of the robot.
         task: Name of the task.
-        judged: The judged figure by way: batch, mujoco, ros.
+        judged: The main figure by way: batch, mujoco, ros.
         same: Whether figures were the same with 64 worlds as with all; None: not looked at.
         training_s: Wall-clock that the policy was trained for; None for what was not trained [s].
 
     Returns:
-        One verdict a requirement; none for pairs that nothing is asked of.
+        One check a requirement; none for pairs without requirements.
     """
     least = LEAST.get(task, {}).get(robot)
     if least is None:

@@ -80,7 +80,7 @@ class _Step:
 
 
 def _search(course: Course, plan: Plan, step: _Step, weight: np.ndarray) -> np.ndarray:
-    """Halve the step until the cost falls (Armijo's rule); moves `plan`, tells where that was possible."""
+    """Halve the step until the cost falls (Armijo's rule); moves `plan`, returns where that was possible."""
     before = _cost(course, plan, weight)
     size = np.ones(len(weight))
     todo = np.flatnonzero(step.definite)

@@ -40,14 +40,14 @@ def turn_limited_bound(
     episodes err towards too many goals:
 
     - Hulls that lose time at stops 5 %: twice as fine a grid finds 3 % more in 16 courses (22 % in the worst), and the
-      better of both 4 %; in the first 48 judged episodes of kingfisher 0.8 % (22 %) and 2.1 %. Several radii cost
+      better of both 4 %; in the first 48 evaluated episodes of kingfisher 0.8 % (22 %) and 2.1 %. Several radii cost
       1.5 %, against linear programming. That a turning hull slides sideways (`motions`) makes it slower, but its circle
       tighter, 1.53 m and not 1.67 m: with it those 48 episodes have 1.3 % more.
     - Others 2 %. On two wheels two finer grids find 0.2 % and 0.4 % more goals in 32 courses of a minute (5 % in the
       worst), and optimal control (multiple shooting) finds 0.7 % fewer in 12 of them.
 
     The bound at top speed holds besides. What the relaxation gives away is at most what is missing to drives that
-    optimal control found with all the dynamics, inertia and slew, and that the core's batch repeats: in judged episodes
+    optimal control found with all the dynamics, inertia and slew, and that the core's batch repeats: in episodes
     of go_through_positions they reach 0.97 of turtlebot2's bound (12 episodes) and 0.87 of kingfisher's (9).
 
     One thing is not relaxed: a hull that is faster than it can hold in a turn keeps some of that speed for a while. It

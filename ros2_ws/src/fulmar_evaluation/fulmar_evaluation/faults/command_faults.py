@@ -112,7 +112,7 @@ def cable_lossy(live: LiveSystem) -> Outcome:
     live.hosts.cable.quality = LOSSY
     time.sleep(DRIVES_S)
     said = f"driven for {DRIVES_S:g} s without a pause"
-    return went_on(live, since_s, detected_by="", reaction=said, told=True)
+    return went_on(live, since_s, detected_by="", reaction=said, correct=True)
 
 
 def _without_two_hosts(_robot: Robot) -> str:

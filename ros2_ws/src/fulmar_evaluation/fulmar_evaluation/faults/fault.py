@@ -61,10 +61,10 @@ def stopped(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:
     observer = live.observer
     wait_for(lambda: time.monotonic() > since_s + limit_s + STAYS_S, limit_s + 2.0 * STAYS_S)
     applied = observer.applied_since(since_s)
-    unsafe = [heard_s for heard_s, moves in applied if moves]
+    unsafe = [received_s for received_s, moves in applied if moves]
     if not unsafe:
         raise NothingShown("nothing moved when the fault was done, so it shows nothing")
-    safe = [heard_s for heard_s, moves in applied if not moves and heard_s > unsafe[-1]]
+    safe = [received_s for received_s, moves in applied if not moves and received_s > unsafe[-1]]
     time_s = safe[0] - since_s if safe else None
     wait_for(lambda: observer.complaint_since(since_s) is not None, WORDS_S)
     word = observer.complaint_since(since_s)
@@ -78,7 +78,7 @@ def went_on(
     *,
     detected_by: str,
     reaction: str,
-    told: bool,
+    correct: bool,
     recorder_away: tuple[float, float] | None = None,
 ) -> Outcome:
     """Whether a robot went on, without a pause as long as its watchdog, and the right thing was said.
@@ -88,7 +88,7 @@ def went_on(
         since_s: When the fault was done, some time ago [s].
         detected_by: Who said it; empty if nobody did.
         reaction: What was said.
-        told: Whether that is what had to be said.
+        correct: Whether that is what had to be said.
         recorder_away: As of `Outcome`.
     """
     words = live.observer.statements_since(since_s - WORDS_S)  # with one from before, to compare with
@@ -98,10 +98,10 @@ def went_on(
     wrong += (
         []
         if len(trips) == 1
-        else [f"the watchdog tripped (trips told: {', '.join(sorted(trips)) or 'none'})"]
+        else [f"the watchdog tripped (trips reported: {', '.join(sorted(trips)) or 'none'})"]
     )
     said = "; ".join([*wrong, reaction])
-    return Outcome(detected_by, said, told and not wrong, recorder_away=recorder_away)
+    return Outcome(detected_by, said, correct and not wrong, recorder_away=recorder_away)
 
 
 def possible(_robot: Robot) -> str:

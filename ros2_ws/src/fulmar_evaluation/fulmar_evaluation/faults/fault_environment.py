@@ -80,7 +80,7 @@ class FaultEnvironment:
         ODOMETRY  # the wire that passes through the injector; None: the robot's commands
     )
     answers_pass: bool = False  # the robot's commands, too, pass through a injector, of their own
-    by_goal_node: bool = False  # a node of its own tells goals from a file
+    by_goal_node: bool = False  # a goal node publishes goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     scenario: str = "nominal"
     emulated: bool = False  # a driver drives an emulated device

@@ -45,9 +45,9 @@ def bearing_late(live: LiveSystem) -> Outcome:
     subscribe(Odometry, TRUTH.name, on_truth, subscriber_qos(TRUTH))
     live.begin()
     moved = wait_for(observer.moves, load_scenario(SCENARIO).bearing_late_s[1] + MARGIN_S)
-    off_s = next((heard_s for heard_s, on in air if not on), None)
-    on_s = next((heard_s for heard_s, on in air if on), math.inf)
-    first_s = next((heard_s for heard_s, moves in observer.applied_since(0.0) if moves), math.inf)
+    off_s = next((received_s for received_s, on in air if not on), None)
+    on_s = next((received_s for received_s, on in air if on), math.inf)
+    first_s = next((received_s for received_s, moves in observer.applied_since(0.0) if moves), math.inf)
     said = next((word for word in observer.statements_since(0.0) if word.text == BEARING_OFF), None)
     if not moved or off_s is None or said is None:
         return Outcome(
@@ -69,7 +69,7 @@ def _without_bearing(robot: Robot) -> str:
 
 # What a device waits for its driver before it stops by itself [s].
 OWN_TIMEOUT_S = {Kobuki: kobuki.TIMEOUT_S, KingfisherNmea: kingfisher.TIMEOUT_S}
-REPORTS_S = 0.05  # an emulator moves and is heard at its own beat
+REPORTS_S = 0.05  # an emulator moves and reports at its own rate
 
 
 def driver_killed(live: LiveSystem) -> Outcome:

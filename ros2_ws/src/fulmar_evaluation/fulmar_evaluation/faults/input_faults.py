@@ -97,7 +97,7 @@ def odometry_out_of_order(live: LiveSystem) -> Outcome:
 
 
 def odometry_late(live: LiveSystem) -> Outcome:
-    """Everything comes later by the same time, longer than the robot may be blind; it is judged before that is over."""
+    """Everything comes later by the same time, which is longer than the robot may be blind."""
     limit_s = live.watchdog_s + live.corrected_s
     late_s = limit_s + STAYS_S + MARGIN_S
     return _intercept(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
@@ -129,12 +129,12 @@ def _jump(live: LiveSystem, by_ns: int) -> Outcome:
     live.injector.change, live.answers.change = _stamped(by_ns), _stamped(-by_ns)
     time.sleep(EPOCH_S)
     epoch, mode = _epoch(live, since_s)
-    told = epoch not in ("", "0")
+    reported = epoch not in ("", "0")
     goes_on = mode == "active" and any(
         moved for _, moved in live.observer.applied_since(since_s + EPOCH_S / 2.0)
     )
     said = f"epoch {epoch} begins; {'goes on' if goes_on else mode}"
-    return Outcome("controller" if told else "", said, told and goes_on)
+    return Outcome("controller" if reported else "", said, reported and goes_on)
 
 
 def _until_mid_way(live: LiveSystem) -> float:
@@ -152,7 +152,7 @@ def _stamped(by_ns: int) -> Injection:
 
 
 def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
-    """The epoch that the controller has told since then, and what it was doing in it."""
+    """The epoch that the controller has reported since then, and what it was doing in it."""
     words = [word for word in live.observer.statements_since(since_s) if "epoch" in word.values]
     return (words[-1].values["epoch"], words[-1].values["mode"]) if words else ("", "silent")
 

@@ -45,7 +45,7 @@ class NothingShown(RunFailed):
 
 
 class LiveSystem:
-    """Recorder, plant, e-stop, controller, and a bystander who hears them."""
+    """Recorder, plant, e-stop, controller, and an observer of them."""
 
     def __init__(
         self,

@@ -31,7 +31,7 @@ NUMBER = re.compile(r"\d+(\.\d+)?")
 class Statement:
     """Something that a node said of itself."""
 
-    heard_s: float  # monotonic clock [s]
+    received_s: float  # monotonic clock [s]
     who: str  # plant, controller, estimator, estop
     level: str  # ok, warn or error
     text: str
@@ -47,11 +47,11 @@ class Observer:
     """Listens, from a node that spins in a thread of its own."""
 
     def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
-        """Listen to what actuators do, on the wire that tells it, and to the health of every node."""
+        """Subscribe to what actuators do, on a wire, and to the health of every node."""
         self.wire = wire
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
-        self._applied: list[tuple[float, int, bool]] = []  # heard [s], stamp [ns], whether it moves
+        self._applied: list[tuple[float, int, bool]] = []  # received [s], stamp [ns], whether it moves
         self._words: list[Statement] = []
         listen = node.create_subscription
         listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))
@@ -83,18 +83,18 @@ class Observer:
     def applied_since(self, since_s: float) -> list[tuple[float, bool]]:
         """When something was applied, and whether it moved the robot."""
         with self._lock:
-            return [(heard_s, moves) for heard_s, _, moves in self._applied if heard_s >= since_s]
+            return [(received_s, moves) for received_s, _, moves in self._applied if received_s >= since_s]
 
-    def heard(self) -> tuple[np.ndarray, np.ndarray]:
+    def received(self) -> tuple[np.ndarray, np.ndarray]:
         """When something was applied, and its stamps, shapes (n,) [s] and int64 [ns]."""
         with self._lock:
-            times = np.array([heard_s for heard_s, _, _ in self._applied], dtype=float)
+            times = np.array([received_s for received_s, _, _ in self._applied], dtype=float)
             return times, np.array([stamp for _, stamp, _ in self._applied], dtype=np.int64)
 
     def statements_since(self, since_s: float) -> list[Statement]:
         """What was said from then on."""
         with self._lock:
-            return [word for word in self._words if word.heard_s >= since_s]
+            return [word for word in self._words if word.received_s >= since_s]
 
     def complaint_since(self, since_s: float) -> Statement | None:
         """The first thing that a node said from then on which was wrong, and not its last word before."""
@@ -103,8 +103,8 @@ class Observer:
 
 def first_complaint(words: list[Statement], since_s: float) -> Statement | None:
     """The first thing that is wrong from a time on, and was not some node's last word before it."""
-    standing = {word.who: word.complaint for word in words if word.heard_s < since_s}.values()
-    new = (word for word in words if word.heard_s >= since_s and word.complaint is not None)
+    standing = {word.who: word.complaint for word in words if word.received_s < since_s}.values()
+    new = (word for word in words if word.received_s >= since_s and word.complaint is not None)
     return next((word for word in new if word.complaint not in standing), None)
 
 
@@ -124,7 +124,7 @@ IN_FLIGHT_S = 0.1  # so long before it hangs a message may be sent that it has n
 
 @dataclass(frozen=True)
 class BagEvidence:
-    """The bag, judged."""
+    """The bag beside what was received."""
 
     lost: int  # messages that came and are not in it
     intact: bool  # it opens, and lacks nothing of the time in which its recorder could work
@@ -132,29 +132,29 @@ class BagEvidence:
 
 
 def bag_evidence(record: Path, observer: Observer, away: tuple[float, float] | None) -> BagEvidence:
-    """Compare a bag with what somebody else heard.
+    """Compare a bag with what an observer received.
 
     Args:
         record: The bag, as it lies there after everybody has ended.
-        observer: Has heard what actuators did.
+        observer: Received what actuators did.
         away: From when to when a fault kept the recorder from its work; for ever, where it ended it [s].
     """
-    heard_s, heard_ns = observer.heard()
+    received_s, received_ns = observer.received()
     from_s, to_s = away or (math.inf, math.inf)
     dead = away is not None and math.isinf(to_s)
     if dead:  # what comes after its end is nobody's loss
-        heard_s, heard_ns = heard_s[heard_s < from_s], heard_ns[heard_s < from_s]
+        received_s, received_ns = received_s[received_s < from_s], received_ns[received_s < from_s]
     from_s, to_s = from_s - (TORN_S if dead else IN_FLIGHT_S), to_s + IN_FLIGHT_S
     try:
         bag = open_bag(record)
     except BagError as error:
-        return BagEvidence(len(heard_ns), False, str(error))
+        return BagEvidence(len(received_ns), False, str(error))
     found = stamps_ns(bag.of(observer.wire))
     if found is None or not len(found):
-        return BagEvidence(len(heard_ns), False, f"it has nothing of {observer.wire.name}")
+        return BagEvidence(len(received_ns), False, f"it has nothing of {observer.wire.name}")
     # A recorder may find the plant a little later than the bystander did.
-    missing = (heard_ns >= found.min()) & ~np.isin(heard_ns, found)
-    gaps = int(np.sum(missing & ~((heard_s >= from_s) & (heard_s < to_s))))
+    missing = (received_ns >= found.min()) & ~np.isin(received_ns, found)
+    gaps = int(np.sum(missing & ~((received_s >= from_s) & (received_s < to_s))))
     dropped = sum((bag.recording.get("dropped") or {}).values())
     problems = [
         *([f"lacks {gaps} of {observer.wire.name}"] if gaps else []),

@@ -43,7 +43,7 @@ def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
 
 
 GAMEPAD_S = 0.05  # between its messages
-TAKES_S = 10.0  # for a hand to be heard, on a busy machine
+TAKES_S = 10.0  # for a gamepad to be received, on a busy machine
 LAYOUT = JoyLayout()
 
 

@@ -84,7 +84,7 @@ def bundle_refused_with_fallback(live: LiveSystem) -> Outcome:
     words = [word for word in live.observer.statements_since(since_s) if word.who == "controller"]
     why = words[-1].values.get("fell_back", "") if words else ""
     said = why.replace(live.plan.policy, "the bundle")
-    return went_on(live, since_s, detected_by="controller" if why else "", reaction=said, told=bool(why))
+    return went_on(live, since_s, detected_by="controller" if why else "", reaction=said, correct=bool(why))
 
 
 POLICY_FAULTS = (
@@ -126,7 +126,7 @@ def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
             answers = [word.values.get("swap", "") for word in live.observer.statements_since(since_s)]
             return next((text for text in reversed(answers) if str(folder) in text), "")
 
-        told = wait_for(lambda: said().startswith(("done", "refused")), ANSWER_S)
+        reported = wait_for(lambda: said().startswith(("done", "refused")), ANSWER_S)
         time.sleep(GOES_ON_S)
     finally:
         node.destroy_node()
@@ -134,7 +134,7 @@ def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
     return went_on(
         live,
         since_s,
-        detected_by="controller" if told else "",
+        detected_by="controller" if reported else "",
         reaction=answer,
-        told=answer.startswith(wanted),
+        correct=answer.startswith(wanted),
     )

@@ -69,7 +69,7 @@ def signalled(live: LiveSystem, name: str, number: signal.Signals, limit_s: floa
 
 
 def plant_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the plant: no actuator is told anything any more, and the controller commands what is safe."""
+    """SIGKILL of the plant: no actuator receives anything any more, and the controller commands what is safe."""
     return _plant(live, signal.SIGKILL)
 
 
@@ -86,18 +86,20 @@ def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
     time.sleep(limit_s + STAYS_S)
     wait_for(lambda: live.observer.complaint_since(since_s) is not None, WORDS_S)
     word = live.observer.complaint_since(since_s)
-    last_s = max((heard_s for heard_s, _ in live.observer.applied_since(since_s)), default=since_s) - since_s
+    last_s = (
+        max((received_s for received_s, _ in live.observer.applied_since(since_s)), default=since_s) - since_s
+    )
     passed = word is not None and last_s <= limit_s
     return Outcome(word.who if word else "", word.text if word else "", passed, last_s, limit_s)
 
 
 def goals_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the node that tells goals: the robot goes to the place that it was told last."""
+    """SIGKILL of the goal node: the robot goes to the last goal that it received."""
     since_s = live.until_it_moves()
     live.send("goals", signal.SIGKILL)
     time.sleep(PAUSE_S)
     who, said = _launcher_on(live, "goals")
-    return went_on(live, since_s, detected_by=who, reaction=said, told=bool(who))
+    return went_on(live, since_s, detected_by=who, reaction=said, correct=bool(who))
 
 
 def recorder_killed(live: LiveSystem) -> Outcome:
@@ -109,7 +111,7 @@ def recorder_killed(live: LiveSystem) -> Outcome:
     time.sleep(PAUSE_S)
     who, said = _launcher_on(live, "recorder")
     return went_on(
-        live, since_s, detected_by=who, reaction=said, told=bool(who), recorder_away=(away_s, math.inf)
+        live, since_s, detected_by=who, reaction=said, correct=bool(who), recorder_away=(away_s, math.inf)
     )
 
 
@@ -121,7 +123,9 @@ def recorder_hangs(live: LiveSystem) -> Outcome:
     live.send("recorder", signal.SIGCONT)
     away = since_s, time.monotonic()
     time.sleep(PAUSE_S)
-    return went_on(live, since_s, detected_by="", reaction="control goes on", told=True, recorder_away=away)
+    return went_on(
+        live, since_s, detected_by="", reaction="control goes on", correct=True, recorder_away=away
+    )
 
 
 def disk_full(live: LiveSystem) -> Outcome:
@@ -139,7 +143,7 @@ def disk_full(live: LiveSystem) -> Outcome:
         since_s,
         detected_by=word.who if word else "",
         reaction=said,
-        told=word is not None,
+        correct=word is not None,
         recorder_away=(away_s, math.inf),
     )
 

@@ -94,7 +94,7 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
     Args:
         robot: Whose system.
         faults: From `faults_of`.
-        progress: Told how many are over.
+        progress: Called with how many are over.
 
     Raises:
         FulmarError: The robot has no policy to run.
@@ -112,7 +112,7 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
 
 
 def _found(robot: str, fault: Fault) -> FaultResult:
-    """What came of a fault; whatever prevents it is told, and the others go on."""
+    """What came of a fault; whatever prevents it is reported, and the others go on."""
     problem = ""
     for _ in range(ATTEMPTS):
         with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:

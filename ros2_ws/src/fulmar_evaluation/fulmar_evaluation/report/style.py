@@ -1,6 +1,6 @@
-"""Colours, type and axes that every picture shares.
+"""Colours, type and axes that every plot shares.
 
-Pictures in a page are drawn once and serve light and dark screens: what is drawn in INK, FAINT or PAPER
+Plots in a page are drawn once and serve light and dark screens: what is drawn in INK, FAINT or PAPER
 becomes a colour of the page's style sheet.
 """
 
@@ -106,7 +106,7 @@ def as_svg(figure: Figure) -> str:
 
 
 def as_png(figure: Figure, mark: str = "", *, dpi: int = 130) -> bytes:
-    """A figure as a picture file on white, with the mark of `report.writer` where one is given."""
+    """A figure as an image on white, with the mark of `report.writer` where one is given."""
     stream = BytesIO()
     metadata = {"Source": mark} if mark else {}
     figure.savefig(stream, format="png", dpi=dpi, facecolor="white", metadata=metadata)

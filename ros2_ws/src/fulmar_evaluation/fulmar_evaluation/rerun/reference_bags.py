@@ -71,7 +71,7 @@ REFERENCES = (
 
 
 def record_reference(reference: Reference, folder: Path) -> Path:
-    """Run through the deployed nodes in MuJoCo, and keep what a controller was told and answered.
+    """Run through the deployed nodes in MuJoCo, and keep what a controller received and answered.
 
     Args:
         reference: What to run.

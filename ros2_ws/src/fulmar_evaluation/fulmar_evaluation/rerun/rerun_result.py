@@ -139,7 +139,7 @@ def write_answers(course: Course, answers: Answers, path: Path) -> None:
         "action": (names, answers.actions),
         "command": (names, answers.commands),
     }
-    told: dict[str, Any] = {
+    columns: dict[str, Any] = {
         "stamp_ns": course.stamp_ns,
         "asked": answers.acted,
         "reason": np.array(answers.reasons),
@@ -148,14 +148,14 @@ def write_answers(course: Course, answers: Answers, path: Path) -> None:
     if path.suffix == ".npz":
         labels = {f"{field}_names": np.array(names) for field, (names, _) in vectors.items()}
         values = {field: table for field, (_, table) in vectors.items()}
-        np.savez_compressed(path, allow_pickle=False, **told, **labels, **values)
+        np.savez_compressed(path, allow_pickle=False, **columns, **labels, **values)
         return
     with path.open("w", newline="", encoding="utf-8") as stream:
         table = csv.writer(stream)
         table.writerow(
-            [*told, *(f"{field}.{name}" for field, (names, _) in vectors.items() for name in names)]
+            [*columns, *(f"{field}.{name}" for field, (names, _) in vectors.items() for name in names)]
         )
         tables = np.concatenate([values for _, values in vectors.values()], axis=1)
         for step, row in enumerate(tables.tolist()):
-            told_here = (int(course.stamp_ns[step]), int(answers.acted[step]), answers.reasons[step])
-            table.writerow([*told_here, *("" if np.isnan(value) else value for value in row)])
+            first_columns = (int(course.stamp_ns[step]), int(answers.acted[step]), answers.reasons[step])
+            table.writerow([*first_columns, *("" if np.isnan(value) else value for value in row)])
