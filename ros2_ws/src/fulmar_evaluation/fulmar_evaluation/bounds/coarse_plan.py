@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_evaluation.bounds.leg_table import HEADINGS, LegTable
 from fulmar_evaluation.bounds.legs import MODES
-from fulmar_evaluation.bounds.turn_course import TurnCourse, TurnPlan
+from fulmar_evaluation.bounds.turn_tour import TurnPlan, TurnTour
 
 _PLACES = np.deg2rad(np.linspace(-105.0, 105.0, 8))  # on a disc, from the side that the way comes from
 _CHUNK = 16  # episodes at once: what a core's cache likes
@@ -46,25 +46,25 @@ class CoarsePlans:
         return TurnPlan(angle, heading * (2.0 * math.pi / HEADINGS), MODES[mode])
 
 
-def coarse_plans(course: TurnCourse, table: LegTable, latest: float) -> CoarsePlans:
+def coarse_plans(tour: TurnTour, table: LegTable, latest: float) -> CoarsePlans:
     """Plan ahead until no episode has time left.
 
     Args:
-        course: The discs.
+        tour: The discs.
         table: Times of legs.
         latest: Time after which nothing matters [s].
     """
-    approach = course.approach
-    touches = course.touch(approach[:, :, None] + _PLACES)
-    count, states = len(course.start), table.modes * len(_PLACES) * HEADINGS
+    approach = tour.approach
+    touches = tour.touch(approach[:, :, None] + _PLACES)
+    count, states = len(tour.start), table.modes * len(_PLACES) * HEADINGS
     cost = np.full((count, table.modes, 1, HEADINGS), np.inf, dtype=np.float32)
     cost[:, -1] = 0.0  # at rest
-    if course.yaw is not None:
-        at = np.rint(course.yaw * (HEADINGS / (2.0 * math.pi))).astype(int) % HEADINGS
+    if tour.yaw is not None:
+        at = np.rint(tour.yaw * (HEADINGS / (2.0 * math.pi))).astype(int) % HEADINGS
         cost[:, -1, 0] = np.where(np.arange(HEADINGS) == at[:, None], 0.0, np.inf)
-    before = course.start[:, None]
+    before = tour.start[:, None]
     times, last, source = [], [], []
-    for goal in range(course.centres.shape[1]):
+    for goal in range(tour.centres.shape[1]):
         new, origin = np.empty((count, states), dtype=np.float32), np.empty((count, states), dtype=np.int16)
         for begin in range(0, count, _CHUNK):
             some = slice(begin, begin + _CHUNK)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fulmar_evaluation.bounds.legs import all_words, best_words, leg_time
 from fulmar_evaluation.bounds.motions import Motions
-from fulmar_evaluation.bounds.turn_course import TurnCourse, TurnPlan, relative
+from fulmar_evaluation.bounds.turn_tour import TurnPlan, TurnTour, relative
 
 _ROUNDS = 14
 _STEPS = np.deg2rad([14.0, 7.0])  # of places on the disc and of headings, in the first round
@@ -20,12 +20,12 @@ _CHUNK = 16  # episodes at once: what a core's cache likes
 
 
 def refined(
-    course: TurnCourse, motions: Motions, plan: TurnPlan, counts: np.ndarray
+    tour: TurnTour, motions: Motions, plan: TurnPlan, counts: np.ndarray
 ) -> tuple[TurnPlan, np.ndarray]:
     """Shorten plans.
 
     Args:
-        course: The discs.
+        tour: The discs.
         motions: What the robot can hold.
         plan: Where to begin.
         counts: Goals of each plan; what it does beyond does not count, shape (E,).
@@ -34,24 +34,24 @@ def refined(
         The better plans, and their times from 0 at the start on, shape (E, goals + 1) [s].
     """
     angle, heading = plan.angle.copy(), plan.heading.copy()
-    if course.yaw is not None:
-        heading[:, 0] = course.yaw
+    if tour.yaw is not None:
+        heading[:, 0] = tour.yaw
     plan = TurnPlan(angle, heading, plan.mode)
     for number, size in enumerate(_SHRINK ** np.arange(_ROUNDS)):
         if number in _ANEW:
-            words = all_words(motions)[_ways(course, motions, plan, _WORDS)[1]]
+            words = all_words(motions)[_ways(tour, motions, plan, _WORDS)[1]]
         for begin in range(0, len(angle), _CHUNK):
             some = slice(begin, begin + _CHUNK)
-            part = course.of(some, angle.shape[1])
+            part = tour.of(some, angle.shape[1])
             better = _round(part, words[:, some], motions, plan.of(some), counts[some], size * _STEPS)
             angle[some], heading[some] = better.angle, better.heading
-    times, _ = _ways(course, motions, plan, 1)
+    times, _ = _ways(tour, motions, plan, 1)
     return plan, np.concatenate((np.zeros((len(angle), 1)), np.cumsum(times[0], axis=1)), axis=1)
 
 
-def _ways(course: TurnCourse, motions: Motions, plan: TurnPlan, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _ways(tour: TurnTour, motions: Motions, plan: TurnPlan, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The fastest ways of each leg of a plan: times and words, shapes (count, E, goals)."""
-    places = np.concatenate((course.start[:, None], course.touch(plan.angle[..., None])[:, :, 0]), axis=1)
+    places = np.concatenate((tour.start[:, None], tour.touch(plan.angle[..., None])[:, :, 0]), axis=1)
     x, y = relative(places[:, :-1], plan.heading[:, :-1], places[:, 1:])
     turn = np.diff(plan.heading, axis=1)
     before, after = _ends(plan)
@@ -66,7 +66,7 @@ def _ends(plan: TurnPlan) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _round(
-    course: TurnCourse,
+    tour: TurnTour,
     words: np.ndarray,
     motions: Motions,
     plan: TurnPlan,
@@ -76,11 +76,11 @@ def _round(
     """Dynamic programming over the neighbours of each state, with words of shape (ways, E, goals, 5)."""
     angles = plan.angle[..., None] + steps[0] * _OFFSETS[:, 0]
     headings = plan.heading[..., None] + steps[1] * _OFFSETS[:, 1]
-    if course.yaw is not None:
+    if tour.yaw is not None:
         headings[:, 0] = plan.heading[:, :1]
     n = len(_OFFSETS)
-    start = np.broadcast_to(course.start[:, None, None], (len(angles), 1, n, 2))
-    places = np.concatenate((start, course.touch(angles)), axis=1)
+    start = np.broadcast_to(tour.start[:, None, None], (len(angles), 1, n, 2))
+    places = np.concatenate((start, tour.touch(angles)), axis=1)
     x, y = relative(places[:, :-1, :, None], headings[:, :-1, :, None], places[:, 1:, None])
     turn = headings[:, 1:, None] - headings[:, :-1, :, None]
     times = np.full(x.shape, np.inf)

@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, slots=True)
-class TurnCourse:
+class TurnTour:
     """Discs of some episodes."""
 
     start: np.ndarray  # (E, 2) [m]
@@ -35,10 +35,10 @@ class TurnCourse:
         edge = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
         return np.asarray(self.centres[:, :, None] + self.radius * edge)
 
-    def of(self, episodes: np.ndarray | slice, goals: int) -> TurnCourse:
+    def of(self, episodes: np.ndarray | slice, goals: int) -> TurnTour:
         """Some of the episodes, and the first goals."""
         yaw = None if self.yaw is None else self.yaw[episodes]
-        return TurnCourse(self.start[episodes], yaw, self.centres[episodes, :goals], self.radius)
+        return TurnTour(self.start[episodes], yaw, self.centres[episodes, :goals], self.radius)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A course of discs, a plan through it, and what the plan must keep to."""
+"""A tour of discs, a plan through it, and what the plan must keep to."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_evaluation.bounds.reach import reach_slack
+from fulmar_evaluation.bounds.reachable_set import reach_slack
 
 # Where the variables of one link lie: position and velocity before and after it, and its duration.
 P0, V0, P1, V1, H = slice(0, 2), slice(2, 4), slice(4, 6), slice(6, 8), 8
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class DiscTour:
     """Discs to touch in order, for E episodes at once, in units in which the largest acceleration is 1."""
 
     start: np.ndarray  # (4, E) position and velocity
     centres: np.ndarray  # (goals, 2, E)
-    counts: np.ndarray  # (E,) discs that count, 1 to goals; a shorter course leaves the last ones out
+    counts: np.ndarray  # (E,) discs that count, 1 to goals; a shorter tour leaves the last ones out
     radius: float
     top_speed: float  # infinite: no limit
 
@@ -32,9 +32,9 @@ class Course:
         """Degree of all barriers together, shape (E,): what one unit of their weight costs at most."""
         return self.counts * (3.0 if np.isinf(self.top_speed) else 7.0)
 
-    def of(self, episodes: np.ndarray) -> Course:
+    def of(self, episodes: np.ndarray) -> DiscTour:
         """Some of the episodes."""
-        return Course(
+        return DiscTour(
             self.start[:, episodes],
             self.centres[:, :, episodes],
             self.counts[episodes],
@@ -79,26 +79,26 @@ class Limit:
     second: dict[tuple[int, int], np.ndarray | float]  # i <= j
 
 
-def links_of(course: Course, plan: Plan) -> Links:
+def links_of(tour: DiscTour, plan: Plan) -> Links:
     """Changes along a plan."""
-    before = np.concatenate((course.start[None], plan.states[:-1]))
+    before = np.concatenate((tour.start[None], plan.states[:-1]))
     change = (plan.states - before).swapaxes(0, 1)
     mean = 0.5 * (plan.states + before)[:, 2:4].swapaxes(0, 1)
     return Links(change[0:2], change[2:4], mean, change[0:2] - plan.durations * mean)
 
 
-def limits(course: Course, plan: Plan, links: Links) -> list[Limit]:
+def limits(tour: DiscTour, plan: Plan, links: Links) -> list[Limit]:
     """Every inequality but that of `reach`.
 
     Each link ends in its disc. A top speed V holds the last velocity and the mean velocity of each link, and on the
     line u between two discs it also costs the time to speed up and to slow down: with the gaps g = V - v·u at both
     ends, a link is shorter than V h by (g0² + g1²) / 2, less what the two triangles share where it is brief.
     """
-    offset = plan.states[:, 0:2].swapaxes(0, 1) - course.centres.swapaxes(0, 1)
-    found = [_round(course.radius, offset, at=4)]
-    if np.isinf(course.top_speed):
+    offset = plan.states[:, 0:2].swapaxes(0, 1) - tour.centres.swapaxes(0, 1)
+    found = [_round(tour.radius, offset, at=4)]
+    if np.isinf(tour.top_speed):
         return found
-    V, h = course.top_speed, plan.durations
+    V, h = tour.top_speed, plan.durations
     found.append(_round(V, plan.states[:, 2:4].swapaxes(0, 1), at=6))
     dx, dy = links.move
     first: dict[int, np.ndarray | float] = {0: 2.0 * dx, 1: 2.0 * dy, 4: -2.0 * dx, 5: -2.0 * dy}
@@ -108,7 +108,7 @@ def limits(course: Course, plan: Plan, links: Links) -> list[Limit]:
     }
     second[8, 8] = 2.0 * V * V
     found.append(Limit(V * V * h * h - dx * dx - dy * dy, first, second))
-    found.append(_speeding_up(V, h, _directions(course).swapaxes(0, 1), links))
+    found.append(_speeding_up(V, h, _directions(tour).swapaxes(0, 1), links))
     return found
 
 
@@ -122,9 +122,9 @@ def _round(size: float, vector: np.ndarray, *, at: int) -> Limit:
     )
 
 
-def _directions(course: Course) -> np.ndarray:
+def _directions(tour: DiscTour) -> np.ndarray:
     """Unit vectors from each disc to the next, shape (goals, 2, E); 0 between equal ones."""
-    leg = np.diff(course.centres, axis=0, prepend=course.start[None, 0:2])
+    leg = np.diff(tour.centres, axis=0, prepend=tour.start[None, 0:2])
     length = np.linalg.norm(leg, axis=1, keepdims=True)
     return np.asarray(leg / np.maximum(length, 1e-12))
 
@@ -148,29 +148,29 @@ def _speeding_up(V: float, h: np.ndarray, u: np.ndarray, links: Links) -> Limit:
     return Limit(V * h - np.sum(links.move * u, axis=0) - lost, first, second)
 
 
-def all_slacks(course: Course, plan: Plan) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def all_slacks(tour: DiscTour, plan: Plan) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Slacks whose logarithms are the barrier, and those that must be positive besides; shapes (links, E)."""
-    links = links_of(course, plan)
+    links = links_of(tour, plan)
     room, slack = reach_slack(links.gain, links.moment, plan.durations)
-    return [slack, *(limit.slack for limit in limits(course, plan, links))], [room, plan.durations]
+    return [slack, *(limit.slack for limit in limits(tour, plan, links))], [room, plan.durations]
 
 
-def is_inside(course: Course, plan: Plan) -> np.ndarray:
+def is_inside(tour: DiscTour, plan: Plan) -> np.ndarray:
     """Which links keep all limits, shape (links, E); links that do not count do."""
-    barrier, others = all_slacks(course, plan)
+    barrier, others = all_slacks(tour, plan)
     kept = np.logical_and.reduce([slack > 0.0 for slack in (*barrier, *others)])
-    return np.asarray(kept | ~course.active)
+    return np.asarray(kept | ~tour.active)
 
 
-def stop_and_go(course: Course) -> Plan:
+def stop_and_go(tour: DiscTour) -> Plan:
     """A plan that keeps all limits: straight lines from centre to centre, at rest after each link."""
-    states = np.concatenate((course.centres, np.zeros_like(course.centres)), axis=1)
-    change = np.diff(states[:, 0:2], axis=0, prepend=course.start[None, 0:2])
+    states = np.concatenate((tour.centres, np.zeros_like(tour.centres)), axis=1)
+    change = np.diff(states[:, 0:2], axis=0, prepend=tour.start[None, 0:2])
     length = np.linalg.norm(change, axis=1)
     # From rest to rest takes 2 √length.
-    plan = Plan(states, np.maximum(2.2 * np.sqrt(length) + 0.1, 1.5 * length / course.top_speed))
+    plan = Plan(states, np.maximum(2.2 * np.sqrt(length) + 0.1, 1.5 * length / tour.top_speed))
     for _ in range(200):
-        outside = ~is_inside(course, plan)
+        outside = ~is_inside(tour, plan)
         if not outside.any():
             break
         plan.durations[outside] *= 1.2
