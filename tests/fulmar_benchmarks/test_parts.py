@@ -89,8 +89,8 @@ def test_the_interval_of_a_share_holds_it_and_shrinks_with_episodes():
 
 def test_an_outcome_is_read_as_it_was_written(tmp_path):
     unit = unit_of(tmp_path)
-    told = []
-    outcome = units.run_unit(unit, told.append)
+    reported = []
+    outcome = units.run_unit(unit, reported.append)
     again = PairResult.load(unit.path)
     for field in dataclasses.fields(PairResult):
         value, other = getattr(outcome, field.name), getattr(again, field.name)
@@ -104,7 +104,7 @@ def test_an_outcome_is_read_as_it_was_written(tmp_path):
             np.testing.assert_array_equal(value, other)
     assert outcome.over_time.shape == (len(QUANTILES), 300)
     assert outcome.paths.shape == (3, 300, 3)
-    assert told[-1] == unit.cost == 3 * 300
+    assert reported[-1] == unit.cost == 3 * 300
     assert outcome.about["same_at_64_worlds"] is True
 
 
@@ -119,7 +119,7 @@ def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
     assert unit.done_before() is None
 
 
-def test_what_was_judged_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path):
+def test_what_was_evaluated_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path):
     unit = unit_of(tmp_path)
     assert done_already([unit], fresh=False) == {}
     outcome = units.run_unit(unit)
@@ -210,7 +210,7 @@ def test_the_fault_of_one_unit_is_a_sentence_and_costs_no_other(tmp_path, monkey
     monkeypatch.setattr(workers, "run_unit", broken)
     seen = []
     outcomes = workers.do_all(
-        [unit], jobs=1, progress=lambda done: None, on_done=lambda *told: seen.append(told)
+        [unit], jobs=1, progress=lambda done: None, on_done=lambda *reported: seen.append(reported)
     )
     assert outcomes == {unit: "RuntimeError: it broke"}
     assert seen == [(unit, "RuntimeError: it broke")]

@@ -125,11 +125,11 @@ def test_the_page_shows_every_pair_and_every_task(written):
     for title in ("Go to position", "Go to pose", "Track velocities", "Go through positions", "obstacles"):
         assert title in words
     assert words.count("floating platform") >= len(TASKS)
-    assert "nobody <drives> it" in words, "what is missing is told, not left out"
+    assert "nobody <drives> it" in words, "what is missing is reported, not left out"
     assert "✓" in words
 
 
-def test_every_picture_has_a_caption_and_a_file_below_half_a_megabyte(written):
+def test_every_plot_has_a_caption_and_a_file_below_half_a_megabyte(written):
     text = written.read_text()
     page = Page(text)
     pictures = sorted((written.parent / "pictures").glob("*.png"))
@@ -146,7 +146,7 @@ def test_a_page_says_what_every_figure_means(written):
         assert meaning in words
 
 
-def test_a_task_that_nobody_did_has_no_pictures(findings, tmp_path):
+def test_a_task_that_nobody_did_has_no_plots(findings, tmp_path):
     from fulmar_benchmarks.roboran.report import write_report
 
     pair = Pair("turtlebot2", "go_to_pose", "policy", reason="no policy is shipped")

@@ -17,7 +17,7 @@ from fulmar_evaluation.run_evaluation import evaluate_run
 from tests.fulmar_cli.bag_commands import BAGS, POLICY, answer, ask
 
 
-def test_a_picture_of_another_kind_is_refused_as_what_it_is(tmp_path):
+def test_a_plot_of_another_kind_is_refused_as_what_it_is(tmp_path):
     refused = str(ask("plot", POLICY, "--out", tmp_path / "run.pdf").exception)
     assert "'.pdf' cannot be drawn" in refused
     assert "report" not in refused.split(": ", 1)[1]
@@ -37,7 +37,7 @@ def test_a_bag_without_what_was_applied_is_plotted_with_what_was_commanded(name)
     assert any(open_spans(record, row) for row in range(len(record.actuation.names)))
 
 
-def test_panels_of_commands_are_told_apart_by_their_topics(tmp_path):
+def test_panels_of_commands_differ_by_their_topics(tmp_path):
     bag = open_bag(POLICY)
     drawings = _drawings(bag, odometries(bag.of(ODOMETRY)))
     titles = [drawing.title for drawing in drawings if "actuators" in drawing.title]

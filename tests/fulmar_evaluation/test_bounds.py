@@ -273,7 +273,7 @@ def test_after_the_last_waypoint_the_first_comes_again_in_a_loop_only():
     assert goals_reached(there_and_back, waypoints, radius=RADIUS, loop=False) == 2
 
 
-def test_many_trajectories_are_judged_at_once():
+def test_many_trajectories_are_evaluated_at_once():
     waypoints = tours(5, 3, seed=14)
     assert goals_reached(waypoints, waypoints, radius=RADIUS).tolist() == [3] * 5
     assert goals_reached(waypoints[0], waypoints, radius=RADIUS).shape == (5,)

@@ -45,7 +45,7 @@ def test_the_same_words_of_another_node_or_after_good_ones_are_new():
 
 @pytest.mark.parametrize("robot", ["floating_platform", "turtlebot2", "kingfisher"])
 @pytest.mark.parametrize("late_s", [-0.01, 0.01])
-def test_whether_a_robot_stopped_in_time_can_be_told_in_json(robot: str, late_s: float, tmp_path: Path):
+def test_whether_a_robot_stopped_in_time_can_be_reported_in_json(robot: str, late_s: float, tmp_path: Path):
     live = LiveSystem(request_of(robot, tmp_path / "bag"), MagicMock(), MagicMock(), MagicMock(), USUAL, None)
     since_s = time.monotonic() - 10.0
     at_s = since_s + live.silenced_s + late_s
@@ -53,8 +53,8 @@ def test_whether_a_robot_stopped_in_time_can_be_told_in_json(robot: str, late_s:
         applied_since=lambda _: [(at_s - 0.02, True), (at_s, False)],
         complaint_since=lambda _: word(at_s, "no command"),
     )
-    told = json.loads(json.dumps(asdict(stopped(live, since_s, live.silenced_s))))
-    assert told["passed"] is (late_s < 0.0)
+    reported = json.loads(json.dumps(asdict(stopped(live, since_s, live.silenced_s))))
+    assert reported["passed"] is (late_s < 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -64,23 +64,23 @@ def stamps() -> np.ndarray:
     return np.sort(found)
 
 
-def heard(stamps: np.ndarray) -> SimpleNamespace:
-    """A bystander who heard one message a second, from 0 s on."""
+def received(stamps: np.ndarray) -> SimpleNamespace:
+    """A bystander who received one message a second, from 0 s on."""
     times = np.arange(len(stamps), dtype=float)
-    return SimpleNamespace(wire=ODOMETRY, heard=lambda: (times, stamps))
+    return SimpleNamespace(wire=ODOMETRY, received=lambda: (times, stamps))
 
 
 def with_one_more(stamps: np.ndarray, at: int) -> np.ndarray:
     return np.insert(stamps, at, (stamps[at - 1] + stamps[at]) // 2)
 
 
-def test_a_bag_with_everything_that_was_heard_is_intact(stamps):
-    kept = bag_evidence(BAG, heard(stamps), None)
+def test_a_bag_with_everything_that_was_received_is_intact(stamps):
+    kept = bag_evidence(BAG, received(stamps), None)
     assert (kept.lost, kept.intact, kept.words) == (0, True, "")
 
 
 def test_a_message_that_is_missing_is_a_gap_unless_the_recorder_was_kept_from_it(stamps):
-    observer = heard(with_one_more(stamps, 10))
+    observer = received(with_one_more(stamps, 10))
     kept = bag_evidence(BAG, observer, None)
     assert (kept.lost, kept.intact) == (1, False)
     assert "lacks 1 of odom" in kept.words
@@ -90,7 +90,7 @@ def test_a_message_that_is_missing_is_a_gap_unless_the_recorder_was_kept_from_it
 
 
 def test_a_recorder_that_died_may_take_its_last_second_along_and_no_more(stamps):
-    observer = heard(with_one_more(stamps, 10))
+    observer = received(with_one_more(stamps, 10))
     assert bag_evidence(BAG, observer, (10.5, math.inf)).intact
     assert not bag_evidence(BAG, observer, (12.5, math.inf)).intact
     before = bag_evidence(BAG, observer, (5.0, math.inf))
@@ -98,6 +98,6 @@ def test_a_recorder_that_died_may_take_its_last_second_along_and_no_more(stamps)
 
 
 def test_a_bag_that_does_not_open_is_lost_as_a_whole(stamps, tmp_path):
-    kept = bag_evidence(tmp_path, heard(stamps), None)
+    kept = bag_evidence(tmp_path, received(stamps), None)
     assert (kept.lost, kept.intact) == (len(stamps), False)
     assert str(tmp_path) in kept.words

@@ -43,14 +43,16 @@ def test_the_command_finds_the_same_and_writes_a_calibration(evaluated, fulmar, 
         "identify", home / "bare", home / "heavy", "--ballast", f"{home / 'heavy'}={weight}+-0.004",
         "--out", out, "--json",
     )  # fmt: skip
-    told = json.loads(printed)
+    reported = json.loads(printed)
     assert code == 0
-    assert (told["robot"], told["calibration"]) == ("floating_platform", str(out))
-    assert told["driven_s"] == pytest.approx(120.0, abs=0.1)
-    assert set(told["estimates"]["mass"]) == {"value", "low", "high", "unit"}
+    assert (reported["robot"], reported["calibration"]) == ("floating_platform", str(out))
+    assert reported["driven_s"] == pytest.approx(120.0, abs=0.1)
+    assert set(reported["estimates"]["mass"]) == {"value", "low", "high", "unit"}
     for name in REQUIRED:
-        assert told["estimates"][name]["value"] == pytest.approx(quantities[name]["value"], rel=0.005)
-    assert load_calibration(out).thrust.value == pytest.approx(told["estimates"]["thrust"]["value"], rel=1e-6)
+        assert reported["estimates"][name]["value"] == pytest.approx(quantities[name]["value"], rel=0.005)
+    assert load_calibration(out).thrust.value == pytest.approx(
+        reported["estimates"]["thrust"]["value"], rel=1e-6
+    )
 
 
 def test_a_simulation_with_the_calibration_has_the_machine_s_own_numbers(

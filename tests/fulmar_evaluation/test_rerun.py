@@ -140,7 +140,7 @@ def test_minus_zero_is_not_the_same_bits_as_zero():
     assert field.differing == 1
 
 
-def test_tolerances_are_told_by_field_and_refused_where_they_make_no_sense():
+def test_tolerances_are_reported_by_field_and_refused_where_they_make_no_sense():
     assert read_tolerances(["1e-3", "action=2"], FIELDS)["action"] == 2.0
     assert read_tolerances(["1e-3"], FIELDS)["command"] == 1e-3
     for wrong in ("-1", "action=much", "acton=1", "nan"):

@@ -39,7 +39,7 @@ def test_a_run_that_reached_its_goal_says_so(reached):
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
-def test_time_to_goal_and_length_of_the_run_are_told_apart(reached, silenced):
+def test_time_to_goal_and_length_of_the_run_differ(reached, silenced):
     summary = summarise(read_run(reached))
     line = verdict(summary).splitlines()[0]
     assert line.startswith(f"lqr: goal met after {summary['time_to_target_s']:.1f} s, ")
@@ -120,8 +120,8 @@ def test_latency_comes_from_the_bag_where_the_plant_does_not_tell_it(reached):
 def test_latency_of_the_plant_counts_where_it_tells_it(reached):
     record = read_run(reached)
     plant = record.last_health("plant")
-    told = {"latency_ms_p50": "1.0", "latency_ms_p99": "2.0", "latency_ms_max": "3.0"}
-    newer = dataclasses.replace(plant, values={**plant.values, **told})
+    reported = {"latency_ms_p50": "1.0", "latency_ms_p99": "2.0", "latency_ms_max": "3.0"}
+    newer = dataclasses.replace(plant, values={**plant.values, **reported})
     summary = summarise(dataclasses.replace(record, health=(*record.health, newer)))
     assert summary["latency_ms"] == {"p50": 1.0, "p99": 2.0, "max": 3.0}
 
@@ -162,7 +162,7 @@ def test_lost_samples_do_not_shift_the_window(reached):
     assert thinned.success
 
 
-def test_a_robot_without_truth_is_judged_by_its_odometry(reached):
+def test_a_robot_without_truth_is_evaluated_by_its_odometry(reached):
     record = read_run(reached)
     nothing = type(record.truth)(
         **{f.name: getattr(record.truth, f.name)[:0] for f in dataclasses.fields(record.truth)}
@@ -233,7 +233,7 @@ def test_a_goal_that_is_repeated_with_its_stamp_is_the_same_goal(reached):
     assert len(_goals(anew, task)) == 2
 
 
-def test_a_velocity_is_judged_against_the_target_of_its_time(tmp_path):
+def test_a_velocity_is_evaluated_against_the_target_of_its_time(tmp_path):
     plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "track_velocities"}, duration_s=30.0)
     record = read_run(write_run(tmp_path / "bag", plan))
     assert [goal.targets.shape for goal in record.goals] == [(1, 3)] * 3
@@ -273,7 +273,7 @@ def test_what_a_task_does_not_ask_is_none(reached):
     assert summary["collided"] is False
 
 
-def test_a_run_on_hardware_is_judged_from_its_first_actuation_on_for_as_long_as_was_asked(reached):
+def test_a_run_on_hardware_is_evaluated_from_its_first_actuation_on_for_as_long_as_was_asked(reached):
     """A robot is measured before and after its run, too: what it did then is nobody's success or failure."""
     record = read_run(reached)
     applied, first = record.applied, 250

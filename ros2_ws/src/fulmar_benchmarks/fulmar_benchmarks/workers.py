@@ -6,13 +6,13 @@ import contextlib
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING, Any
 
 from fulmar_benchmarks.results import PairResult
-from fulmar_benchmarks.unit import Unit, run_unit
+from fulmar_benchmarks.unit import Unit, done_already, run_unit
 from fulmar_bringup.environment import environment
 from fulmar_core.errors import RunFailed
 from fulmar_core.parent_watch import end_with
@@ -69,6 +69,36 @@ def counted(index: int) -> Callable[[int], None]:
 
 Outcome = PairResult | str  # a sentence where a unit failed
 Done = Callable[[Unit, Outcome], None]
+
+
+def evaluate_units(
+    units: Sequence[Unit],
+    *,
+    jobs: int,
+    fresh: bool,
+    progress: Callable[[float, float], None],
+    on_done: Callable[[Unit, Outcome, bool], None],
+) -> dict[Unit, Outcome]:
+    """Outcomes of units, from the files of an earlier run where these hold.
+
+    Args:
+        units: What to do.
+        jobs: Processes at once.
+        fresh: Whether to do again what was done before.
+        progress: Called with how much is done, and of how much.
+        on_done: Called with each unit, its outcome, and whether it was there before.
+    """
+    outcomes: dict[Unit, Outcome] = {**done_already(units, fresh=fresh)}
+    for unit, before in outcomes.items():
+        on_done(unit, before, True)
+    left = [unit for unit in units if unit not in outcomes]
+    total = sum(unit.cost for unit in left)
+    return outcomes | do_all(
+        left,
+        jobs=jobs,
+        progress=lambda done: progress(done, total),
+        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    )
 
 
 def do_all(

@@ -23,8 +23,8 @@ from fulmar_benchmarks.drift.document import document_of
 from fulmar_benchmarks.drift.unit import DriftUnit
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
 from fulmar_benchmarks.results import PairResult
-from fulmar_benchmarks.unit import Unit, done_already
-from fulmar_benchmarks.workers import Outcome, do_all
+from fulmar_benchmarks.unit import Unit
+from fulmar_benchmarks.workers import Outcome, evaluate_units
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
@@ -65,13 +65,7 @@ def run_drift(
 ) -> CampaignResult:
     """Evaluate every controller in every row, but for what was evaluated before with the same code and configuration.
 
-    Args:
-        request: What to evaluate.
-        progress: Called with how much is done, and of how much.
-        on_done: Called with each unit, its outcome, and whether it was there before.
-
-    Returns:
-        What was found.
+    Arguments beside the request as of `evaluate_units`.
     """
     began = time.monotonic()
     pairs = {
@@ -86,16 +80,8 @@ def run_drift(
         for controller in request.controllers
         if not pairs[_task_of_row(row), controller].missing
     }
-    outcomes: dict[Unit, Outcome] = {**done_already(units.values(), fresh=request.fresh)}
-    for unit, before in outcomes.items():
-        on_done(unit, before, True)
-    left: list[Unit] = [unit for unit in units.values() if unit not in outcomes]
-    total = sum(unit.cost for unit in left)
-    outcomes |= do_all(
-        left,
-        jobs=request.jobs,
-        progress=lambda done: progress(done, total),
-        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    outcomes = evaluate_units(
+        list(units.values()), jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
     )
     found = {key: outcomes[unit] for key, unit in units.items()}
     document = document_of(

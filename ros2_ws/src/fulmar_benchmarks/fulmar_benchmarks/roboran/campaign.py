@@ -11,8 +11,8 @@ from typing import Any
 from fulmar_benchmarks.pairs import Pair, find_pair, units_of
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import FORMAT, pair_entry
-from fulmar_benchmarks.unit import Unit, done_already
-from fulmar_benchmarks.workers import Outcome, do_all
+from fulmar_benchmarks.unit import Unit
+from fulmar_benchmarks.workers import Outcome, evaluate_units
 from fulmar_core.provenance import fulmar_version, git_revision
 from fulmar_evaluation.evaluation import BATCH_EPISODES
 from fulmar_evaluation.evaluation import EPISODES as JUDGED
@@ -54,13 +54,7 @@ def run_benchmark(
 ) -> CampaignResult:
     """Evaluate every pair, but for what was evaluated before with the same code, configuration and controller.
 
-    Args:
-        request: What to evaluate.
-        progress: Called with how much is done, and of how much.
-        on_done: Called with each unit, its outcome, and whether it was there before.
-
-    Returns:
-        What was found.
+    Arguments beside the request as of `evaluate_units`.
     """
     began = time.monotonic()
     pairs = [
@@ -82,16 +76,8 @@ def run_benchmark(
         if not pair.missing
     }
     every = [unit for of_pair in units.values() for unit in of_pair]
-    outcomes: dict[Unit, Outcome] = {**done_already(every, fresh=request.fresh)}
-    for unit, before in outcomes.items():
-        on_done(unit, before, True)
-    left = [unit for unit in every if unit not in outcomes]
-    total = sum(unit.cost for unit in left)
-    outcomes |= do_all(
-        left,
-        jobs=request.jobs,
-        progress=lambda done: progress(done, total),
-        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    outcomes = evaluate_units(
+        every, jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
     )
     by_pair = {pair: {unit.trial.through: outcomes[unit] for unit in units.get(pair, [])} for pair in pairs}
     entries = [pair_entry(pair, by_pair[pair]) for pair in pairs]
