@@ -60,7 +60,7 @@ class Case(Protocol):
         ...
 
     def about(self) -> dict[str, Any]:
-        """What is told about it beside its figures."""
+        """What is reported about it beside its figures."""
         ...
 
 

@@ -38,7 +38,7 @@ def estimator(
     """Compare the state estimator with the mean of 30 poses that RoboRAN deploys, on the same data.
 
     A robot is driven about in the core's dynamics at 200 Hz; its poses, at 200 Hz and at 25 Hz, and its inertial
-    readings have the noise of the robot's YAML. Every figure is about what a controller is estimates at the very instant,
+    readings have the noise of the robot's YAML. Every figure is about what a controller receives at an instant,
     against the truth at that instant. Exit code 1 if the estimator's velocity error is more than half the mean's, or
     20 ms late.
 

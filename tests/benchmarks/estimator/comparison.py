@@ -81,14 +81,14 @@ def estimate_by_filter(
     estimates = np.full((len(drive.time_s), 3), np.nan)
     newest = np.full(3, np.nan)
     for tick in range(len(estimates)):
-        now_ns, captured, heard = round(1e9 * float(drive.time_s[tick])), tick - late, False
+        now_ns, captured, taken = round(1e9 * float(drive.time_s[tick])), tick - late, False
         if with_imu:
             sample = ImuSample(drive.force[tick], np.array([0.0, 0.0, drive.turn_rate[tick]]))
-            heard = not estimator.see_imu(sample, now_ns)
+            taken = not estimator.see_imu(sample, now_ns)
         if captured >= 0 and captured % every == 0:
             x, y, yaw = drive.measured_place[captured]
-            heard |= not estimator.see_pose(np.array([x, y, 0.0]), from_yaw(np.asarray(yaw)), now_ns)
-        estimate = estimator.estimate() if heard else None
+            taken |= not estimator.see_pose(np.array([x, y, 0.0]), from_yaw(np.asarray(yaw)), now_ns)
+        estimate = estimator.estimate() if taken else None
         if estimate is not None:
             newest = np.array(
                 [*estimate.state.velocity_in_world[:2], estimate.state.angular_velocity_in_body[2]]

@@ -36,7 +36,7 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
 
     Args:
         asked: What.
-        progress: Told in a few words what goes on.
+        progress: Called with a few words on what goes on.
 
     Returns:
         Figures by part, ready for JSON; `passed` where every part is.
