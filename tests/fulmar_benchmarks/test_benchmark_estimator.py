@@ -19,6 +19,7 @@ from tests.benchmarks.estimator.comparison import (
     ThirtyPoses,
     compare,
     estimate_by_mean,
+    requirements_met,
 )
 from tests.benchmarks.estimator.drive import TICK_S, Drive, drives
 
