@@ -84,13 +84,7 @@ PLATFORM = "floating_platform"
 def run_identification(
     trials: Sequence[Trial], *, jobs: int, on_done: Callable[[dict[str, Any]], None] = lambda result: None
 ) -> list[dict[str, Any]]:
-    """Run trials in processes of their own; results in the order of the trials.
-
-    Args:
-        trials: What to do.
-        jobs: Processes at once.
-        on_done: Given each result as it comes.
-    """
+    """Run trials in processes of their own; results in the order of the trials."""
     results: dict[int, dict[str, Any]] = {}
     spawn = multiprocessing.get_context("spawn")
     with one_thread_each(), ended_with_us(ProcessPoolExecutor(jobs, spawn)) as pool:

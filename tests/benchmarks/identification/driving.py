@@ -39,9 +39,6 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
         folder: Of the bag.
         seed: Of the sensors' noise.
         duration_s: Length [s].
-
-    Returns:
-        The folder.
     """
     task = load_task(TASK)
     controller = Excite(nominal, task)
@@ -82,9 +79,6 @@ def speeds_of_wheels(machine: Machine) -> dict[str, float]:
     """Speed over commanded speed, straight ahead and on the spot, when it changes no more.
 
     Not quite the factors that the machine was made with: wheels creep a little where they push.
-
-    Args:
-        machine: With two driven wheels.
 
     Returns:
         `wheel_scale` and `turn_scale`.

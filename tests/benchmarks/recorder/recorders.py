@@ -84,11 +84,7 @@ class Recorder:
 
 @contextlib.contextmanager
 def recorders(plans: dict[Path, RunPlan]) -> Iterator[list[Recorder]]:
-    """Recorders that all record; none is left when the context ends.
-
-    Args:
-        plans: Plan by bag folder.
-    """
+    """Recorders that all record; none is left when the context ends."""
     with contextlib.ExitStack() as stack:
         started = []
         for bag, plan in plans.items():

@@ -92,15 +92,7 @@ class Unit:
 
 
 def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, PairResult]:
-    """What is known of some units from earlier runs.
-
-    Args:
-        units: What is to be done.
-        fresh: Do all of it again: nothing is known.
-
-    Returns:
-        Their outcomes.
-    """
+    """What is known of some units from earlier runs."""
     known = {}
     for unit in units:
         if not fresh and (before := unit.done_before()) is not None:
@@ -117,9 +109,6 @@ def run_unit(
         unit: What to do.
         progress: Called with how many steps have been done, of `cost`.
         pool: Processes that stay for one unit after another, through ros.
-
-    Returns:
-        The outcome.
     """
     began = time.monotonic()
     trial, weight = _long(unit.trial), STEP_COSTS[unit.trial.through]

@@ -106,15 +106,6 @@ def do_all(
 ) -> dict[Unit, Outcome]:
     """Do units, the costliest first; those through ros, which use all cores themselves, after the others.
 
-    Args:
-        units: What to do.
-        jobs: Processes at once.
-        progress: Called with how much is done, of the sum of their costs.
-        on_done: Called as each unit ends.
-
-    Returns:
-        The outcome of each.
-
     Raises:
         RunFailed: A process was ended from outside.
     """

@@ -92,9 +92,6 @@ class RunResult:
 def evaluate_run(record: RunRecord) -> RunResult | None:
     """Evaluate a run by its task.
 
-    Args:
-        record: The run.
-
     Returns:
         The result; None if the record has fewer than two states.
 

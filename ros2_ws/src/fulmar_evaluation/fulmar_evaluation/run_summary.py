@@ -29,9 +29,6 @@ Spread = dict[str, float | None]
 def summarise(record: RunRecord) -> dict[str, Any]:
     """Sum up a run.
 
-    Args:
-        record: The run.
-
     Returns:
         Figures by name, ready for JSON; None for what is not known.
 
@@ -174,9 +171,6 @@ STANDS_S = 1.0  # a belief that went sooner, and before the end, is none that a 
 
 def believed_dead(record: RunRecord) -> list[str]:
     """Valves that `controller/status` named as believed dead, for a while or at the end of the run.
-
-    Args:
-        record: The run.
 
     Returns:
         Their names, in the order in which they were first named.

@@ -30,12 +30,7 @@ _WIDTH = 170  # where nobody looks at a terminal, lines need not fit one
 
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
-    """Print both tables, what their figures are, what is not met, and the conclusion.
-
-    Args:
-        document: Of `document_of`.
-        output: Where to.
-    """
+    """Print both tables, what their figures are, what is not met, and the conclusion."""
     wide = output if output.is_terminal else Console(highlight=False, emoji=False, width=_WIDTH)
     poses, paths = pose_lines(document), path_lines(document)
     if poses:

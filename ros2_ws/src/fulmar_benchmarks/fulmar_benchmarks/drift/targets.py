@@ -46,10 +46,6 @@ TRACKING = {"circle": (0.01, 0.01), "infinite": (0.01, 0.01), "square": (0.05, 0
 def published(row: str, controller: str) -> tuple[str, dict[str, float]]:
     """What stands beside one of our controllers in a row of Table 3.5.
 
-    Args:
-        row: Name of a condition.
-        controller: Name of our controller.
-
     Returns:
         RL or LQR, and its figures by the names of `FIGURES`.
     """

@@ -87,12 +87,7 @@ def missing(entry: dict[str, Any]) -> str:
 
 
 def rows(task: str, entries: list[dict[str, Any]]) -> list[Row]:
-    """Every quantity of a task, a cell for each pair; figures are means of its first way.
-
-    Args:
-        task: Name of the task.
-        entries: Pairs of this task, from the document.
-    """
+    """Every quantity of a task, a cell for each pair; figures are means of its first way."""
     figure = "share of the bound" if task == "go_through_positions" else "success"
     ways = [way for way in WAYS if any(way in entry["ways"] for entry in entries)]
     table = [Row(f"{figure}, {WAYS[way]}", tuple(_judged(entry, way) for entry in entries)) for way in ways]
@@ -170,12 +165,7 @@ _WIDTH = 140  # where nobody looks at a terminal, lines need not fit one
 
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
-    """Print one table a task, what the figures are, and the conclusion.
-
-    Args:
-        document: Of `roboran`.
-        output: Where to.
-    """
+    """Print one table a task, what the figures are, and the conclusion."""
     width = None if output.is_terminal else _WIDTH
     wide = output if width is None else Console(highlight=False, emoji=False, width=width)
     for task in dict.fromkeys(entry["task"] for entry in document["pairs"]):

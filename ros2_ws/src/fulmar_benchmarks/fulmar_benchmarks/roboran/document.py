@@ -21,10 +21,6 @@ Z95 = 1.96
 def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, Any]:
     """The entry of one pair.
 
-    Args:
-        pair: The pair.
-        outcomes: By way: results, or why there is none.
-
     Returns:
         An entry of `pairs`; docs/evaluation.md names its keys.
     """

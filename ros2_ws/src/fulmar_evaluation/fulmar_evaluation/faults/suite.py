@@ -91,11 +91,6 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
 def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[FaultResult]:
     """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
 
-    Args:
-        robot: Whose system.
-        faults: From `faults_of`.
-        progress: Called with how many are over.
-
     Raises:
         FulmarError: The robot has no policy to run.
     """

@@ -116,9 +116,6 @@ def why_not() -> str:
 def two_hosts(*, seed: int = 0) -> Iterator[TwoHosts]:
     """Make two hosts; everything of them is gone afterwards, also on errors. Processes on them need `ACROSS`.
 
-    Args:
-        seed: Of the frames' fates.
-
     Raises:
         RunFailed: They cannot be made; with what was said.
     """

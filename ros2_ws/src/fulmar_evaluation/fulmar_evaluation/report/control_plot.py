@@ -21,12 +21,7 @@ Span = tuple[float, float]  # begin and end, in simulated time since the first s
 
 
 def open_spans(record: RunRecord, actuator: int) -> list[Span]:
-    """When one actuator was in use.
-
-    Args:
-        record: The run.
-        actuator: Column of `record.actuation.effort`.
-    """
+    """When one actuator was in use."""
     return _spans(record, record.actuation.effort[:, actuator] != 0.0)
 
 

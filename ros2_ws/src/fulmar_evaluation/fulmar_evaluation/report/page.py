@@ -121,12 +121,7 @@ def headline(text: str) -> str:
 
 
 def origin(document: dict[str, Any], file: str) -> list[str]:
-    """Section on where the figures of a benchmark come from.
-
-    Args:
-        document: Has command, version and revision.
-        file: Name of the file that has all figures.
-    """
+    """Section on where the figures of a benchmark come from."""
     command = f'<p class="faint"><code>{escape(document["command"])}</code></p>'
     revision = f", revision {document['git_revision']}" if document["git_revision"] else ""
     return [

@@ -34,9 +34,6 @@ def write_report(
         title: Heading; made from the runs by default.
         force: Replace whatever file is there; False: only a report of the same runs.
 
-    Returns:
-        The file.
-
     Raises:
         ConfigError: There is no run, the runs are of several tasks, or as `write_document` says.
         BagError: A run names no task or no goal.

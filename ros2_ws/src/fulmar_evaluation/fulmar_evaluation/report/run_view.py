@@ -47,9 +47,6 @@ class View:
 def views(records: Sequence[RunRecord]) -> list[View]:
     """Prepare runs for one report.
 
-    Args:
-        records: At least one.
-
     Raises:
         FulmarError: A record names no task or goal.
     """

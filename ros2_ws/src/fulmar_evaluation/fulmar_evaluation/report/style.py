@@ -67,11 +67,7 @@ def house_style() -> Iterator[None]:
 
 
 def colours(controllers: Sequence[str]) -> list[str]:
-    """One colour for each run; two runs of one controller differ.
-
-    Args:
-        controllers: Name of the controller of each run.
-    """
+    """One colour for each run; two runs of one controller differ."""
     spare = iter(OTHER_COLOURS * (1 + len(controllers) // len(OTHER_COLOURS)))
     taken: list[str] = []
     for name in controllers:

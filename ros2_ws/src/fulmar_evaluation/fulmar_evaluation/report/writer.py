@@ -57,9 +57,6 @@ def write_benchmark(out: Path, title: str, parts: Sequence[Part], *, style: str 
         title: Of the page.
         parts: Of the page, drawn inside `house_style`; each plot has a name.
         style: Rules beside those of every benchmark.
-
-    Returns:
-        The page.
     """
     folder = out / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
@@ -104,10 +101,6 @@ def source_mark(bags: Iterable[Path]) -> str:
 
 def check_overwrite(out: Path, mark: str) -> None:
     """Refuse to replace a file that was not made from the same runs.
-
-    Args:
-        out: File to be written.
-        mark: Of the runs that it is to show.
 
     Raises:
         ConfigError: There is such a file, of something else.

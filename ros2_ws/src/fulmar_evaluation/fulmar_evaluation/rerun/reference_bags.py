@@ -77,9 +77,6 @@ def record_reference(reference: Reference, folder: Path) -> Path:
         reference: What to run.
         folder: Where the reference bags are; an older one of the same name is replaced.
 
-    Returns:
-        The bag.
-
     Raises:
         RunFailed: The run did not come to its end.
         BagError: The bag cannot be written.
@@ -156,9 +153,6 @@ def _stamps(topic: Topic) -> list[int]:
 
 def check_reference(path: Path) -> list[Field]:
     """Run a reference bag again, from its odometry on: gates, observations, actions, commands.
-
-    Args:
-        path: The bag.
 
     Returns:
         Every field, with where it differs.

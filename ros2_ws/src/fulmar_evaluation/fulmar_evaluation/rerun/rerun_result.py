@@ -23,11 +23,6 @@ NUMBER = re.compile(r"-?[0-9]+([.][0-9]+)?")
 def compare_answers(course: Course, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
     """Compare every field that the bag has.
 
-    Args:
-        course: What was recorded.
-        answers: What a controller says now.
-        tolerances: By field, see `FIELDS`.
-
     Returns:
         `decision` (1: the controller was asked), `observation`, `action` (before limits) and `command` (after them), as
         far as they were recorded.

@@ -24,12 +24,7 @@ EPISODE = 0  # of a path that is drawn
 
 
 def draw_starts(by_row: dict[str, list[View]], rows: Sequence[str]) -> Figure:
-    """Two starts, each in some conditions.
-
-    Args:
-        by_row: Every controller of every condition.
-        rows: Which conditions to draw.
-    """
+    """Two starts, each in some conditions."""
     columns = [(row, start) for row in rows for start in STARTS if start < len(by_row[row][0].outcome.paths)]
     figure = Figure(figsize=(WIDTH * min(1.0, (len(columns) + 0.5) / 4.5), 6.6), layout="constrained")
     axes = figure.subplots(3, len(columns), squeeze=False, height_ratios=(1.5, 1.0, 1.0))

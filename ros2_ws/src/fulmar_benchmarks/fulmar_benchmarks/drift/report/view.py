@@ -31,12 +31,7 @@ class View:
 
 
 def views(result: CampaignResult, kind: str) -> dict[str, list[View]]:
-    """By row, every controller that has a result in it.
-
-    Args:
-        result: Of the benchmark.
-        kind: pose or path.
-    """
+    """By row, every controller that has a result in it."""
     document: dict[str, Any] = result.document
     colour = dict(zip(document["controllers"], colours(document["controllers"]), strict=True))
     found = {
