@@ -12,7 +12,7 @@ from fulmar_core.robot import load_robot
 pytest.importorskip("mujoco")
 
 from tests.benchmarks.identification.campaign import Trial, document_of, run_identification, run_trial
-from tests.benchmarks.identification.machines import draw_machine
+from tests.benchmarks.identification.driving import draw_machine
 
 REQUIRED = ("mass", "yaw_inertia", "thrust")
 

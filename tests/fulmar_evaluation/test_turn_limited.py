@@ -26,12 +26,10 @@ from fulmar_evaluation.bounds import (
     top_speed_bound,
     turn_limited_bound,
 )
-from fulmar_evaluation.bounds.coarse_plan import coarse_plans
-from fulmar_evaluation.bounds.fine_plan import refined
 from fulmar_evaluation.bounds.leg_table import leg_table
 from fulmar_evaluation.bounds.legs import best_words
 from fulmar_evaluation.bounds.surge import Surge, time_lost
-from fulmar_evaluation.bounds.turn_tour import TurnTour
+from fulmar_evaluation.bounds.turn_plans import TurnTour, coarse_plans, refined
 
 RADIUS = 0.2
 CAR = Motions(1.0, 0.5, ((1.0, 0.8), (-0.5, 0.8), (0.0, 0.8)))

@@ -18,8 +18,7 @@ from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.identification.identify import Weight, identify
 from fulmar_core.robot import load_robot
 from fulmar_evaluation.driven_run import driven_run
-from tests.benchmarks.identification.driving import drive, speeds_of_wheels
-from tests.benchmarks.identification.machines import draw_machine
+from tests.benchmarks.identification.driving import draw_machine, drive, speeds_of_wheels
 
 # Long enough that the intervals are a third of what is asked for, and short enough for one tank of air.
 DURATION_S = {"thrusters": 120.0, "propellers": 240.0, "differential_drive": 120.0}

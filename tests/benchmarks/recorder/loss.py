@@ -27,8 +27,7 @@ from fulmar_core.topics import (
     TRUTH,
 )
 from fulmar_evaluation.run_outcome import run_and_evaluate
-from tests.benchmarks.recorder.recorders import opens, recorders, stamps_by_topic
-from tests.benchmarks.recorder.traffic import EVERY, Traffic, traffic
+from tests.benchmarks.recorder.recorders import EVERY, Traffic, opens, recorders, stamps_by_topic, traffic
 
 LAST_S = 0.5  # for the last messages to arrive
 

@@ -12,12 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_evaluation.bounds.coarse_plan import coarse_plans
-from fulmar_evaluation.bounds.fine_plan import refined
 from fulmar_evaluation.bounds.leg_table import LegTable, leg_table, table_scale
 from fulmar_evaluation.bounds.motions import Motions
 from fulmar_evaluation.bounds.top_speed import top_speed_bound
-from fulmar_evaluation.bounds.turn_tour import TurnTour
+from fulmar_evaluation.bounds.turn_plans import TurnTour, coarse_plans, refined
 from fulmar_evaluation.bounds.visits import Bound, Route, route_of
 
 _BATCH = 256  # episodes at once

@@ -21,10 +21,8 @@ from fulmar_benchmarks.drift.cells import (
     spoken,
     unmet,
 )
-from fulmar_benchmarks.drift.report.glance_plot import draw_glance
 from fulmar_benchmarks.drift.report.path_plots import draw_paths, draw_starts
-from fulmar_benchmarks.drift.report.time_plots import draw_row, draw_rows
-from fulmar_benchmarks.drift.report.view import views
+from fulmar_benchmarks.drift.report.time_plots import draw_glance, draw_row, draw_rows, views
 from fulmar_benchmarks.drift.tables import conclusion, notes
 from fulmar_benchmarks.drift.targets import BANDS
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table
