@@ -43,25 +43,20 @@ class Case(Protocol):
     @property
     def name(self) -> str:
         """Of the files in which its episodes are kept."""
-        ...
 
     @property
     def robot(self) -> str:
         """Which robot."""
-        ...
 
     @property
     def task(self) -> str:
         """What it is to do."""
-        ...
 
     def prepared(self, seed: int) -> contextlib.AbstractContextManager[Command]:
         """What an episode needs around it."""
-        ...
 
     def about(self) -> dict[str, Any]:
         """What is reported about it beside its figures."""
-        ...
 
 
 @dataclass(frozen=True)

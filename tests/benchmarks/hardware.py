@@ -17,7 +17,7 @@ from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
 from hardware_drivers.settings import MavlinkBoat, load_hardware
-from tests.benchmarks.closed_loops import Command
+from tests.benchmarks.closed_loops import Campaign, Command, measure
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,6 @@ def hardware(
     """
     from fulmar_bringup.system import modules_of
     from fulmar_cli.extras import require
-    from tests.benchmarks.closed_loops import Campaign, measure
 
     cases = cases_of([name.strip() for name in only.split(",")] if only else None)
     for case in cases:

@@ -51,10 +51,10 @@ class Machine:
     legs: tuple[Leg, ...]
     truth: dict[str, float]  # by name of the estimate
     delay_s: float
-    opening_delay_s: float
     gain: tuple[float, ...]  # of each actuator
-    slope: float  # of the floor [rad]
-    slope_direction: float  # [rad]
+    opening_delay_s: float = 0.0
+    slope: float = 0.0  # of the floor [rad]
+    slope_direction: float = 0.0  # [rad]
 
     def push(self, leg: Leg) -> tuple[float, float]:
         """Force of the sloping floor along the world's axes [N]."""
@@ -146,10 +146,7 @@ def _boat(nominal: Robot, rng: np.random.Generator, delay: float) -> Machine:
         legs=(Leg("driven", mass, inertia, (0.0, 0.0)),),
         truth=truth,
         delay_s=delay,
-        opening_delay_s=0.0,
         gain=(1.0,) * len(nominal.actuators.names),
-        slope=0.0,
-        slope_direction=0.0,
     )
 
 
@@ -161,10 +158,7 @@ def _wheels(nominal: Robot, rng: np.random.Generator, delay: float) -> Machine:
         legs=(Leg("driven", nominal.body.mass, nominal.body.inertia[2], (0.0, 0.0)),),
         truth={"wheel_scale": scale, "turn_scale": scale / base, "delay": delay},
         delay_s=delay,
-        opening_delay_s=0.0,
         gain=(scale, scale / base),
-        slope=0.0,
-        slope_direction=0.0,
     )
 
 

@@ -76,9 +76,8 @@ class FaultEnvironment:
     """What is unusual about a system; the usual one has an e-stop, and its odometry may be intercepted."""
 
     guards: Mapping[str, Any] = field(default_factory=dict)  # beside the e-stop
-    intercepted: Wire | None = (
-        ODOMETRY  # the wire that passes through the injector; None: the robot's commands
-    )
+    # The wire that passes through the injector; None: the robot's commands.
+    intercepted: Wire | None = ODOMETRY
     answers_pass: bool = False  # the robot's commands, too, pass through a injector, of their own
     by_goal_node: bool = False  # a goal node publishes goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
