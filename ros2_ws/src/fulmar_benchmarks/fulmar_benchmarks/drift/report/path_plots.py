@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.drift.conditions import ROBOT, RUN_UP_S
-from fulmar_benchmarks.drift.report.time_plots import LIMITS, View, controllers_key
+from fulmar_benchmarks.drift.report.plots import LIMITS, View, controllers_key
 from fulmar_core.goal_files import FollowedPath, load_goals
 from fulmar_core.planar import wrapped
 from fulmar_core.robot import load_robot

@@ -22,7 +22,7 @@ from fulmar_benchmarks.drift.cells import (
     unmet,
 )
 from fulmar_benchmarks.drift.report.path_plots import draw_paths, draw_starts
-from fulmar_benchmarks.drift.report.time_plots import draw_glance, draw_row, draw_rows, views
+from fulmar_benchmarks.drift.report.plots import draw_glance, draw_row, draw_rows, views
 from fulmar_benchmarks.drift.tables import conclusion, notes
 from fulmar_benchmarks.drift.targets import BANDS
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table

@@ -1,4 +1,4 @@
-"""All conditions at a glance, and all trajectories over time (thesis Figure 3.5)."""
+"""Controllers prepared for drawing; all conditions at a glance, all trajectories over time (thesis Figure 3.5)."""
 
 from __future__ import annotations
 
