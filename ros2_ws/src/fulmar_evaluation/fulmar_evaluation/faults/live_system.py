@@ -33,7 +33,7 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment, FaultInjector, source_of
-from fulmar_evaluation.faults.observer import Observer, wait_for
+from fulmar_evaluation.faults.observer import RunObserver, wait_for
 from fulmar_evaluation.faults.two_hosts import TwoHosts
 from fulmar_ros.runtime import spinning
 
@@ -61,7 +61,7 @@ class LiveSystem:
         self.bystander, self._request, self._overseer, self._hosts = bystander, request, overseer, hosts
         robot = load_robot(self.plan.robot)
         self.robot = robot
-        self.observer = Observer(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
+        self.observer = RunObserver(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
         self.injector = FaultInjector(bystander, about.intercepted or command_wire(robot))
         self._answers = FaultInjector(bystander, command_wire(robot)) if about.answers_pass else None
         self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz

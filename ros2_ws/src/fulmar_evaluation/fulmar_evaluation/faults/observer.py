@@ -43,7 +43,7 @@ class Statement:
         return None if self.level == "ok" else (self.who, NUMBER.sub("#", self.text))
 
 
-class Observer:
+class RunObserver:
     """Listens, from a node that spins in a thread of its own."""
 
     def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
@@ -131,7 +131,7 @@ class BagEvidence:
     words: str = ""  # what is wrong; empty if nothing is
 
 
-def bag_evidence(record: Path, observer: Observer, away: tuple[float, float] | None) -> BagEvidence:
+def bag_evidence(record: Path, observer: RunObserver, away: tuple[float, float] | None) -> BagEvidence:
     """Compare a bag with what an observer received.
 
     Args:
