@@ -43,25 +43,20 @@ class Case(Protocol):
     @property
     def name(self) -> str:
         """Of the files in which its episodes are kept."""
-        ...
 
     @property
     def robot(self) -> str:
         """Which robot."""
-        ...
 
     @property
     def task(self) -> str:
         """What it is to do."""
-        ...
 
     def prepared(self, seed: int) -> contextlib.AbstractContextManager[Command]:
         """What an episode needs around it."""
-        ...
 
     def about(self) -> dict[str, Any]:
-        """What is told about it beside its figures."""
-        ...
+        """What is reported about it beside its figures."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +93,7 @@ def measure(
     Args:
         cases: What to run.
         campaign: How.
-        progress: Told how many episodes are over.
+        progress: Called with how many episodes are over.
 
     Returns:
         Figures of each case, ready for JSON.

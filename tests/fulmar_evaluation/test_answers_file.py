@@ -23,7 +23,7 @@ from fulmar_core.topics import ACTION, METADATA, ODOMETRY
 from tests.foreign_bag import write_foreign
 
 POLICY = Path(__file__).resolve().parents[1] / "replay" / "bags" / "floating_platform_go_to_pose_policy"
-ASKED = ("--controller", "policy", "--robot", "turtlebot2", "--task", "go_to_position", "--goal", "0,0,0")
+REQUIRED = ("--controller", "policy", "--robot", "turtlebot2", "--task", "go_to_position", "--goal", "0,0,0")
 
 
 def ask(*words: object):
@@ -56,12 +56,12 @@ def copied(folder: Path, *, info: dict | None = None, said: tuple[str, ...] = ()
 
 def test_answers_to_a_bag_of_others_are_written_and_exit_code_1_says_that_nothing_was_compared(tmp_path):
     bag = write_foreign(tmp_path / "bag", StoragePlugin.MCAP)
-    done = ask("rerun", bag, *ASKED, "--out", tmp_path / "answers.csv")
+    done = ask("rerun", bag, *REQUIRED, "--out", tmp_path / "answers.csv")
     assert done.exit_code == 1
     assert "nothing was recorded that its answers could be compared with" in done.output
     with (tmp_path / "answers.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    assert ask("rerun", bag, *ASKED, "--out", tmp_path / "answers.npz").exit_code == 1
+    assert ask("rerun", bag, *REQUIRED, "--out", tmp_path / "answers.npz").exit_code == 1
     arrays = np.load(tmp_path / "answers.npz", allow_pickle=False)
     assert len(rows) == len(arrays["command"]) > 30
     assert [float(row["command.speed"]) for row in rows] == arrays["command"][:, 0].tolist()

@@ -39,7 +39,7 @@ def test_the_length_of_an_episode_is_seconds_or_control_steps():
     ("asked", "episodes"),
     [("lqr --through batch", 4096), ("lqr --through mujoco", 256), ("lqr --through batch --episodes 3", 3)],
 )
-def test_the_batch_is_judged_by_more_episodes_where_nobody_says_how_many(asked, episodes, monkeypatch):
+def test_the_batch_is_evaluated_by_more_episodes_where_nobody_says_how_many(asked, episodes, monkeypatch):
     class AskedError(Exception):
         pass
 
@@ -52,7 +52,7 @@ def test_the_batch_is_judged_by_more_episodes_where_nobody_says_how_many(asked, 
 
 
 @pytest.mark.slow
-def test_waypoints_are_told_with_what_physics_allows(monkeypatch):
+def test_waypoints_are_reported_with_what_physics_allows(monkeypatch):
     monkeypatch.setattr("fulmar_evaluation.evaluation.BOUNDED_EPISODES", 2)
     words = "evaluate turtlebot2 go_through_positions --controller classical --through batch --episodes 3"
     found = evaluate(f"{words} --episode-s 20")

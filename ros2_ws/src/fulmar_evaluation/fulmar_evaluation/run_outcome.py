@@ -35,9 +35,6 @@ class RunOutcome:
 def run_and_evaluate(request: RunRequest) -> RunOutcome:
     """Run once and evaluate the bag.
 
-    Args:
-        request: What to run.
-
     Returns:
         The outcome; a failed run has one too, with whatever was recorded.
 

@@ -33,7 +33,7 @@ def plot(
     without: its path, its speed, its actuators, and how late its messages came.
     """
     require("matplotlib")
-    from fulmar_evaluation.report.bag_plots import write_pictures
+    from fulmar_evaluation.report.bag_report import write_bag_report
     from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries
 
     opened = open_and_warn(bag)
@@ -47,7 +47,7 @@ def plot(
             record = read_run(bag)
             written = [write_report([record], file) for file in files]
         else:
-            written = [write_pictures(opened, file, odometry) for file in files]
+            written = [write_bag_report(opened, file, odometry) for file in files]
     if as_json:
         print_json({"bag": str(bag), "files": [str(file) for file in written]})
     else:
@@ -60,9 +60,9 @@ def _has_a_task(bag: Path) -> bool:
     """Whether this is a run that can be judged."""
     from fulmar_bags.run_record import read_run
     from fulmar_core.errors import FulmarError
-    from fulmar_evaluation.run_evaluation import judge
+    from fulmar_evaluation.run_evaluation import evaluate_run
 
     try:
-        return judge(read_run(bag)) is not None
+        return evaluate_run(read_run(bag)) is not None
     except FulmarError:
         return False

@@ -84,12 +84,17 @@ def rerun(
     from fulmar_bags.contents import open_bag
     from fulmar_bags.control_steps import control_steps_of
     from fulmar_bags.figures import controllers_of
-    from fulmar_evaluation.rerun.answers_file import check_answers_file, write_answers
-    from fulmar_evaluation.rerun.calibration import calibrated_as
-    from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries
+    from fulmar_evaluation.rerun.embedded_configs import calibrated_as, knowing_what_it_carries
     from fulmar_evaluation.rerun.replay_controllers import answers_of
     from fulmar_evaluation.rerun.rerun import FROM
-    from fulmar_evaluation.rerun.rerun_result import FIELDS, judge_answers, pauses, sums
+    from fulmar_evaluation.rerun.rerun_result import (
+        FIELDS,
+        check_answers_file,
+        compare_answers,
+        pauses,
+        sums,
+        write_answers,
+    )
 
     began = time.monotonic()
     for what, given, known in (("--from", source, FROM), ("--through", through, WAYS)):
@@ -127,7 +132,7 @@ def rerun(
             answers, sha256 = answers_of(
                 course, name, folder, "odometry" if foreign else source, follow=follow
             )
-    fields = judge_answers(course, answers, tolerances)
+    fields = compare_answers(course, answers, tolerances)
     first = first_difference(fields)
     recorded = [each.get("sha256") for each in controllers_of(opened)]
     if out is not None:

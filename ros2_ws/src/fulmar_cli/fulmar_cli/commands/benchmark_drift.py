@@ -77,7 +77,7 @@ def drift(
     from fulmar_benchmarks.drift.conditions import ROWS
     from fulmar_benchmarks.drift.tables import print_tables
     from fulmar_benchmarks.drift.unit import DriftUnit
-    from fulmar_benchmarks.outcomes import Judged
+    from fulmar_benchmarks.results import PairResult
     from fulmar_benchmarks.unit import Unit
     from fulmar_cli.commands.benchmark_roboran import chosen
     from fulmar_cli.extras import require
@@ -109,7 +109,7 @@ def drift(
         command="fulmar " + " ".join(sys.argv[1:]),
     )
 
-    def tell(unit: Unit, outcome: Judged | str, before: bool) -> None:
+    def tell(unit: Unit, outcome: PairResult | str, before: bool) -> None:
         assert isinstance(unit, DriftUnit)
         name = f"{unit.row}, {unit.controller}"
         if isinstance(outcome, str):
@@ -133,9 +133,9 @@ def drift(
 
 
 def _main_figure(outcome: object) -> str:
-    from fulmar_benchmarks.outcomes import Judged
+    from fulmar_benchmarks.results import PairResult
 
-    assert isinstance(outcome, Judged)
+    assert isinstance(outcome, PairResult)
     figures = outcome.figures
     if "PT5_percent" in figures:
         return f"PT5 {figures['PT5_percent'].mean():.1f} %, OT5 {figures['OT5_percent'].mean():.1f} %"
@@ -145,9 +145,9 @@ def _main_figure(outcome: object) -> str:
 def _write(findings: object, out: Path, report: bool) -> Path:
     import json
 
-    from fulmar_benchmarks.drift.campaign import Findings
+    from fulmar_benchmarks.drift.campaign import CampaignResult
 
-    assert isinstance(findings, Findings)
+    assert isinstance(findings, CampaignResult)
     out.mkdir(parents=True, exist_ok=True)
     path = out / "drift.json"
     path.write_text(json.dumps(findings.document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

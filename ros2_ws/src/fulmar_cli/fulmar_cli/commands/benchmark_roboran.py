@@ -76,11 +76,11 @@ def roboran(
     fulmar benchmark roboran --robots turtlebot2 --tasks go_to_pose --controllers policy,classical
     """
     from fulmar_benchmarks.cells import spoken
-    from fulmar_benchmarks.outcomes import Judged
     from fulmar_benchmarks.pairs import KINDS
+    from fulmar_benchmarks.results import PairResult
     from fulmar_benchmarks.roboran.campaign import EPISODES, Request, run_benchmark
-    from fulmar_benchmarks.roboran.published import ROBOTS, TASKS
-    from fulmar_benchmarks.roboran.tables import print_tables
+    from fulmar_benchmarks.roboran.cells import print_tables
+    from fulmar_benchmarks.roboran.targets import ROBOTS, TASKS
     from fulmar_benchmarks.unit import Unit
     from fulmar_cli.extras import require
     from fulmar_core.disturbances.scenario import load_scenario
@@ -110,7 +110,7 @@ def roboran(
         command="fulmar " + " ".join(sys.argv[1:]),
     )
 
-    def tell(unit: Unit, outcome: Judged | str, before: bool) -> None:
+    def tell(unit: Unit, outcome: PairResult | str, before: bool) -> None:
         plan = unit.trial.plan
         name = f"{spoken(plan.robot)}, {spoken(plan.task).lower()}, {plan.controller}, {unit.trial.through}"
         if isinstance(outcome, str):
@@ -150,9 +150,9 @@ def chosen(text: str, family: str, known: tuple[str, ...]) -> tuple[str, ...]:
 def _write(findings: object, out: Path, report: bool) -> Path:
     import json
 
-    from fulmar_benchmarks.roboran.campaign import Findings
+    from fulmar_benchmarks.roboran.campaign import CampaignResult
 
-    assert isinstance(findings, Findings)
+    assert isinstance(findings, CampaignResult)
     out.mkdir(parents=True, exist_ok=True)
     path = out / "roboran.json"
     path.write_text(json.dumps(findings.document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -14,7 +14,7 @@ from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.exit_codes import FAILED
 
 if TYPE_CHECKING:
-    from fulmar_evaluation.faults.fault_result import Finding
+    from fulmar_evaluation.faults.fault import FaultResult
     from fulmar_evaluation.faults.suite import Skipped
 
 
@@ -64,7 +64,7 @@ def names_in(only: str | None) -> list[str] | None:
     return None if only is None else [name.strip() for name in only.split(",") if name.strip()]
 
 
-def _print(robot: str, findings: list[Finding], skipped: list[Skipped]) -> None:
+def _print(robot: str, findings: list[FaultResult], skipped: list[Skipped]) -> None:
     table = Table(title=f"faults of a live {robot}")
     for column in ("fault", "detected by", "reaction"):
         table.add_column(column)
@@ -79,14 +79,14 @@ def _print(robot: str, findings: list[Finding], skipped: list[Skipped]) -> None:
             "" if finding.limit_s is None else f"{finding.limit_s:.3f} s",
             "" if finding.data_lost is None else str(finding.data_lost),
             {True: "intact", False: "damaged", None: ""}[finding.bag_intact],
-            finding.verdict,
+            finding.status,
         )
     output.print(table)
     for fault in skipped:
         console.print(f"skipped: {fault.name}: {fault.reason}", markup=False)
 
 
-def _time_to_safe(finding: Finding) -> str:
+def _time_to_safe(finding: FaultResult) -> str:
     if finding.time_to_safe_s is not None:
         return f"{finding.time_to_safe_s:.3f} s"
     if finding.bag_intact is None:

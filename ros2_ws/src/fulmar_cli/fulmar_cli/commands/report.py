@@ -40,8 +40,8 @@ def report(
     from fulmar_bags.run_record import read_any_run
     from fulmar_core.tasks import load_task
     from fulmar_evaluation.report import write_report
-    from fulmar_evaluation.report.bag_plots import write_pictures
-    from fulmar_evaluation.report.sources import default_report
+    from fulmar_evaluation.report.bag_report import write_bag_report
+    from fulmar_evaluation.report.writer import default_report
     from fulmar_evaluation.rerun.embedded_configs import knowing_what_they_carry
 
     if task is not None:
@@ -58,5 +58,5 @@ def report(
             if len(bags) > 1:
                 raise
             console.print(f"warning: no result: {missing}", markup=False, soft_wrap=True)
-            write_pictures(open_bag(bags[0]), path, note=f"No result: {missing}", force=force)
+            write_bag_report(open_bag(bags[0]), path, note=f"No result: {missing}", force=force)
     output.print(str(path), markup=False, soft_wrap=True)
