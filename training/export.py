@@ -23,9 +23,9 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from training.golden_limits import with_limits
-from training.interrupt import polite_interrupt
 from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record
+from training.session import polite_interrupt
 
 GOLDEN_VECTORS = 64
 GOLDEN_STEPS = 5  # commands between the two moments that golden vectors are taken at

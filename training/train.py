@@ -21,9 +21,8 @@ from fulmar_core.geofence import check_starts
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint
-from training.checks import held_out_judge
+from training.evaluator import held_out_judge
 from training.fallback_policy import Specialist
-from training.interrupt import polite_interrupt
 from training.learners import build_learner, callbacks_of
 from training.network import save_network
 from training.progress import LearningBar, Watcher
@@ -36,7 +35,7 @@ from training.run_folder import (
     write_run_record,
     write_start,
 )
-from training.session import Limits, RunIsOver, Session, Story
+from training.session import Limits, RunIsOver, Session, Story, polite_interrupt
 from training.settings import OffPolicy, TrainingSettings, write_training_settings
 from training.vec_env import BatchVecEnv
 

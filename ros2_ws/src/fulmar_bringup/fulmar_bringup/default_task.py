@@ -8,8 +8,7 @@ from fulmar_bringup.system import default_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from policy_server.controllers import CONTROLLERS
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"
 OPTIONS = {POSE: "--goal x,y,deg", POSITION: "--goal x,y"}

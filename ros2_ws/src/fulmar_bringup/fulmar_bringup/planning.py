@@ -44,8 +44,7 @@ from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import UNARMED, MavlinkBoat, load_hardware
-from policy_server.controllers import FALLBACKS, controller_entry
-from policy_server.shipped import shipped_policies, shipped_policy
+from policy_server.controllers import FALLBACKS, controller_entry, shipped_policies, shipped_policy
 
 PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
 

@@ -181,8 +181,7 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
     """Name of the controller and folder of its bundle, empty where it has none."""
     from fulmar_bags.control_steps import policy_folder
     from fulmar_core.own_class import is_own
-    from policy_server.controllers import controller_entry
-    from policy_server.shipped import shipped_policy
+    from policy_server.controllers import controller_entry, shipped_policy
 
     name = controller or ("policy" if policy else (bag.info or {}).get("controller"))
     if not isinstance(name, str):

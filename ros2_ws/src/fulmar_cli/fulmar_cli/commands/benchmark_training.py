@@ -31,12 +31,12 @@ def training(
     """
     from training.benchmark import benchmark_jobs, compare
     from training.executors import LocalExecutor
-    from training.job_bars import JobBars
+    from training.progress import JobBars
 
     out = out or Path("runs") / "benchmark" / f"{time.strftime('%Y%m%d_%H%M%S')}_training"
     numbers = range(1, seeds + 1)
     jobs = benchmark_jobs(robot, task, seeds=numbers, seconds=seconds, check_every_s=check_every, out=out)
-    with JobBars(jobs) as bars:
+    with JobBars([job.name for job in jobs]) as bars:
         told = compare(jobs, LocalExecutor(at_once), bars)
     if as_json:
         print_json(told)

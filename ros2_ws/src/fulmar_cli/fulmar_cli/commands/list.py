@@ -75,8 +75,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from hardware_drivers.settings import load_hardware
-    from policy_server.controllers import CONTROLLERS
-    from policy_server.shipped import policies_directory, shipped_policies
+    from policy_server.controllers import CONTROLLERS, policies_directory, shipped_policies
 
     if family == "policies":
         folder = policies_directory()

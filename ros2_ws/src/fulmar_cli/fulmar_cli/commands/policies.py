@@ -44,10 +44,10 @@ def policies(
     fulmar policies kingfisher_go_to_pose --anew
     """
     from fulmar_core.provenance import git_revision
-    from policy_server.shipped import policies_directory
+    from policy_server.controllers import policies_directory
     from training.executors import LocalExecutor
-    from training.job_bars import JobBars
     from training.policies import expected_s, is_made, load_policy_table, make_policies, policy_job, set_aside
+    from training.progress import JobBars
 
     table = load_policy_table()
     known = [policy.name for policy in table.policies]
@@ -72,7 +72,7 @@ def policies(
         if aside := set_aside(job):
             console.print(f"{job.name}: the old one is in {aside}", markup=False, soft_wrap=True)
     console.print(f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the judging")
-    with JobBars(missing) as bars:
+    with JobBars([job.name for job in missing]) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
     if as_json:
         print_json({"policies": lines})

@@ -215,8 +215,7 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     from training.evaluator import judge_in_mujoco
     from training.jobs import learn
     from training.progress import LearningBar
-    from training.run_folder import START_FILE
-    from training.run_lock import learning_in
+    from training.run_folder import START_FILE, learning_in
 
     with learning_in(job.out):
         if not resumes and (job.out / START_FILE).exists():  # since we looked
@@ -271,13 +270,13 @@ def _executor(name: str, address: str | None) -> Executor:
 
 def _campaign(job: Job, seeds: int, executor: Executor, *, as_json: bool) -> None:
     from training.campaign import run_campaign
-    from training.job_bars import JobBars
+    from training.progress import JobBars
 
     jobs = [
         replace(job, name=f"seed {seed}", seed=seed, out=job.out / f"seed_{seed}")
         for seed in range(job.seed, job.seed + seeds)
     ]
-    with JobBars(jobs) as bars:
+    with JobBars([job.name for job in jobs]) as bars:
         told = run_campaign(jobs, executor, job.out, bars)
     if as_json:
         print_json(told)

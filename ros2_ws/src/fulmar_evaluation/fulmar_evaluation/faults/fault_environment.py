@@ -12,7 +12,7 @@ import yaml
 
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_core.topics import ODOMETRY, Wire
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import shipped_policy
 
 FAR_M = 6.0  # the robot is under way for seconds
 CORNERS_M = ((FAR_M, 0.0), (FAR_M, 1.0))  # where a node of goals sends it
