@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fulmar_bringup.goal_plan import task_of_goals
 from fulmar_bringup.system import default_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
@@ -12,6 +13,32 @@ from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"
 OPTIONS = {POSE: "--goal x,y,deg", POSITION: "--goal x,y"}
+
+
+def task_of_run(
+    task: str | None,
+    robot: str,
+    controller: str,
+    backend: str,
+    *,
+    goal: tuple[float, ...] | None,
+    goals: str | None,
+    policy: Path | None,
+) -> tuple[str, str]:
+    """Name of the task of a run, and a note where a part of its goal has no effect; arguments as of `default_task`.
+
+    Args:
+        task: Name of the task, if one was given.
+        goals: Name or path of a goal file, which decides the task if it was given.
+
+    Raises:
+        ConfigError: As of `default_task` and `check_heading`.
+    """
+    if task is not None:
+        return task, "" if goal is None else check_heading(task, goal)
+    if goals:
+        return task_of_goals(goals), ""
+    return default_task(robot, controller, backend, goal=goal, policy=policy), ""
 
 
 def default_task(

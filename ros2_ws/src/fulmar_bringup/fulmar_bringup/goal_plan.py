@@ -23,7 +23,7 @@ SHOWN = 400  # points of a path that a record carries along
 SPARE_S = 5.0  # after everything is done, to see that it stays so
 
 
-def default_task(goals: str) -> str:
+def task_of_goals(goals: str) -> str:
     """Name of the task whose controller takes the goals of a file.
 
     Raises:
@@ -55,7 +55,7 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
     if not fits or task.sees_obstacles or task.things:  # whose surroundings the seed draws
         raise ConfigError(
             f"the goals '{goals}' are no goals of task '{task.name}'. "
-            f"Leave --task out: they are for '{default_task(goals)}'."
+            f"Leave --task out: they are for '{task_of_goals(goals)}'."
         )
     check_pace(file, goals, robot)
     return file
