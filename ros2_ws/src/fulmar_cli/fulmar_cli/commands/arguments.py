@@ -56,23 +56,35 @@ CONTROLLER_HELP = (
     "With `fulmar run` also external: a node that you start."
 )
 ControllerOption = Annotated[str, option("C", CONTROLLER_HELP, "--controller")]
-PolicyOption = Annotated[Path | None, option("DIR", "A policy bundle; the shipped one by default.", "--policy")]
+PolicyOption = Annotated[
+    Path | None, option("DIR", "A policy bundle; the shipped one by default.", "--policy")
+]
 SeedOption = Annotated[int, option("N", "Seed of everything random.", "--seed", min=0, max=2**63 - 1)]
 ScenarioOption = Annotated[str, option("NAME", "Disturbances: a name from configs/scenarios.", "--scenario")]
 CalibrationOption = Annotated[
-    Path | None, option("FILE", "A result of `fulmar identify`, used in place of the robot's YAML.", "--calibration")
+    Path | None,
+    option("FILE", "A result of `fulmar identify`, used in place of the robot's YAML.", "--calibration"),
 ]
-HARDWARE_HELP = "With --backend hardware: a name from configs/hardware, or a .yaml file; the robot's own by default."
+HARDWARE_HELP = (
+    "With --backend hardware: a name from configs/hardware, or a .yaml file; the robot's own by default."
+)
 HardwareOption = Annotated[str | None, option("NAME", HARDWARE_HELP, "--hardware")]
-EmulateOption = Annotated[bool, flag("--emulate", "With --backend hardware: an emulator replaces the device.")]
+EmulateOption = Annotated[
+    bool, flag("--emulate", "With --backend hardware: an emulator replaces the device.")
+]
 ArmOption = Annotated[
-    bool, flag("--arm", "Let the driver set MANUAL, arm the boat's autopilot and override RC, as `arm: true` does.")
+    bool,
+    flag(
+        "--arm", "Let the driver set MANUAL, arm the boat's autopilot and override RC, as `arm: true` does."
+    ),
 ]
 RateOption = Annotated[
     float, option("F", "Simulated seconds per second of wall-clock time.", "--rate", min=0.01, max=50.0)
 ]
 ControlHzOption = Annotated[float | None, option("HZ", "Command rate; the robot's own by default.", min=0.01)]
-RecordOption = Annotated[Path | None, option("DIR", "Folder of the bag; runs/<time>... by default.", "--record")]
+RecordOption = Annotated[
+    Path | None, option("DIR", "Folder of the bag; runs/<time>... by default.", "--record")
+]
 JobsOption = Annotated[int | None, option("N", "Parallel processes; one for each core by default.", min=1)]
 BagArgument = Annotated[Path, argument("BAG", "A bag folder, or the .mcap or .db3 file in it.")]
 OdometryOption = Annotated[str | None, option("TOPIC", "The odometry to use, where a bag has several.")]
@@ -88,7 +100,9 @@ def invoked_command() -> str:
 
 def dated_folder(parent: str, *names: str) -> Path:
     """A new folder, named by the time and by what is in it; of a class of one's own the module is left out."""
-    return Path(parent, "_".join((time.strftime("%Y%m%d_%H%M%S"), *(name.rpartition(":")[2] for name in names))))
+    return Path(
+        parent, "_".join((time.strftime("%Y%m%d_%H%M%S"), *(name.rpartition(":")[2] for name in names)))
+    )
 
 
 def read_names(text: str, family: str, known: Sequence[str]) -> tuple[str, ...]:

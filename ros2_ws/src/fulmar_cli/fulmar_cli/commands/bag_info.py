@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import print_result, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption
 from fulmar_core.exit_codes import DONE, FAILED
 
@@ -41,33 +41,30 @@ def info(bag: BagArgument, as_json: JsonOption = False) -> None:
     from fulmar_bags.figures import describe
 
     found = describe(open_bag(bag))
-    if as_json:
-        print_json(found)
-    else:
-        _show(found)
+    print_result(found, _show, as_json=as_json)
     raise typer.Exit(FAILED if found["damage"] else DONE)
 
 
 def _show(found: dict[str, Any]) -> None:
     when = _when(found["start_ns"])
-    _say(
+    write_line(
         f"{found['bag']}: {found['storage']}, {found['size_bytes'] / 1e3:.0f} kB, {found['messages']} messages, "
         f"{found['duration_s']:.2f} s" + (f" from {when}" if found["messages"] else "")
     )
     for row in _aligned([HEAD, *map(_row, found["topics"])]):
-        _say(row)
+        write_line(row)
     for topic in found["topics"]:
         if topic["unstamped"]:
-            _say(
+            write_line(
                 f"{topic['name']}: {topic['unstamped']} of {topic['count']} messages have a stamp of 0 (not set)"
             )
     if found["silent_topics"]:
-        _say(f"announced, without a message: {', '.join(found['silent_topics'])}")
+        write_line(f"announced, without a message: {', '.join(found['silent_topics'])}")
     for fault in found["faults"]:
-        _say(f"written for a fault at {_when(fault['time_ns'])}: {fault['reason']}")
+        write_line(f"written for a fault at {_when(fault['time_ns'])}: {fault['reason']}")
     _show_origin(found["provenance"])
     for line in found["damage"]:
-        _say(f"damage: {line}")
+        write_line(f"damage: {line}")
 
 
 def _row(topic: dict[str, Any]) -> tuple[str, ...]:
@@ -97,24 +94,24 @@ def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
 
 def _show_origin(origin: dict[str, Any]) -> None:
     if not origin["recorded_by_fulmar"]:
-        _say("recorded by somebody else: it does not say which code, config and robot made it")
+        write_line("recorded by somebody else: it does not say which code, config and robot made it")
         return
     for key in ORIGIN:
         if origin[key] not in (None, ""):
-            _say(f"{key}: {origin[key]}")
-    _say(
+            write_line(f"{key}: {origin[key]}")
+    write_line(
         f"code: fulmar {origin['fulmar_version'] or 'unknown'}, revision {origin['git_revision'] or 'unknown'}"
     )
     if origin["made_by"]:
-        _say(f"on {origin['made_by']['platform']}, Python {origin['made_by']['python']}")
+        write_line(f"on {origin['made_by']['platform']}, Python {origin['made_by']['python']}")
     if origin["recorded_to_its_end"] is False:
-        _say("the recorder did not come to an orderly end")
+        write_line("the recorder did not come to an orderly end")
     if origin["controller_sha256"]:
-        _say(f"controller SHA-256: {origin['controller_sha256']}")
+        write_line(f"controller SHA-256: {origin['controller_sha256']}")
     for name, sha256 in origin["attachments"].items():
-        _say(f"carries {name}, SHA-256 {sha256[:16]}")
+        write_line(f"carries {name}, SHA-256 {sha256[:16]}")
     if origin["config_changed_since"]:
-        _say(f"changed here since then: {', '.join(origin['config_changed_since'])}")
+        write_line(f"changed here since then: {', '.join(origin['config_changed_since'])}")
 
 
 def _when(time_ns: int) -> str:
@@ -123,7 +120,3 @@ def _when(time_ns: int) -> str:
 
 def _number(value: float | None, form: str) -> str:
     return "–" if value is None else form.format(value)
-
-
-def _say(text: str) -> None:
-    output.print(text, markup=False, soft_wrap=True)

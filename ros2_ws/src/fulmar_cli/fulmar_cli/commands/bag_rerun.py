@@ -6,10 +6,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import BagArgument, JsonOption, PolicyOption, read_pose
+from fulmar_bringup.console import log_line, print_json, write_line
+from fulmar_cli.commands.arguments import BagArgument, JsonOption, PolicyOption, option, read_pose
 from fulmar_cli.commands.damage import finish, warn
 from fulmar_core.errors import ConfigError, UnknownNameError
 
@@ -24,48 +22,36 @@ SHOWN = 12  # lines of fields that differ
 def rerun(
     bag: BagArgument,
     controller: Annotated[
-        str | None,
-        typer.Option(metavar="C", help="policy, lqr, classical, ...; by default the one that was recorded."),
+        str | None, option("C", "policy, lqr, classical, ...; by default the one that was recorded.")
     ] = None,
     policy: PolicyOption = None,
     source: Annotated[
         str,
-        typer.Option(
+        option(
+            "observations|odometry",
+            "Feed the recorded observations, or make them anew from odometry and goals, gates included.",
             "--from",
-            metavar="observations|odometry",
-            help="Feed the recorded observations, or make them anew from odometry and goals, gates included.",
         ),
     ] = "observations",
     through: Annotated[
-        str,
-        typer.Option(metavar="direct|node", help="Call the controller, or run the live node in lock step."),
+        str, option("direct|node", "Call the controller, or run the live node in lock step.")
     ] = "direct",
     tolerance: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="[FIELD=]X",
-            help="Largest difference that counts as the same, for all fields or for one of decision, observation, "
+        option(
+            "[FIELD=]X",
+            "Largest difference that counts as the same, for all fields or for one of decision, observation, "
             "action, command; 0, the same bits, by default. May be repeated.",
         ),
     ] = None,
-    robot: Annotated[
-        str | None, typer.Option(metavar="R", help="Whose bag it is, if it does not say.")
-    ] = None,
-    task: Annotated[
-        str | None, typer.Option(metavar="T", help="What was to be done, if it does not say.")
-    ] = None,
-    goal: Annotated[
-        str | None, typer.Option(metavar="x,y,deg", help="The goal, for a bag that holds none.")
-    ] = None,
+    robot: Annotated[str | None, option("R", "Whose bag it is, if it does not say.")] = None,
+    task: Annotated[str | None, option("T", "What was to be done, if it does not say.")] = None,
+    goal: Annotated[str | None, option("x,y,deg", "The goal, for a bag that holds none.")] = None,
     control_hz: Annotated[
-        float | None, typer.Option(metavar="HZ", min=0.01, help="Command rate, if the bag does not say it.")
+        float | None, option("HZ", "Command rate, if the bag does not say it.", min=0.01)
     ] = None,
-    odometry: Annotated[
-        str | None, typer.Option(metavar="TOPIC", help="Which odometry, where a bag has several.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the answers, step by step: .csv or .npz.")
-    ] = None,
+    odometry: Annotated[str | None, option("TOPIC", "Which odometry, where a bag has several.")] = None,
+    out: Annotated[Path | None, option("FILE", "Write the answers, step by step: .csv or .npz.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show a recorded run to a controller, and compare its answers with the recorded ones, field by field.
@@ -125,10 +111,7 @@ def rerun(
         else:
             follow = policy is None and name == (opened.info or {}).get("controller")
             if course.changes and not follow:
-                console.print(
-                    "warning: the record changed its policy on the way; here one goes through all of it",
-                    markup=False,
-                )
+                log_line("warning: the record changed its policy on the way; here one goes through all of it")
             answers, sha256 = answers_of(
                 course, name, folder, "odometry" if foreign else source, follow=follow
             )
@@ -218,50 +201,46 @@ def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | Non
 
 
 def _show(result: dict[str, Any], sums: list[dict[str, Any]]) -> None:
-    _say(
+    write_line(
         f"{result['bag']}: {result['steps']} steps of {result['robot']}, {result['task']}; "
         f"'{result['controller']}' was asked {result['asked']} times, in {result['elapsed_s']:.2f} s"
     )
     if result["sha256"] and result["recorded_sha256"]:
         same = result["sha256"] == result["recorded_sha256"]
-        _say("the same controller as recorded" if same else "another controller than recorded")
+        write_line("the same controller as recorded" if same else "another controller than recorded")
     turns = len(result["recorded_sha256s"])
     if turns > 1:
-        _say(f"{turns} controllers had their turn in the record; compared with the first of them")
+        write_line(f"{turns} controllers had their turn in the record; compared with the first of them")
     for each in result["not_asked"][:SHOWN]:
-        _say(f"  not asked at {each['steps']} steps, from step {each['first_step']}: {each['reason']}")
+        write_line(f"  not asked at {each['steps']} steps, from step {each['first_step']}: {each['reason']}")
     if result["answers"]:
-        _say(f"its answers are in {result['answers']}")
+        write_line(f"its answers are in {result['answers']}")
     if not result["compared"]:
-        _say("nothing was recorded that its answers could be compared with")
+        write_line("nothing was recorded that its answers could be compared with")
         return
     for each in sums:
         verdict = "the same" if not each["differing"] else f"{each['differing']} numbers differ"
-        _say(
+        write_line(
             f"  {each['field']:<12} {each['steps']:>7} steps  {verdict}, largest difference {each['largest']:.3g}"
         )
     first = result["first_difference"]
     if first is None:
-        _say("same")
+        write_line("same")
         return
-    _say(
+    write_line(
         f"first difference: step {first['first_step']}, odom of t = {first['first_stamp_s']:.3f} s, "
         f"{first['field']} {first['name']}: recorded {_number(first['recorded'])}, now {_number(first['found'])}"
     )
     differing = [each for each in result["fields"] if each["differing"]]
     for each in differing[:SHOWN]:
         spread = each["difference"] or {"p50": 0.0, "p99": 0.0, "max": 0.0}
-        _say(
+        write_line(
             f"  {each['field']} {each['name']}: {each['differing']} of {each['compared']} differ, from step "
             f"{each['first_step']}; median {spread['p50']:.3g}, p99 {spread['p99']:.3g}, largest {spread['max']:.3g}"
         )
     if len(differing) > SHOWN:
-        _say(f"  ... and {len(differing) - SHOWN} more; --json has them all")
+        write_line(f"  ... and {len(differing) - SHOWN} more; --json has them all")
 
 
 def _number(value: float | None) -> str:
     return "nothing" if value is None else f"{value:.9g}"
-
-
-def _say(text: str) -> None:
-    output.print(text, markup=False, soft_wrap=True)

@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.console import log_line, output, print_json
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JsonOption, PolicyOption, SeedOption
+from fulmar_cli.commands.arguments import JsonOption, PolicyOption, SeedOption, flag, option
 from fulmar_core.episode import JUDGE_SEED
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
@@ -19,46 +19,32 @@ from fulmar_core.exit_codes import FAILED
 
 def drift(
     through: Annotated[
-        str,
-        typer.Option(metavar="batch|mujoco|ros", help="ros: the deployed nodes over DDS, in lock step."),
+        str, option("batch|mujoco|ros", "ros: the deployed nodes over DDS, in lock step.")
     ] = "ros",
     controllers: Annotated[
-        str, typer.Option(metavar="K,...", help="Out of policy and the classical controllers.")
+        str, option("K,...", "Out of policy and the classical controllers.")
     ] = "policy,lqr",
     rows: Annotated[
-        str | None,
-        typer.Option(metavar="R,...", help="Names of conditions and paths; all twelve by default."),
+        str | None, option("R,...", "Names of conditions and paths; all twelve by default.")
     ] = None,
     episodes: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Trajectories of each condition; paths have at most 4.")
+        int, option("N", "Trajectories of each condition; paths have at most 4.", min=1)
     ] = 256,
     seed: SeedOption = JUDGE_SEED,
     policy: PolicyOption = None,
     tracking_policy: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Policy bundle for the paths; the shipped one by default."),
+        Path | None, option("DIR", "Policy bundle for the paths; the shipped one by default.")
     ] = None,
     out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            "--output",
-            metavar="DIR",
-            help="Where outcomes are kept, and the report with its pictures.",
-        ),
+        Path, option("DIR", "Where outcomes are kept, and the report with its pictures.", "--out", "--output")
     ] = Path("runs/benchmark/drift"),
     jobs: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, help="Processes at once, pairs of them through ros; one for each core."
-        ),
+        int | None, option("N", "Processes at once, pairs of them through ros; one for each core.", min=1)
     ] = None,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="Judge again what was judged before and did not change.")
-    ] = False,
+    fresh: Annotated[bool, flag("--fresh", "Judge again what was judged before and did not change.")] = False,
     report: Annotated[bool, typer.Option(help="Draw the report.")] = True,
     check: Annotated[
-        bool, typer.Option("--check", help="End with code 1 unless everything asked was measured and met.")
+        bool, flag("--check", "End with code 1 unless everything asked was measured and met.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -113,11 +99,11 @@ def drift(
         assert isinstance(unit, DriftUnit)
         name = f"{unit.row}, {unit.controller}"
         if isinstance(outcome, str):
-            console.print(f"{name}: failed: {outcome}", markup=False, soft_wrap=True)
+            log_line(f"{name}: failed: {outcome}")
             return
         speed = outcome.about["control_steps"] / outcome.about["wall_s"]
         how = "judged before" if before else f"{outcome.about['wall_s']:.1f} s, {speed:,.0f} steps/s"
-        console.print(f"{name}: {_main_figure(outcome)} ({how})", markup=False, soft_wrap=True)
+        log_line(f"{name}: {_main_figure(outcome)} ({how})")
 
     with work_bar("judging") as progress:
         findings = run_drift(request, progress=progress, on_done=tell)
@@ -127,7 +113,7 @@ def drift(
         print_json(document)
     else:
         print_tables(document, output)
-    console.print(f"written: {written}", markup=False, soft_wrap=True)
+    log_line(f"written: {written}")
     if check and document["met"] < document["asked"]:
         raise typer.Exit(FAILED)
 

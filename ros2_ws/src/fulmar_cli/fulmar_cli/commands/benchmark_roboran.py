@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.console import log_line, output, print_json
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, SeedOption
+from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, SeedOption, flag, option
 from fulmar_core.episode import JUDGE_SEED
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
@@ -21,47 +21,31 @@ ALL = "all"
 
 def roboran(
     robots: Annotated[
-        str | None,
-        typer.Option(
-            metavar="R,...", help="Names with commas between, or all; the thesis' three by default."
-        ),
+        str | None, option("R,...", "Names with commas between, or all; the thesis' three by default.")
     ] = None,
     tasks: Annotated[
-        str | None,
-        typer.Option(metavar="T,...", help="Names with commas between, or all; five by default."),
+        str | None, option("T,...", "Names with commas between, or all; five by default.")
     ] = None,
-    through: Annotated[
-        str, typer.Option(metavar="W,...", help="Out of batch, mujoco and ros, or all.")
-    ] = "batch,mujoco",
+    through: Annotated[str, option("W,...", "Out of batch, mujoco and ros, or all.")] = "batch,mujoco",
     controllers: Annotated[
-        str,
-        typer.Option(
-            metavar="K,...",
-            help="policy: the shipped bundles. classical: the laws of the families.",
-        ),
+        str, option("K,...", "policy: the shipped bundles. classical: the laws of the families.")
     ] = "policy",
     policies: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of bundles named ROBOT_TASK; the shipped ones by default."),
+        Path | None, option("DIR", "Folder of bundles named ROBOT_TASK; the shipped ones by default.")
     ] = None,
     episodes: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="In every way; 4,096, 256 and 16 through ros by default."),
+        int | None, option("N", "In every way; 4,096, 256 and 16 through ros by default.", min=1)
     ] = None,
     seed: SeedOption = JUDGE_SEED,
     scenario: ScenarioOption = "nominal",
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Where outcomes are kept, and the report with its pictures.")
-    ] = Path("runs/benchmark/roboran"),
-    jobs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Processes at once; one for each core.")
-    ] = None,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="Judge again what was judged before and did not change.")
-    ] = False,
+    out: Annotated[Path, option("DIR", "Where outcomes are kept, and the report with its pictures.")] = Path(
+        "runs/benchmark/roboran"
+    ),
+    jobs: Annotated[int | None, option("N", "Processes at once; one for each core.", min=1)] = None,
+    fresh: Annotated[bool, flag("--fresh", "Judge again what was judged before and did not change.")] = False,
     report: Annotated[bool, typer.Option(help="Draw the report.")] = True,
     check: Annotated[
-        bool, typer.Option("--check", help="End with code 1 unless everything asked was measured and met.")
+        bool, flag("--check", "End with code 1 unless everything asked was measured and met.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -114,12 +98,10 @@ def roboran(
         plan = unit.trial.plan
         name = f"{spoken(plan.robot)}, {spoken(plan.task).lower()}, {plan.controller}, {unit.trial.through}"
         if isinstance(outcome, str):
-            console.print(f"{name}: failed: {outcome}", markup=False, soft_wrap=True)
+            log_line(f"{name}: failed: {outcome}")
         else:
             how = "judged before" if before else f"{outcome.about['wall_s']:.1f} s"
-            console.print(
-                f"{name}: success {outcome.succeeded.mean():.3f} ({how})", markup=False, soft_wrap=True
-            )
+            log_line(f"{name}: success {outcome.succeeded.mean():.3f} ({how})")
 
     with work_bar("judging") as progress:
         findings = run_benchmark(request, progress=progress, on_done=tell)
@@ -129,7 +111,7 @@ def roboran(
         print_json(document)
     else:
         print_tables(document, output)
-    console.print(f"written: {written}", markup=False, soft_wrap=True)
+    log_line(f"written: {written}")
     if check and document["met"] < document["asked"]:
         raise typer.Exit(FAILED)
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import typer
 from rich.table import Table
 
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.console import console, output, print_result
 from fulmar_bringup.progress import step_bar
-from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, TaskOption
+from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, TaskOption, option
 from fulmar_core.errors import ConfigError, UnknownNameError
 
 DEVICES, LIBRARIES = ("cpu", "cuda"), ("compiled", "numpy", "torch")
@@ -17,30 +16,21 @@ ROUNDS = 5
 
 
 def throughput(
-    robots: Annotated[
-        str | None,
-        typer.Option(metavar="R,...", help="Names with commas between; all by default."),
-    ] = None,
-    device: Annotated[
-        str, typer.Option(metavar="cpu|cuda", help="Where the batch is computed; cuda needs torch.")
-    ] = "cpu",
+    robots: Annotated[str | None, option("R,...", "Names with commas between; all by default.")] = None,
+    device: Annotated[str, option("cpu|cuda", "Where the batch is computed; cuda needs torch.")] = "cpu",
     library: Annotated[
         str | None,
-        typer.Option(
-            metavar="compiled|numpy|torch",
-            help="Who computes the batch: on cpu a compiled kernel (which takes torch and g++) or else numpy, on cuda "
+        option(
+            "compiled|numpy|torch",
+            "Who computes the batch: on cpu a compiled kernel (which takes torch and g++) or else numpy, on cuda "
             "torch.",
         ),
     ] = None,
-    worlds: Annotated[int, typer.Option(metavar="N", min=1, help="Worlds of the batch.")] = 4096,
+    worlds: Annotated[int, option("N", "Worlds of the batch.", min=1)] = 4096,
     task: TaskOption = "go_to_pose",
     scenario: ScenarioOption = "randomised",
-    cores: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Processes of the batch, and threads of MuJoCo's rollout.")
-    ] = 2,
-    seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.05, help="Time of each of the measurements [s].")
-    ] = 1.0,
+    cores: Annotated[int, option("N", "Processes of the batch, and threads of MuJoCo's rollout.", min=1)] = 2,
+    seconds: Annotated[float, option("S", "Time of each of the measurements [s].", min=0.05)] = 1.0,
     as_json: JsonOption = False,
 ) -> None:
     """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
@@ -93,10 +83,7 @@ def throughput(
         "scenario": scenario,
         "cores": cores,
     }
-    if as_json:
-        print_json(figures)
-    else:
-        _print(figures)
+    print_result(figures, _print, as_json=as_json)
 
 
 def _fastest(device: str) -> str:

@@ -7,34 +7,24 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption
+from fulmar_bringup.console import log_line, print_json, write_line
+from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption, argument, flag, option
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import DONE, FAILED
 
 
 def commission(
-    hardware: Annotated[
-        str,
-        typer.Argument(metavar="HARDWARE", help="A name from `fulmar list hardware`, or a .yaml file."),
-    ],
+    hardware: Annotated[str, argument("HARDWARE", "A name from `fulmar list hardware`, or a .yaml file.")],
     yes: Annotated[
-        bool, typer.Option("--yes", help="The robot may move: the air is open and 0.5 m around it are free.")
+        bool, flag("--yes", "The robot may move: the air is open and 0.5 m around it are free.")
     ] = False,
     arm: ArmOption = False,
-    port: Annotated[str, typer.Option(metavar="P", help="Takes the place of the hardware file's port.")] = "",
-    write: Annotated[
-        bool, typer.Option("--write", help="Write what was found into the hardware file.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the corrected hardware file here instead.")
-    ] = None,
-    emulate: Annotated[bool, typer.Option("--emulate", help="An emulator speaks for the device.")] = False,
+    port: Annotated[str, option("P", "Takes the place of the hardware file's port.")] = "",
+    write: Annotated[bool, flag("--write", "Write what was found into the hardware file.")] = False,
+    out: Annotated[Path | None, option("FILE", "Write the corrected hardware file here instead.")] = None,
+    emulate: Annotated[bool, flag("--emulate", "An emulator speaks for the device.")] = False,
     wiring: Annotated[
-        str,
-        typer.Option(
-            metavar="W", help="With --emulate: as_written, shuffled, inverted or dead (one wire, by --seed)."
-        ),
+        str, option("W", "With --emulate: as_written, shuffled, inverted or dead (one wire, by --seed).")
     ] = "as_written",
     seed: SeedOption = 0,
     as_json: JsonOption = False,
@@ -84,12 +74,10 @@ def commission(
     require(*(("mujoco",) if emulate else ()), *file.needs)
     if not emulate:
         check_presence(file.driver, port)
-    say = (lambda text: None) if as_json else lambda text: output.print(f"  {text}", markup=False)
+    say = (lambda text: None) if as_json else lambda text: write_line(f"  {text}")
     if not as_json:
-        output.print(
-            "each wire is pulsed; keep a hand on the e-stop (`fulmar estop`)" if yes
-            else "AIR CLOSED? Each valve clicks once; note which one you hear:", markup=False,
-        )  # fmt: skip
+        write_line("each wire is pulsed; keep a hand on the e-stop (`fulmar estop`)" if yes
+            else "AIR CLOSED? Each valve clicks once; note which one you hear:")  # fmt: skip
     found = conduct(Request(hardware, yes, emulate, wiring, seed, arm, port), say)
     value = found.get(found.get("key", ""))
     target = out or (hardware_path(hardware) if write else None)
@@ -102,9 +90,9 @@ def commission(
     elif yes:
         _print(found, line_of(found["key"], value) if value is not None else "")
         if target is not None and found["written"] is None:
-            console.print("nothing was written: correct what is named above first", markup=False)
+            log_line("nothing was written: correct what is named above first")
     else:
-        output.print("heard each? Open the air, free 0.5 m around the robot, and add --yes", markup=False)
+        write_line("heard each? Open the air, free 0.5 m around the robot, and add --yes")
     raise typer.Exit(DONE if found["success"] else FAILED)
 
 
@@ -112,14 +100,12 @@ def _print(found: dict[str, Any], line: str) -> None:
     for wire in found["wires"]:
         drives = wire["drives"] or "DOES NOT ANSWER"
         same = "as the file says" if drives == wire["file_says"] else f"the file says {wire['file_says']}"
-        output.print(f"{wire['name']}: {drives} ({same})", markup=False)
+        write_line(f"{wire['name']}: {drives} ({same})")
     for group in found["indistinguishable"]:
-        output.print(f"no motion distinguishes: {', '.join(group)}", markup=False)
+        write_line(f"no motion distinguishes: {', '.join(group)}")
     for problem in found["problems"]:
-        output.print(f"WRONG: {problem}", markup=False, soft_wrap=True)
+        write_line(f"WRONG: {problem}")
     if line:
-        output.print(
-            ("the file is right: " if found["as_written"] else "write into the file: ") + line, markup=False
-        )
+        write_line(("the file is right: " if found["as_written"] else "write into the file: ") + line)
     if found["written"]:
-        output.print(f"written: {found['written']}", markup=False)
+        write_line(f"written: {found['written']}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from fulmar_bringup.console import console
+from fulmar_bringup.console import log_line
 from fulmar_core.exit_codes import DONE, FAILED
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def open_and_warn(path: Path) -> Bag:
 def warn(lines: Iterable[str]) -> None:
     """Say what is wrong, beside the answer."""
     for line in lines:
-        console.print(f"warning: {line}", markup=False, soft_wrap=True)
+        log_line(f"warning: {line}")
 
 
 def finish(*bags: Bag, good: bool = True) -> typer.Exit:

@@ -10,15 +10,15 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from fulmar_bringup.console import console, output
+from fulmar_bringup.console import log_line, output, write_line
+from fulmar_cli.commands.arguments import option
 
 START, GOAL, DURATION_S, RATE = (2.5, 1.5, 120.0), (0.0, 0.0, 0.0), 30.0, 2.0
 
 
 def demo(
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of bags and report; runs/demo_<time> by default."),
+        Path | None, option("DIR", "Folder of bags and report; runs/demo_<time> by default.")
     ] = None,
 ) -> None:
     """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
@@ -32,10 +32,9 @@ def demo(
     out = out or Path("runs") / f"demo_{time.strftime('%Y%m%d_%H%M%S')}"
     outcomes = []
     for controller in ("policy", "lqr"):
-        console.print(
+        log_line(
             f"{controller}: a simulated platform, the {controller} node and a recorder, each a process of its own, "
-            f"{DURATION_S:g} s at {RATE:g} times real time",
-            markup=False,
+            f"{DURATION_S:g} s at {RATE:g} times real time"
         )
         request = plan_run(
             robot="floating_platform",
@@ -56,13 +55,13 @@ def demo(
         )
         outcome = run_and_evaluate(request)
         if outcome.failure:  # Ctrl-C among them: there is nothing to compare
-            console.print(f"{controller}: {outcome.failure}", markup=False, soft_wrap=True)
+            log_line(f"{controller}: {outcome.failure}")
             raise typer.Exit(outcome.exit_code)
         outcomes.append(outcome)
     output.print(_table([outcome.summary for outcome in outcomes]))
     page = write_report([read_run(out / name) for name in ("policy", "lqr")], out / "report.html")
-    output.print(f"report: {page}", markup=False, soft_wrap=True)
-    output.print(f"bags:   {out / 'policy'}  {out / 'lqr'}", markup=False, soft_wrap=True)
+    write_line(f"report: {page}")
+    write_line(f"bags:   {out / 'policy'}  {out / 'lqr'}")
     raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_cli.commands.arguments import JsonOption, argument, flag
 from fulmar_core.errors import RunFailed
 from fulmar_core.exit_codes import FAILED
 
@@ -17,12 +17,9 @@ if TYPE_CHECKING:
 
 def estop(
     robot: Annotated[
-        str | None,
-        typer.Argument(metavar="[ROBOT]", help="Name of the only robot to stop; every one by default."),
+        str | None, argument("[ROBOT]", "Name of the only robot to stop; every one by default.")
     ] = None,
-    reset: Annotated[
-        bool, typer.Option("--reset", help="Release it; refused while commands are not zero.")
-    ] = False,
+    reset: Annotated[bool, flag("--reset", "Release it; refused while commands are not zero.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Press the emergency stop of every robot in this ROS domain: actuators go to their safe state, at once.

@@ -6,10 +6,9 @@ import os
 import time
 from typing import Annotated, Any
 
-import typer
 from rich.table import Table
 
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.console import log_line, output, print_result, write_line
 from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
 from fulmar_cli.commands.arguments import (
@@ -21,6 +20,7 @@ from fulmar_cli.commands.arguments import (
     ScenarioOption,
     SeedOption,
     TaskArgument,
+    option,
 )
 from fulmar_core.episode import JUDGE_SEED, episode_steps
 from fulmar_core.errors import ConfigError, UnknownNameError
@@ -39,49 +39,33 @@ def evaluate(
     policy: PolicyOption = None,
     through: Annotated[
         str,
-        typer.Option(
-            metavar="batch|mujoco|ros",
-            help="batch: the core's own dynamics. mujoco: an independent simulator. ros: the deployed nodes over DDS.",
+        option(
+            "batch|mujoco|ros",
+            "batch: the core's own dynamics. mujoco: an independent simulator. ros: the deployed nodes over DDS.",
         ),
     ] = "mujoco",
     episodes: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            help="Number of episodes; 4,096 in the batch, 256 elsewhere.",
-        ),
+        int | None, option("N", "Number of episodes; 4,096 in the batch, 256 elsewhere.", min=1)
     ] = None,
     seed: SeedOption = JUDGE_SEED,
     scenario: ScenarioOption = "nominal",
     calibration: CalibrationOption = None,
     control_hz: Annotated[
-        float | None, typer.Option(metavar="HZ", min=0.01, help="Command rate; the robot's own by default.")
+        float | None, option("HZ", "Command rate; the robot's own by default.", min=0.01)
     ] = None,
     jobs: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            help="Processes at once, through ros; one for each core.",
-        ),
+        int | None, option("N", "Processes at once, through ros; one for each core.", min=1)
     ] = None,
     episode_s: Annotated[
-        float | None,
-        typer.Option(metavar="S", min=0.01, help="Length of an episode [s]; the task's own by default."),
+        float | None, option("S", "Length of an episode [s]; the task's own by default.", min=0.01)
     ] = None,
-    steps: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="The same, as a number of control steps.")
-    ] = None,
+    steps: Annotated[int | None, option("N", "The same, as a number of control steps.", min=1)] = None,
     worlds: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Episodes at once in the batch; no figure depends on it."),
+        int | None, option("N", "Episodes at once in the batch; no figure depends on it.", min=1)
     ] = None,
     bounds: Annotated[
         int | None,
-        typer.Option(
-            metavar="N", min=1, help="Episodes, from the first on, whose bound on waypoints is computed; 256."
-        ),
+        option("N", "Episodes, from the first on, whose bound on waypoints is computed; 256.", min=1),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -140,7 +124,7 @@ def evaluate(
         )
     policy = chosen_policy(controller, policy, the_robot, the_task, hz)
     if note := gains_note(robot, controller):
-        console.print(f"info: {note}", markup=False, soft_wrap=True)
+        log_line(f"info: {note}")
     require(*modules_of(controller, "mock" if through == "batch" else "mujoco"))
     plan = RunPlan(
         robot=robot,
@@ -173,10 +157,7 @@ def evaluate(
         "wall_s": wall_s,
         "steps_per_s": judged["control_steps"] / wall_s,
     }
-    if as_json:
-        print_json(figures)
-    else:
-        _print(figures)
+    print_result(figures, _print, as_json=as_json)
 
 
 def _cores() -> int:
@@ -198,11 +179,7 @@ def _print(figures: dict[str, Any]) -> None:
             table.add_row(name, *numbers)
     output.print(table)
     if "bound" in figures:
-        output.print(
-            f"bound on goals, of the first {figures['bound_episodes']} episodes: {figures['bound']}",
-            markup=False,
-            soft_wrap=True,
-        )
+        write_line(f"bound on goals, of the first {figures['bound_episodes']} episodes: {figures['bound']}")
     output.print(
         f"success {figures['success_rate']:.3f} of {figures['episodes']} episodes of {figures['episode_s']:g} s "
         f"(seed {figures['seed']}) through {figures['through']}; {figures['wall_s']:.1f} s, "

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.console import log_line, output, print_json
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_cli.commands.arguments import JsonOption, option
 from fulmar_core.exit_codes import FAILED
 
 if TYPE_CHECKING:
@@ -19,12 +19,9 @@ if TYPE_CHECKING:
 
 
 def faults(
-    robot: Annotated[
-        str, typer.Option(metavar="R", help="A name from `fulmar list robots`.")
-    ] = "floating_platform",
+    robot: Annotated[str, option("R", "A name from `fulmar list robots`.")] = "floating_platform",
     only: Annotated[
-        str | None,
-        typer.Option(metavar="F,...", help="Some faults by name, with commas between; all by default."),
+        str | None, option("F,...", "Some faults by name, with commas between; all by default.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -83,7 +80,7 @@ def _print(robot: str, findings: list[FaultResult], skipped: list[Skipped]) -> N
         )
     output.print(table)
     for fault in skipped:
-        console.print(f"skipped: {fault.name}: {fault.reason}", markup=False)
+        log_line(f"skipped: {fault.name}: {fault.reason}")
 
 
 def _time_to_safe(finding: FaultResult) -> str:

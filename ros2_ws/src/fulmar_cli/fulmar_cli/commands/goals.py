@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from fulmar_cli.commands.arguments import NameOption, read_goal
+from fulmar_cli.commands.arguments import NameOption, argument, flag, option, read_goal
 from fulmar_cli.commands.list import list_names
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot_name import checked_name
@@ -17,38 +17,29 @@ GIVE_UP_S = 5.0  # without odometry or without a subscriber of the goals
 def goals(
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar="NAME",
-            help="A name from `fulmar list goals`, or a path that ends in .yaml; without it they are listed.",
+        argument(
+            "NAME",
+            "A name from `fulmar list goals`, or a path that ends in .yaml; without it they are listed.",
         ),
     ] = None,
     robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="R", help="Type of the robot that is to do it: a name from `fulmar list robots`."
-        ),
+        str | None, option("R", "Type of the robot that is to do it: a name from `fulmar list robots`.")
     ] = None,
     robot_name: NameOption = None,
     pose: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "X,Y,DEG",
+            "One goal instead of a file: x [m], y [m], heading [deg]; or x,y for a position.",
             "--pose",
-            metavar="X,Y,DEG",
-            help="One goal instead of a file: x [m], y [m], heading [deg]; or x,y for a position.",
         ),
     ] = None,
     as_path: Annotated[
-        bool,
-        typer.Option(
-            "--as-path", help="Tell all positions or poses at once, for tasks that pass through them."
-        ),
+        bool, flag("--as-path", "Tell all positions or poses at once, for tasks that pass through them.")
     ] = False,
-    control_hz: Annotated[
-        float, typer.Option(metavar="HZ", min=0.01, help="Velocities come so often along a path.")
-    ] = 10.0,
+    control_hz: Annotated[float, option("HZ", "Velocities come so often along a path.", min=0.01)] = 10.0,
     wait: Annotated[
-        bool,
-        typer.Option("--wait", help=f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default."),
+        bool, flag("--wait", f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default.")
     ] = False,
 ) -> None:
     """Tell a running robot its goals, one after the other, until they are done or Ctrl-C.

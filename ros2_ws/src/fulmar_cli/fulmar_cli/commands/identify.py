@@ -6,11 +6,10 @@ import re
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
 from rich.table import Table
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_bringup.console import log_line, output, print_json, write_line
+from fulmar_cli.commands.arguments import JsonOption, argument, option
 from fulmar_cli.commands.damage import warn
 from fulmar_core.errors import ConfigError
 
@@ -19,20 +18,16 @@ _QUANTITY = re.compile(rf"(?P<value>{_NUMBER})(?:(?:\+-|±)(?P<error>{_NUMBER}))
 
 
 def identify(
-    bags: Annotated[list[Path], typer.Argument(metavar="BAG...", help="Driven runs of one robot.")],
+    bags: Annotated[list[Path], argument("BAG...", "Driven runs of one robot.")],
     known: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE+-ERROR", help="A quantity that was measured, such as mass=5.32+-0.02."
-        ),
+        option("NAME=VALUE+-ERROR", "A quantity that was measured, such as mass=5.32+-0.02."),
     ] = None,
     ballast: Annotated[
-        list[str] | None,
-        typer.Option(metavar="BAG=KG+-KG", help="A weight that was aboard during one of the runs, anywhere."),
+        list[str] | None, option("BAG=KG+-KG", "A weight that was aboard during one of the runs, anywhere.")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write a calibration for --calibration of run, evaluate, train."),
+        Path | None, option("FILE", "Write a calibration for --calibration of run, evaluate, train.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -93,7 +88,7 @@ def identify(
             ]
         )
     if not found.trusted:
-        console.print(f"note: {found.scale}.", markup=False, soft_wrap=True)
+        log_line(f"note: {found.scale}.")
     if as_json:
         print_json(document)
         return
@@ -136,10 +131,6 @@ def _print(document: dict[str, Any]) -> None:
     for name, e in document["estimates"].items():
         table.add_row(name, *(f"{e[part]:.5g}" for part in ("value", "low", "high")), e["unit"])
     output.print(table)
-    output.print(f"{document['scale']}", markup=False, soft_wrap=True)
+    write_line(f"{document['scale']}")
     if document["calibration"]:
-        output.print(
-            f"written: {document['calibration']}; use it with --calibration {document['calibration']}",
-            markup=False,
-            soft_wrap=True,
-        )
+        write_line(f"written: {document['calibration']}; use it with --calibration {document['calibration']}")

@@ -13,10 +13,12 @@ from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands.arguments import dated_folder, flag, option, read_area, read_goal, read_pose
 
 RUN_TASK_HELP = (
-    f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, and "
-    "the task that takes the goals of --goals."
+    f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
+    "and the task that takes the goals of --goals."
 )
-GOAL_HELP = "Where to go, with or without a heading; drawn from the seed by default, as tasks with many targets are."
+GOAL_HELP = (
+    "Where to go, with or without a heading; drawn from the seed by default, as tasks with many targets are."
+)
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
 ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
@@ -78,14 +80,18 @@ def run(
     ] = None,
     area: Annotated[str | None, option("x,x,y,y", AREA_HELP)] = None,
     max_run_time: Annotated[
-        float | None, option("S", "Stop the robot after so many acting seconds; no limit by default.", min=0.1)
+        float | None,
+        option("S", "Stop the robot after so many acting seconds; no limit by default.", min=0.1),
     ] = None,
     recording: Annotated[str | None, option("whole|ring", RECORDING_HELP)] = None,
     copies: Annotated[
         int, option("N", "Times each command is sent, for networks that lose some.", min=1, max=3)
     ] = 1,
     controller_network: Annotated[
-        str, option("NETNS", "Linux network namespace of the controller, as on another computer.", "--controller-in")
+        str,
+        option(
+            "NETNS", "Linux network namespace of the controller, as on another computer.", "--controller-in"
+        ),
     ] = "",
     mocap_hz: Annotated[
         float, option("HZ", "Rate of a simulated motion capture; 200 in the Zero-G Lab.", min=0.0, max=1000.0)

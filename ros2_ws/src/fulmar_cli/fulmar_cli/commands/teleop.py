@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import output
-from fulmar_cli.commands.arguments import NameOption, RobotArgument
+from fulmar_bringup.console import write_line
+from fulmar_cli.commands.arguments import NameOption, RobotArgument, flag, option
 from fulmar_core.errors import RunFailed
 from fulmar_core.exit_codes import FAILED
 from fulmar_core.robot_name import checked_name, namespace_of
@@ -17,15 +17,10 @@ def teleop(
     robot: RobotArgument,
     name: NameOption = None,
     keyboard: Annotated[
-        bool,
-        typer.Option("--keyboard/--no-keyboard", help="Read keys from this terminal, beside the topic joy."),
+        bool, flag("--keyboard/--no-keyboard", "Read keys from this terminal, beside the topic joy.")
     ] = True,
-    share: Annotated[
-        float, typer.Option(metavar="F", min=0.01, max=1.0, help="Of what the robot can, at full wish.")
-    ] = 0.5,
-    give_back: Annotated[
-        bool, typer.Option("--give-back", help="Only give the robot back to its controller.")
-    ] = False,
+    share: Annotated[float, option("F", "Of what the robot can, at full wish.", min=0.01, max=1.0)] = 0.5,
+    give_back: Annotated[bool, flag("--give-back", "Only give the robot back to its controller.")] = False,
 ) -> None:
     """Drive a running robot by keyboard or gamepad; a hand goes before the controller.
 
@@ -54,7 +49,7 @@ def teleop(
             if not person.robots_with(GIVE_BACK, name, wait_s=FIND_S):
                 raise RunFailed(f"no plant of '{name}' is heard in this ROS domain. {person.heard_words()}")
             done, words = person.ask(f"{space}/{GIVE_BACK}")
-        output.print(words, markup=False)
+        write_line(words)
         raise typer.Exit(0 if done else FAILED)
     spec = teleop_spec(robot, name=name, keyboard=keyboard, share=share)
     from fulmar_ros.runtime import run_node

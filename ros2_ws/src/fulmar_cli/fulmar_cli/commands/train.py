@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import CalibrationOption, JsonOption, SeedOption
+from fulmar_bringup.console import console, log_line, print_json, write_line
+from fulmar_cli.commands.arguments import CalibrationOption, JsonOption, SeedOption, argument, flag, option
 from fulmar_cli.extras import require
 from fulmar_core.calibration import use_calibration
 from fulmar_core.errors import ConfigError
@@ -23,58 +23,34 @@ if TYPE_CHECKING:
 
 
 def train(
-    robot: Annotated[
-        str | None, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")
-    ] = None,
-    task: Annotated[
-        str | None, typer.Argument(metavar="TASK", help="A name from `fulmar list tasks`.")
-    ] = None,
+    robot: Annotated[str | None, argument("ROBOT", "A name from `fulmar list robots`.")] = None,
+    task: Annotated[str | None, argument("TASK", "A name from `fulmar list tasks`.")] = None,
     seed: SeedOption = 1,
-    seeds: Annotated[
-        int, typer.Option(metavar="N", min=1, help="A campaign of this many seeds, beginning with --seed.")
-    ] = 1,
+    seeds: Annotated[int, option("N", "A campaign of this many seeds, beginning with --seed.", min=1)] = 1,
     time_limit: Annotated[
-        float | None,
-        typer.Option(metavar="S", min=1.0, help="Wall-clock seconds of learning; the settings' by default."),
+        float | None, option("S", "Wall-clock seconds of learning; the settings' by default.", min=1.0)
     ] = None,
-    updates: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="End after this many updates instead.")
-    ] = None,
+    updates: Annotated[int | None, option("N", "End after this many updates instead.", min=1)] = None,
     stop_at_success: Annotated[
-        float | None,
-        typer.Option(metavar="RATE", min=0.0, max=1.0, help="End early after two checks with this success."),
+        float | None, option("RATE", "End early after two checks with this success.", min=0.0, max=1.0)
     ] = None,
     settings: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="A file of configs/training, or a path; by robot and task by default."
-        ),
+        str | None, option("NAME", "A file of configs/training, or a path; by robot and task by default.")
     ] = None,
     control_hz: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ", help="Rate of the commands; the settings', or the robot's own by default."
-        ),
+        float | None, option("HZ", "Rate of the commands; the settings', or the robot's own by default.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Run folder; runs/train/<time>... by default.")
-    ] = None,
-    episodes: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Episodes of the closing judgement in MuJoCo.")
-    ] = 256,
+    out: Annotated[Path | None, option("DIR", "Run folder; runs/train/<time>... by default.")] = None,
+    episodes: Annotated[int, option("N", "Episodes of the closing judgement in MuJoCo.", min=1)] = 256,
     calibration: CalibrationOption = None,
-    resume: Annotated[
-        Path | None, typer.Option(metavar="RUN", help="Go on with this run, exactly where it was.")
-    ] = None,
+    resume: Annotated[Path | None, option("RUN", "Go on with this run, exactly where it was.")] = None,
     executor: Annotated[
-        str, typer.Option(metavar="E", help="Who runs a campaign: local (one run a core) or ray (a cluster).")
+        str, option("E", "Who runs a campaign: local (one run a core) or ray (a cluster).")
     ] = "local",
     address: Annotated[
-        str | None, typer.Option(metavar="A", help="Of the Ray cluster; RAY_ADDRESS or a new one by default.")
+        str | None, option("A", "Of the Ray cluster; RAY_ADDRESS or a new one by default.")
     ] = None,
-    wandb: Annotated[
-        bool, typer.Option("--wandb", help="Send curves to Weights & Biases too, project 'fulmar'.")
-    ] = False,
+    wandb: Annotated[bool, flag("--wandb", "Send curves to Weights & Biases too, project 'fulmar'.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Learn a policy, then judge it in MuJoCo, where it was not trained.
@@ -220,7 +196,7 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     with learning_in(job.out):
         if not resumes and (job.out / START_FILE).exists():  # since we looked
             raise ConfigError(f"{job.out}: another training began there. Give --out another folder.")
-        console.print(_when_it_ends_early(job), markup=False, soft_wrap=True)
+        log_line(_when_it_ends_early(job))
         try:
             record = learn(job, LearningBar(job.out))
         except KeyboardInterrupt:
@@ -233,10 +209,9 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     if as_json:
         print_json({"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures})
         return
-    output.print(
+    write_line(
         f"success {figures['success_rate']:.3f} of {job.episodes} episodes in MuJoCo; run folder {job.out}\n"
-        f"next: fulmar export {job.out} --out DIR",
-        markup=False,
+        f"next: fulmar export {job.out} --out DIR"
     )
 
 
@@ -252,9 +227,9 @@ def _tell_how_to_go_on(run: Path) -> None:
     from training.run_folder import CHECKPOINT_FILE, NETWORK_FILE, RUN_FILE
 
     if (run / CHECKPOINT_FILE).is_file():
-        console.print(f"go on with it: fulmar train --resume {run}", markup=False, soft_wrap=True)
+        log_line(f"go on with it: fulmar train --resume {run}")
     if (run / RUN_FILE).is_file() and (run / NETWORK_FILE).is_file():
-        console.print(f"its best so far: fulmar export {run} --out DIR", markup=False, soft_wrap=True)
+        log_line(f"its best so far: fulmar export {run} --out DIR")
 
 
 def _executor(name: str, address: str | None) -> Executor:
@@ -287,21 +262,17 @@ def _campaign(job: Job, seeds: int, executor: Executor, *, as_json: bool) -> Non
 
 
 def _print_campaign(told: dict[str, Any], out: Path) -> None:
-    output.print(f"{'seed':>6}  {'held out':>8}  {'MuJoCo':>7}  {'steps':>12}", markup=False)
+    write_line(f"{'seed':>6}  {'held out':>8}  {'MuJoCo':>7}  {'steps':>12}")
     for line in told["seeds"]:
         if "error" in line:
-            output.print(f"{line['seed']:>6}  failed: {line['error']}", markup=False)
+            write_line(f"{line['seed']:>6}  failed: {line['error']}")
             continue
         judged = f"{line['success_mujoco']:>7.3f}" if line["success_mujoco"] is not None else f"{'-':>7}"
-        output.print(
-            f"{line['seed']:>6}  {line['success_held_out']:>8.3f}  {judged}  {line['steps']:>12,}",
-            markup=False,
-        )
+        write_line(f"{line['seed']:>6}  {line['success_held_out']:>8.3f}  {judged}  {line['steps']:>12,}")
     if told["best_run"] is None:
-        output.print(f"no run of {out} succeeded", markup=False)
+        write_line(f"no run of {out} succeeded")
         return
-    output.print(
+    write_line(
         f"success {told['success_mean']:.3f} ± {told['success_std']:.3f}; best: seed {told['best_seed']}\n"
-        f"next: fulmar export {told['best_run']} --out DIR",
-        markup=False,
+        f"next: fulmar export {told['best_run']} --out DIR"
     )

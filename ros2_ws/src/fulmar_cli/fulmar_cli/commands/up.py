@@ -45,7 +45,9 @@ def up(
     estop: Annotated[bool, flag("--estop", "Run an e-stop node; nothing moves without it.")] = False,
     record: cli.RecordOption = None,
     recording: Annotated[str | None, option("whole|ring|goals", RECORDING_HELP)] = None,
-    as_json: Annotated[bool, flag("--json", "Print one JSON object a line for each event, and nothing else.")] = False,
+    as_json: Annotated[
+        bool, flag("--json", "Print one JSON object a line for each event, and nothing else.")
+    ] = False,
 ) -> None:
     """Keep a system running until Ctrl-C or SIGTERM, and record it.
 
@@ -87,7 +89,9 @@ def up(
     report = _print_json if as_json else _print_words
     with live_line() as show:
         end = keep_up(request, report, show)
-    bags = sorted({str(file.parent) for file in Path(request.record).rglob("*.mcap")})  # one, or one for each goal
+    bags = sorted(
+        {str(file.parent) for file in Path(request.record).rglob("*.mcap")}
+    )  # one, or one for each goal
     report("stopped", failure=end.failure or None, watchdog_trips=end.watchdog_trips, bags=bags)
     raise typer.Exit(FAILED if end.failure else DONE)
 
