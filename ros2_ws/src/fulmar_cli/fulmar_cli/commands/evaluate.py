@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import time
-from typing import Annotated, Any
+from typing import Annotated
 
-from rich.table import Table
-
-from fulmar_bringup.console import log_line, output, print_result, write_line
-from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.progress import step_bar
+from fulmar_bringup.console import output, print_result
 from fulmar_cli.commands.arguments import (
     CalibrationOption,
     ControllerOption,
@@ -22,9 +16,7 @@ from fulmar_cli.commands.arguments import (
     TaskArgument,
     option,
 )
-from fulmar_core.episode import JUDGE_SEED, episode_steps
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.figures import FIGURES, meanings
+from fulmar_core.figures import meanings
 
 EPILOG = f"""\b
 What the figures mean. Of all but the first: mean, median and 95th percentile over the episodes.
@@ -69,7 +61,7 @@ def evaluate(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Judge a controller over many episodes and print every figure.
+    """Evaluate a controller over many episodes and print every figure.
 
     Episode i of a seed is the same in every way of running it. Success means staying inside the task's tolerance
     for its whole closing window.
@@ -80,108 +72,15 @@ def evaluate(
 
     fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
     """
-    from fulmar_bringup.planning import checked_rate, chosen_policy
-    from fulmar_bringup.system import check_names, gains_note, modules_of
-    from fulmar_cli.extras import require
+    from fulmar_cli.extras import check_plan
     from fulmar_core.calibration import use_calibration
-    from fulmar_core.disturbances.scenario import check_delays, load_scenario
-    from fulmar_core.robot import load_robot
-    from fulmar_core.rollout import WORLDS
-    from fulmar_core.tasks import load_task
-    from fulmar_evaluation.evaluation import (
-        BATCH_EPISODES,
-        BOUNDED_EPISODES,
-        EPISODES,
-        WAYS,
-        Trial,
-        evaluate_trial,
-    )
-    from policy_server.controllers import controller_entry
+    from fulmar_evaluation.trial_plan import plan_trial, print_figures, trial_figures
 
-    if through not in WAYS:
-        raise UnknownNameError("way", through, WAYS)
     use_calibration(calibration, robot)
-    check_names(robot, task, controller, "mujoco")
-    if controller_entry(controller).is_external:
-        raise ConfigError(
-            f"controller '{controller}' is a node of your own, which no evaluation can begin anew for each episode. "
-            "Use `fulmar run`, or make it a class: docs/own-controller.md."
-        )
-    the_robot, the_task = load_robot(robot), load_task(task)
-    check_delays(the_robot, load_scenario(scenario))  # so that mistakes are told before anything is started
-    hz = checked_rate(the_robot, control_hz or the_robot.timing.control_hz)
-    if episode_s is not None and steps is not None:
-        raise ConfigError("--episode-s and --steps say the same thing. Give one of them.")
-    if worlds is not None and through != "batch":
-        raise ConfigError("--worlds belongs to --through batch.")
-    control_dt = the_robot.timing.substeps(hz) * the_robot.timing.physics_dt
-    duration_s = episode_s or (steps * control_dt if steps else the_task.episode_s)
-    window_s = the_task.tolerance.hold_s
-    if duration_s < window_s:
-        raise ConfigError(
-            f"an episode of {duration_s:g} s is shorter than the {window_s:g} s that '{task}' is held in the end. "
-            "Make it longer."
-        )
-    policy = chosen_policy(controller, policy, the_robot, the_task, hz)
-    if note := gains_note(robot, controller):
-        log_line(f"info: {note}")
-    require(*modules_of(controller, "mock" if through == "batch" else "mujoco"))
-    plan = RunPlan(
-        robot=robot,
-        task=task,
-        controller=controller,
-        backend="mujoco",
-        control_hz=hz,
-        policy=str(policy.absolute()) if policy else "",
-        scenario=scenario,
-        seed=seed,
-        duration_s=duration_s,
-        lockstep=True,
-    )
-    episodes = episodes or (BATCH_EPISODES if through == "batch" else EPISODES)
-    trial = Trial(plan, through, episodes, worlds or WORLDS, jobs or _cores(), bounds or BOUNDED_EPISODES)
-    began = time.monotonic()
-    with step_bar("judging", episodes * episode_steps(trial.task, control_dt)) as progress:
-        judged = evaluate_trial(trial, progress)
-    wall_s = time.monotonic() - began
-    figures = {
-        "robot": robot,
-        "task": task,
-        "controller": controller,
-        "through": through,
-        "scenario": scenario,
-        "seed": seed,
-        "control_hz": hz,
-        "episode_s": duration_s,
-        **judged,
-        "wall_s": wall_s,
-        "steps_per_s": judged["control_steps"] / wall_s,
-    }
-    print_result(figures, _print, as_json=as_json)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0))
-
-
-def _print(figures: dict[str, Any]) -> None:
-    table = Table(
-        title=f"{figures['robot']} · {figures['task']} · {figures['controller']} · {figures['scenario']}"
-    )
-    for column in ("", "mean", "median", "p95"):
-        table.add_column(column, justify="left" if not column else "right")
-    for name, value in figures.items():
-        if name in FIGURES:
-            numbers = (
-                "–" if value[key] is None else f"{value[key]:.3f}" for key in ("mean", "median", "p95")
-            )
-            table.add_row(name, *numbers)
-    output.print(table)
-    if "bound" in figures:
-        write_line(f"bound on goals, of the first {figures['bound_episodes']} episodes: {figures['bound']}")
-    output.print(
-        f"success {figures['success_rate']:.3f} of {figures['episodes']} episodes of {figures['episode_s']:g} s "
-        f"(seed {figures['seed']}) through {figures['through']}; {figures['wall_s']:.1f} s, "
-        f"{figures['steps_per_s']:,.0f} steps/s"
-    )
+    trial = plan_trial(
+        robot=robot, task=task, controller=controller, policy=policy, through=through, episodes=episodes,
+        seed=seed, scenario=scenario, control_hz=control_hz, jobs=jobs, episode_s=episode_s, steps=steps,
+        worlds=worlds, bounds=bounds,
+    )  # fmt: skip
+    check_plan(trial.plan, backend="mock" if through == "batch" else "")
+    print_result(trial_figures(trial), lambda figures: print_figures(figures, output), as_json=as_json)
