@@ -253,7 +253,7 @@ def test_a_bundle_for_a_rate_that_the_robot_cannot_keep_is_not_accepted(fulmar, 
 def test_a_part_that_is_not_installed_is_named_with_its_extra(module, extra, words, tmp_path):
     program = (
         f"import sys; sys.modules[{module!r}] = None; sys.argv = {['fulmar', *words]!r}\n"
-        "from fulmar_bringup import cli\n"
+        "from fulmar_cli import main as cli\n"
         "cli.main()\n"
     )
     done = subprocess.run(
