@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fulmar_bringup.goal_plan import task_of_goals, is_endless, shown_path, start_of
+from fulmar_bringup.goal_plan import is_endless, shown_path, start_of, task_of_goals
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.node_table import controller_spec, run_goals_spec
 from fulmar_bringup.planning import plan_run

@@ -25,11 +25,16 @@ def task_of_run(
     goals: str | None,
     policy: Path | None,
 ) -> tuple[str, str]:
-    """Name of the task of a run, and a note where a part of its goal has no effect; arguments as of `default_task`.
+    """Name of the task of a run, and a note where a part of its goal has no effect.
 
     Args:
         task: Name of the task, if one was given.
-        goals: Name or path of a goal file, which decides the task if it was given.
+        robot: Name of the robot.
+        controller: Name of the controller.
+        backend: Name of the backend.
+        goal: x [m], y [m] and, for a pose, heading [deg].
+        goals: Name or path of a goal file; without a task it decides.
+        policy: Bundle that was given.
 
     Raises:
         ConfigError: As of `default_task` and `check_heading`.

@@ -1,19 +1,15 @@
-"""Options and arguments that several commands share, and how their texts are read."""
+"""Options and arguments that several commands share."""
 
 from __future__ import annotations
 
-import math
 import sys
 import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
 
 from fulmar_bringup.console import warn
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.safety.area import check_area
 
 Value = TypeVar("Value")
 
@@ -78,6 +74,9 @@ ArmOption = Annotated[
         "--arm", "Let the driver set MANUAL, arm the boat's autopilot and override RC, as `arm: true` does."
     ),
 ]
+EstopOption = Annotated[
+    bool, flag("--estop", "Run an e-stop node; nothing moves without it. See `fulmar estop`.")
+]
 RateOption = Annotated[
     float, option("F", "Simulated seconds per second of wall-clock time.", "--rate", min=0.01, max=50.0)
 ]
@@ -90,8 +89,6 @@ BagArgument = Annotated[Path, argument("BAG", "A bag folder, or the .mcap or .db
 OdometryOption = Annotated[str | None, option("TOPIC", "The odometry to use, where a bag has several.")]
 JsonOption = Annotated[bool, flag("--json", "Print one JSON object and nothing else.")]
 
-Area = tuple[float, float, float, float]  # x_min, x_max, y_min, y_max [m]
-
 
 def invoked_command() -> str:
     """The command line of this process, for records."""
@@ -103,61 +100,3 @@ def dated_folder(parent: str, *names: str) -> Path:
     return Path(
         parent, "_".join((time.strftime("%Y%m%d_%H%M%S"), *(name.rpartition(":")[2] for name in names)))
     )
-
-
-def read_names(text: str, family: str, known: Sequence[str]) -> tuple[str, ...]:
-    """Read names with commas between them, in the order of those known; `all` stands for every one.
-
-    Raises:
-        UnknownNameError: For the first that is not known.
-    """
-    names = {name.strip() for name in text.split(",") if name.strip()}
-    for name in sorted(names - {"all"}):
-        if name not in known:
-            raise UnknownNameError(family, name, known)
-    return tuple(name for name in known if name in names or "all" in names)
-
-
-def read_area(text: str | None) -> Area | None:
-    """Read `x_min,x_max,y_min,y_max` of --area [m].
-
-    Raises:
-        ConfigError: If it is not such an area.
-    """
-    wanted = "x_min,x_max,y_min,y_max in m with x_min < x_max and y_min < y_max, such as --area=-2,2,-1,1."
-    return _read(text, "--area", wanted, lambda values: check_area(values) is None)
-
-
-def read_goal(text: str | None, option: str = "--goal") -> tuple[float, ...] | None:
-    """Read `x,y` or `x,y,deg`: x [m], y [m] and, for a pose, heading [deg].
-
-    Raises:
-        ConfigError: If it is not two or three finite numbers.
-    """
-    wanted = (
-        "two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
-        f"Example: {option} 1,-0.5 or {option} 1,-0.5,90"
-    )
-    return _read(text, option, wanted, lambda values: len(values) in (2, 3))
-
-
-def read_pose(text: str | None, option: str) -> tuple[float, float, float] | None:
-    """Read `x,y,deg`: x [m], y [m] and heading [deg].
-
-    Raises:
-        ConfigError: If it is not three finite numbers.
-    """
-    wanted = f"three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90"
-    return _read(text, option, wanted, lambda values: len(values) == 3)
-
-
-def _read(text: str | None, option: str, wanted: str, fits: Callable[[tuple[float, ...]], bool]) -> Any:
-    if text is None:
-        return None
-    try:
-        values = tuple(float(part) for part in text.split(","))
-        if all(map(math.isfinite, values)) and fits(values):
-            return values
-    except ValueError:  # of a part, or of `fits`
-        pass
-    raise ConfigError(f"{option} = '{text}' must be {wanted}")

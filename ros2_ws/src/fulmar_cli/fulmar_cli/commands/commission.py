@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,9 @@ from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption, argument, flag, option
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.exit_codes import DONE, FAILED
+
+if TYPE_CHECKING:
+    from fulmar_bringup.commissioning.commission import Request
 
 
 def commission(
@@ -46,44 +49,26 @@ def commission(
 
     fulmar commission turtlebot2 --emulate --wiring shuffled --seed 3 --yes
     """
-    from fulmar_bringup.commissioning.commission import WIRINGS, Request
+    from fulmar_bringup.commissioning.commission import Request
     from fulmar_bringup.commissioning.commission import commission as conduct
-    from fulmar_bringup.commissioning.hardware_file import line_of, write_line
-    from fulmar_bringup.emulation import check_emulated
-    from fulmar_bringup.planning import check_arming
-    from fulmar_cli.extras import require
-    from hardware_drivers.own_driver import check_own_driver
-    from hardware_drivers.presence import check_presence
-    from hardware_drivers.settings import hardware_path, load_hardware
+    from fulmar_bringup.commissioning.hardware_file import line_of
+    from fulmar_bringup.commissioning.hardware_file import write_line as write_into_file
+    from hardware_drivers.settings import hardware_path
 
-    file = load_hardware(hardware)
-    if wiring not in WIRINGS:
-        raise UnknownNameError("wiring", wiring, WIRINGS)
-    if not emulate and wiring != "as_written":
-        raise ConfigError("--wiring goes with --emulate: a real robot has the wiring that it has.")
-    if not file.opens_valves and not yes:
-        raise ConfigError(
-            f"'{file.robot}' has no valves to click: each pulse moves it. Give --yes once 0.5 m around it are free."
-        )
     if (write or out) and not yes:
         raise ConfigError("clicks find no order to write: --write and --out need --yes.")
-    check_arming(hardware, arm=arm)
-    if emulate:
-        check_emulated(file.driver)
-    check_own_driver(file.driver)
-    require(*(("mujoco",) if emulate else ()), *file.needs)
-    if not emulate:
-        check_presence(file.driver, port)
+    request = Request(hardware, yes, emulate, wiring, seed, arm, port)
+    _check(request)
     say = (lambda text: None) if as_json else lambda text: write_line(f"  {text}")
     if not as_json:
         write_line("each wire is pulsed; keep a hand on the e-stop (`fulmar estop`)" if yes
             else "AIR CLOSED? Each valve clicks once; note which one you hear:")  # fmt: skip
-    found = conduct(Request(hardware, yes, emulate, wiring, seed, arm, port), say)
+    found = conduct(request, say)
     value = found.get(found.get("key", ""))
     target = out or (hardware_path(hardware) if write else None)
     found["written"] = None
     if target is not None and value is not None and found["success"]:
-        write_line(hardware_path(hardware), target, found["key"], value)
+        write_into_file(hardware_path(hardware), target, found["key"], value)
         found["written"] = str(target)
     if as_json:
         print_json(found)
@@ -94,6 +79,34 @@ def commission(
     else:
         write_line("heard each? Open the air, free 0.5 m around the robot, and add --yes")
     raise typer.Exit(DONE if found["success"] else FAILED)
+
+
+def _check(request: Request) -> None:
+    """Reject a request that cannot be carried out, before anything moves."""
+    from fulmar_bringup.commissioning.commission import WIRINGS
+    from fulmar_bringup.emulation import check_emulated
+    from fulmar_bringup.planning import check_arming
+    from fulmar_cli.extras import require
+    from hardware_drivers.own_driver import check_own_driver
+    from hardware_drivers.presence import check_presence
+    from hardware_drivers.settings import load_hardware
+
+    file = load_hardware(request.hardware)
+    if request.wiring not in WIRINGS:
+        raise UnknownNameError("wiring", request.wiring, WIRINGS)
+    if not request.emulate and request.wiring != "as_written":
+        raise ConfigError("--wiring goes with --emulate: a real robot has the wiring that it has.")
+    if not file.opens_valves and not request.pulses:
+        raise ConfigError(
+            f"'{file.robot}' has no valves to click: each pulse moves it. Give --yes once 0.5 m around it are free."
+        )
+    check_arming(request.hardware, arm=request.arm)
+    if request.emulate:
+        check_emulated(file.driver)
+    check_own_driver(file.driver)
+    require(*(("mujoco",) if request.emulate else ()), *file.needs)
+    if not request.emulate:
+        check_presence(file.driver, request.port)
 
 
 def _print(found: dict[str, Any], line: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,8 +9,8 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from fulmar_bringup.console import log_line, output, write_line
-from fulmar_cli.commands.arguments import option
+from fulmar_bringup.console import log_line, new_table, output, write_line
+from fulmar_cli.commands.arguments import invoked_command, option
 
 START, GOAL, DURATION_S, RATE = (2.5, 1.5, 120.0), (0.0, 0.0, 0.0), 30.0, 2.0
 
@@ -33,26 +32,14 @@ def demo(
     outcomes = []
     for controller in ("policy", "lqr"):
         log_line(
-            f"{controller}: a simulated platform, the {controller} node and a recorder, each a process of its own, "
+            f"{controller}: a simulated platform, the {controller} node and a recorder, in separate processes, "
             f"{DURATION_S:g} s at {RATE:g} times real time"
         )
         request = plan_run(
-            robot="floating_platform",
-            task="go_to_pose",
-            controller=controller,
-            backend="mujoco",
-            policy=None,
-            goal=GOAL,
-            start=START,
-            duration_s=DURATION_S,
-            lockstep=False,
-            rate=RATE,
-            control_hz=None,
-            scenario="nominal",
-            seed=1,
-            record=out / controller,
-            command="fulmar " + " ".join(sys.argv[1:]),
-        )
+            robot="floating_platform", task="go_to_pose", controller=controller, backend="mujoco", policy=None,
+            goal=GOAL, start=START, duration_s=DURATION_S, lockstep=False, rate=RATE, control_hz=None,
+            scenario="nominal", seed=1, record=out / controller, command=invoked_command(),
+        )  # fmt: skip
         outcome = run_and_evaluate(request)
         if outcome.failure:  # Ctrl-C among them: there is nothing to compare
             log_line(f"{controller}: {outcome.failure}")
@@ -66,21 +53,10 @@ def demo(
 
 
 def _table(summaries: list[dict[str, Any]]) -> Table:
-    table = Table(title="floating platform, go to pose, over ROS 2")
-    columns = (
-        "controller",
-        "goal",
-        "time to goal",
-        "position",
-        "heading",
-        "valves",
-        "rate",
-        "latency p99",
-        "trips",
-    )
-    for column in columns:
-        left = column in ("controller", "goal")
-        table.add_column(column, justify="left" if left else "right", no_wrap=left)
+    numbers = ("time to goal", "position", "heading", "valves", "rate", "latency p99", "trips")
+    table = new_table("floating platform, go to pose, over ROS 2", ("controller", "goal"), numbers)
+    for column in table.columns[:2]:
+        column.no_wrap = True
     for s in summaries:
         table.add_row(
             str(s["controller"]),

@@ -17,6 +17,7 @@ from fulmar_cli.commands.arguments import (
     option,
 )
 from fulmar_core.figures import meanings
+from fulmar_core.seeds import EVALUATION_SEED
 
 EPILOG = f"""\b
 What the figures mean. Of all but the first: mean, median and 95th percentile over the episodes.
@@ -39,7 +40,7 @@ def evaluate(
     episodes: Annotated[
         int | None, option("N", "Number of episodes; 4,096 in the batch, 256 elsewhere.", min=1)
     ] = None,
-    seed: SeedOption = JUDGE_SEED,
+    seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",
     calibration: CalibrationOption = None,
     control_hz: Annotated[

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from fulmar_cli.commands.arguments import NameOption, argument, flag, option, read_goal
+from fulmar_cli.commands.arguments import NameOption, argument, flag, option
 from fulmar_cli.commands.list import list_names
+from fulmar_cli.commands.values import read_goal
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot_name import checked_name
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from rich.table import Table
-
-from fulmar_bringup.console import log_line, output, print_json, write_line
+from fulmar_bringup.console import log_line, new_table, output, print_result, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
 from fulmar_cli.commands.damage import warn
 from fulmar_core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from fulmar_core.identification.identify import Identified
+    from fulmar_core.robot import Robot
 
 _NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
 _QUANTITY = re.compile(rf"(?P<value>{_NUMBER})(?:(?:\+-|±)(?P<error>{_NUMBER}))?(?:\s*(?:kg|N|s|m|kg·m²))?")
@@ -67,32 +69,33 @@ def identify(
     calibration = calibration_of(robot, found, [str(bag) for bag in bags])
     if out is not None:
         save_calibration(calibration, out)
-    document: dict[str, Any] = {
+    document = _document(robot, bags, sum(drive.duration_s for _, drive, _ in runs), found, out)
+    if found.untold:
+        names_left = ", ".join(found.untold)
+        warn([f"the runs do not show {names_left}: left out of the calibration. Drive more briskly."])
+    if not found.trusted:
+        log_line(f"note: {found.scale}.")
+    print_result(document, _print, as_json=as_json)
+
+
+def _document(
+    robot: Robot, bags: list[Path], driven_s: float, found: Identified, out: Path | None
+) -> dict[str, Any]:
+    fit = found.fit
+    return {
         "robot": robot.name,
         "bags": [str(bag) for bag in bags],
-        "driven_s": round(sum(drive.duration_s for _, drive, _ in runs), 3),
+        "driven_s": round(driven_s, 3),
         "scale": found.scale,
         "estimates": {
             name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit}
-            for name, e in found.fit.estimates.items()
+            for name, e in fit.estimates.items()
         },
         "untold": list(found.untold),
-        "residuals": dict(zip(("x_m", "y_m", "heading_rad"), found.fit.noise, strict=True)),
-        "windows": found.fit.windows,
+        "residuals": dict(zip(("x_m", "y_m", "heading_rad"), fit.noise, strict=True)),
+        "windows": fit.windows,
         "calibration": None if out is None else str(out),
     }
-    if found.untold:
-        warn(
-            [
-                f"the runs tell nothing of {', '.join(found.untold)}: left out of the calibration. Drive more briskly."
-            ]
-        )
-    if not found.trusted:
-        log_line(f"note: {found.scale}.")
-    if as_json:
-        print_json(document)
-        return
-    _print(document)
 
 
 def _read(text: str, option: str, example: str) -> tuple[str, float, float]:
@@ -125,9 +128,9 @@ def _loads(bags: list[Path], ballast: list[str]) -> tuple[list[int], dict[int, t
 
 
 def _print(document: dict[str, Any]) -> None:
-    table = Table(title=f"{document['robot']}, {document['driven_s']:g} s in {document['windows']} windows")
-    for column in ("", "value", "95 % from", "to", "unit"):
-        table.add_column(column, justify="left" if column in ("", "unit") else "right")
+    title = f"{document['robot']}, {document['driven_s']:g} s in {document['windows']} windows"
+    table = new_table(title, [""], ["value", "95 % from", "to"])
+    table.add_column("unit")
     for name, e in document["estimates"].items():
         table.add_row(name, *(f"{e[part]:.5g}" for part in ("value", "low", "high")), e["unit"])
     output.print(table)

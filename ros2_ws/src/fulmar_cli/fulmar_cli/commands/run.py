@@ -10,15 +10,14 @@ import typer
 
 from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_cli.commands import arguments as cli
-from fulmar_cli.commands.arguments import dated_folder, flag, option, read_area, read_goal, read_pose
+from fulmar_cli.commands.arguments import dated_folder, flag, option
+from fulmar_cli.commands.values import read_area, read_goal, read_pose
 
 RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
     "and the task that takes the goals of --goals."
 )
-GOAL_HELP = (
-    "Where to go, with or without a heading; drawn from the seed by default, as tasks with many targets are."
-)
+GOAL_HELP = "Where to go, with or without a heading; drawn from the seed by default, as many targets are."
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
 ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
@@ -57,7 +56,7 @@ def run(
         float | None, option("S", "Simulated seconds; the task's episode by default.", min=0.1)
     ] = None,
     lockstep: Annotated[
-        bool, flag("--lockstep", "Run as fast as possible; one seed gives the same bytes.")
+        bool, flag("--lockstep", "As fast as possible; one seed gives the same bytes.")
     ] = False,
     rate: cli.RateOption = 1.0,
     control_hz: Annotated[
@@ -68,12 +67,10 @@ def run(
     seed: cli.SeedOption = 0,
     record: cli.RecordOption = None,
     estimator: Annotated[str | None, option("NAME", ESTIMATOR_HELP)] = None,
-    estop: Annotated[
-        bool, flag("--estop", "Run an e-stop node; nothing moves without it. See `fulmar estop`.")
-    ] = False,
+    estop: cli.EstopOption = False,
     end_on_estop: Annotated[bool, flag("--end-on-estop", END_HELP)] = False,
     fallback: Annotated[
-        str | None, option("C", "Classical controller that takes over when the policy is rejected.")
+        str | None, option("C", "Classical controller for when the policy is rejected.")
     ] = None,
     trusted_keys: Annotated[
         Path | None, option("FILE|DIR", "Public keys: reject bundles that none of them has signed.")

@@ -14,7 +14,8 @@ import typer
 from fulmar_bringup.console import write_line
 from fulmar_bringup.progress import live_line
 from fulmar_cli.commands import arguments as cli
-from fulmar_cli.commands.arguments import argument, dated_folder, flag, option, read_pose
+from fulmar_cli.commands.arguments import argument, dated_folder, flag, option
+from fulmar_cli.commands.values import read_pose
 from fulmar_core.exit_codes import DONE, FAILED
 
 RECORDING_HELP = (
@@ -42,7 +43,7 @@ def up(
         str | None, option("x,y,deg", "Where a simulated robot begins; 0,0,0 by default.")
     ] = None,
     rate: cli.RateOption = 1.0,
-    estop: Annotated[bool, flag("--estop", "Run an e-stop node; nothing moves without it.")] = False,
+    estop: cli.EstopOption = False,
     record: cli.RecordOption = None,
     recording: Annotated[str | None, option("whole|ring|goals", RECORDING_HELP)] = None,
     as_json: Annotated[
