@@ -230,4 +230,4 @@ def test_a_rerun_refuses_an_external_controller_and_compares_another(external, r
 @pytest.mark.parametrize("through", ["batch", "mujoco", "ros"])
 def test_an_evaluation_refuses_an_external_controller(through, fulmar):
     words = ("turtlebot2", "go_to_position", "--controller", "external", "--through", through)
-    assert "a node of your own, which no evaluation can begin anew" in complaint(fulmar("evaluate", *words))
+    assert "a node of your own, which no evaluation can restart" in complaint(fulmar("evaluate", *words))

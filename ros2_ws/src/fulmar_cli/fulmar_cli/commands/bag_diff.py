@@ -1,11 +1,11 @@
-"""`fulmar bag diff`: what differs between two bags."""
+"""`fulmar bag diff`: differences between two bags."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated, Any
 
-from fulmar_bringup.console import print_result, write_line
+from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption, argument, option
 from fulmar_cli.commands.damage import finish, open_and_warn
 
@@ -21,7 +21,7 @@ def diff(
 ) -> None:
     """Compare two bags, field by field of every topic, and name what differs first.
 
-    Messages belong together by the stamps in them. Clock, status and diagnostics tell of the machine and differ always;
+    Messages belong together by the stamps in them. Clock, status and diagnostics differ always;
     name them with --topic to see how. Two lock-step runs of one seed are the same.
 
     Messages that cannot be read are compared byte by byte.
@@ -34,6 +34,8 @@ def diff(
     bags = [open_and_warn(bag), open_and_warn(other)]
     found = differing(*bags, tolerance=tolerance, only=topic)
     print_result(found, _show, as_json=as_json)
+    if not as_json and all(each.info for each in bags):
+        log_line(f"to compare the two runs: fulmar report {bag} {other}")
     raise finish(*bags, good=found["same"])
 
 

@@ -1,4 +1,4 @@
-"""`fulmar bag info`: topics, rates, gaps, what is late or missing, and where a bag comes from."""
+"""`fulmar bag info`: topics, rates, gaps, late and missing messages, and the origin of a bag."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ ORIGIN = (
 
 
 def info(bag: BagArgument, as_json: JsonOption = False) -> None:
-    """Tell what is in a bag: topics, types, counts, rates, gaps, late and dropped messages, provenance.
+    """Show what is in a bag: topics, types, counts, rates, gaps, late and dropped messages, provenance.
 
     Rates and gaps go by the stamps in the messages where they have any, else by when they were recorded. A gap is 2.5
     periods without a message; a stamp of 0, which means "not set", counts for none. Late is a message that came more
-    than a period later than usual. Dropped is what must have been there: numbers that the recorder counted and the
-    file lacks, odometry that was answered but is not there.
+    than a period later than usual. Dropped are messages that the recorder counted and the file lacks, and
+    odometry that was answered but is not there.
 
     Exit code: 0 the whole bag was read, 1 part of it could not be, 2 nothing could.
     """
@@ -61,7 +61,7 @@ def _show(found: dict[str, Any]) -> None:
     if found["silent_topics"]:
         write_line(f"announced, without a message: {', '.join(found['silent_topics'])}")
     for fault in found["faults"]:
-        write_line(f"written for a fault at {_when(fault['time_ns'])}: {fault['reason']}")
+        write_line(f"recorded around a fault at {_when(fault['time_ns'])}: {fault['reason']}")
     _show_origin(found["provenance"])
     for line in found["damage"]:
         write_line(f"damage: {line}")
@@ -94,7 +94,7 @@ def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
 
 def _show_origin(origin: dict[str, Any]) -> None:
     if not origin["recorded_by_fulmar"]:
-        write_line("recorded by somebody else: it does not say which code, config and robot made it")
+        write_line("not recorded by Fulmar: code, config and robot are unknown")
         return
     for key in ORIGIN:
         if origin[key] not in (None, ""):
@@ -105,11 +105,11 @@ def _show_origin(origin: dict[str, Any]) -> None:
     if origin["made_by"]:
         write_line(f"on {origin['made_by']['platform']}, Python {origin['made_by']['python']}")
     if origin["recorded_to_its_end"] is False:
-        write_line("the recorder did not come to an orderly end")
+        write_line("the recorder was not shut down in order")
     if origin["controller_sha256"]:
         write_line(f"controller SHA-256: {origin['controller_sha256']}")
     for name, sha256 in origin["attachments"].items():
-        write_line(f"carries {name}, SHA-256 {sha256[:16]}")
+        write_line(f"contains {name}, SHA-256 {sha256[:16]}")
     if origin["config_changed_since"]:
         write_line(f"changed here since then: {', '.join(origin['config_changed_since'])}")
 

@@ -1,4 +1,4 @@
-"""`fulmar bag play`: a bag back onto ROS."""
+"""`fulmar bag play`: publish a bag on ROS again."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def play(
     topic: Annotated[
         list[str] | None, option("TOPIC", "This topic alone, such as odom; may be repeated. All by default.")
     ] = None,
-    wait: Annotated[float, option("S", "Before the first message, for others to find us.", min=0.0)] = 0.5,
+    wait: Annotated[float, option("S", "Wait before the first message, for discovery.", min=0.0)] = 0.5,
     as_json: JsonOption = False,
 ) -> None:
-    """Publish what was recorded, byte for byte, at the pace of the run.
+    """Publish recorded messages, byte for byte, at the pace of the run.
 
     The pace is that of the stamps: a lock-step run, recorded in a second, plays for as long as it lasted. Goals and
-    other latched messages from before --start are told at the start. With --loop time jumps back, as with a restarted
-    plant.
+    other latched messages from before --start are published at the start. With --loop time jumps back, as with a
+    restarted plant.
 
     Try, with a controller listening: fulmar bag play runs/demo_x/lqr --topic odom --topic goal_pose --clock
     """

@@ -1,4 +1,4 @@
-"""`fulmar bag plot`: a bag to look at."""
+"""`fulmar bag plot`: plots of a bag."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def plot(
     bag: BagArgument,
     out: Annotated[
         list[Path] | None,
-        option("FILE", "A page (.html) or a .png picture; may be repeated. By default both, beside the bag."),
+        option("FILE", "A page (.html) or a .png image; may be repeated. By default both, beside the bag."),
     ] = None,
     odometry: Annotated[str | None, option("TOPIC", "Which odometry, where a bag has several.")] = None,
     as_json: JsonOption = False,
@@ -50,7 +50,7 @@ def plot(
 
 
 def _has_a_task(bag: Path) -> bool:
-    """Whether this is a run that can be judged."""
+    """Whether this is a run that can be evaluated."""
     from fulmar_bags.run_reader import read_run
     from fulmar_core.errors import FulmarError
     from fulmar_evaluation.run_evaluation import evaluate_run

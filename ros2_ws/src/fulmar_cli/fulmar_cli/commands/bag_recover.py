@@ -1,4 +1,4 @@
-"""`fulmar bag recover`: a bag that a power cut or a damaged disk left torn, made whole."""
+"""`fulmar bag recover`: repair a bag that a power cut or a damaged disk left torn."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fulmar_core.exit_codes import DONE, FAILED
 
 
 def recover(bag: BagArgument, as_json: JsonOption = False) -> None:
-    """Write the MCAP files of a bag anew with everything that can be read, and their metadata.yaml.
+    """Rewrite the MCAP files of a bag with everything that can be read, and their metadata.yaml.
 
     Where something could not be read, the old file stays beside the new one, with `.damaged` behind its name. Not for
     a bag that is being recorded.

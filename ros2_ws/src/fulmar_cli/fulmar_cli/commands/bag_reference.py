@@ -1,4 +1,4 @@
-"""`fulmar bag reference`: the runs that every later version must answer the same way."""
+"""`fulmar bag reference`: runs that every later version must answer the same way."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def reference(
     """Check that the reference bags are answered as they were recorded, or record them anew.
 
     Each is a short lock-step run. It is run again from its odometry: the gates decide, observations are made, the
-    controller acts, commands are limited. Whatever differs by more than another processor rounds is told, with its
+    controller acts, commands are limited. Each difference beyond the rounding of another processor is shown with its
     field and its step.
 
     Exit code: 0 all are the same, or were recorded; 1 something differs.

@@ -20,17 +20,15 @@ def latency(
     rates: Annotated[
         str, option("HZ,...", "Commands a second, 5 to 500, with commas between.")
     ] = "5,10,20,50,100,200",
-    seconds: Annotated[float, option("S", "Of each cell.", min=1.0)] = 6.0,
-    executors: Annotated[
-        str, option("E,...", "Of events, default: which executor serves the nodes.")
-    ] = "events,default",
+    seconds: Annotated[float, option("S", "Seconds of each measurement.", min=1.0)] = 6.0,
+    executors: Annotated[str, option("E,...", "Executors of the nodes: events, default.")] = "events,default",
     as_json: JsonOption = False,
 ) -> None:
-    """Measure the way of a state through the controller and back to the actuators, at several rates.
+    """Measure the latency from a state through the controller to the actuators, at several rates.
 
     Plant (MuJoCo), controller (the shipped policy of go_to_pose) and recorder are processes, as `fulmar run` has them.
     Latency goes from where the plant publishes its state to where it has taken the command that answers it. Each rate
-    is measured on a machine that does nothing else, and with a busy process for each core; with rclpy's EventsExecutor,
+    is measured on an idle computer, and with a busy process for each core; with rclpy's EventsExecutor,
     which Fulmar uses, and with its default one. Nothing else should run meanwhile. The exit code is 1 unless at 50 Hz
     the 99th percentile is below 3 ms when idle and no watchdog trips under load.
 
@@ -51,14 +49,18 @@ def latency(
 
 
 def endurance(
-    simulated_s: Annotated[float, option("S", "In the robot's own time.", "--seconds", min=10.0)] = 3600.0,
-    rate: Annotated[float, option("F", "Its seconds a second of the wall clock.", min=0.1, max=10.0)] = 1.0,
+    simulated_s: Annotated[
+        float, option("S", "Length, in the robot's own time.", "--seconds", min=10.0)
+    ] = 3600.0,
+    rate: Annotated[
+        float, option("F", "Simulated seconds per second of wall-clock time.", min=0.1, max=10.0)
+    ] = 1.0,
     out: Annotated[
         Path | None, option("DIR", "Folder of the bag; runs/benchmark/<time>... by default.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run a system at 50 Hz of its own time for an hour: no memory may grow, and no command be lost in the bag.
+    """Run a system at 50 Hz of its own time for an hour: memory must not grow, and the bag must hold every command.
 
     The exit code is 1 if a node grows by 5 MB or more after a tenth of the time, or if the bag lacks a command that
     the plant has taken.

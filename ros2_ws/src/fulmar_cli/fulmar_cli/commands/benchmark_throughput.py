@@ -1,4 +1,4 @@
-"""`fulmar benchmark throughput`: how fast the batch simulates, beside MuJoCo."""
+"""`fulmar benchmark throughput`: the speed of the batch simulation beside MuJoCo."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def throughput(
         str | None,
         option(
             "compiled|numpy|torch",
-            "Who computes the batch: on cpu a compiled kernel (which takes torch and g++) or else numpy, on cuda "
+            "What computes the batch: on cpu a compiled kernel (which takes torch and g++) or else numpy, on cuda "
             "torch.",
         ),
     ] = None,
@@ -35,7 +35,7 @@ def throughput(
 ) -> None:
     """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
 
-    A step of the batch has all that training asks for: disturbances, odometry, observation, reward and new episodes.
+    A step of the batch has all that training needs: disturbances, odometry, observation, reward and new episodes.
     MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
     the medians are printed. Robots on water are also rolled out by MuJoCo in the water of the plant ("in water").
     Before that a step of each robot is compiled, which takes 10 to 30 s.
@@ -87,7 +87,7 @@ def throughput(
 
 
 def _fastest(device: str) -> str:
-    """The library that makes most steps here."""
+    """The fastest library here."""
     from importlib.util import find_spec
 
     if device != "cpu":
@@ -102,7 +102,7 @@ def _fastest(device: str) -> str:
 
 
 def _check_device(device: str, library: str) -> None:
-    """Refuse devices that the library or the machine does not have."""
+    """Reject a device that the library or this computer does not have."""
     if device != "cuda":
         return
     if library != "torch":
@@ -133,7 +133,7 @@ def _print(figures: dict[str, Any]) -> None:
 
 
 def _afloat(found: dict[str, float]) -> tuple[str, ...]:
-    """What is measured of robots on water alone."""
+    """Figures of robots on water; none for others."""
     if "ratio_with_water" not in found:
         return ()
     return f"{found['mujoco_with_water_steps_per_s']:,.0f}", f"{found['ratio_with_water']:.1f}"

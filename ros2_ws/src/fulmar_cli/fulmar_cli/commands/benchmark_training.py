@@ -37,24 +37,26 @@ def training(
     numbers = range(1, seeds + 1)
     jobs = benchmark_jobs(robot, task, seeds=numbers, seconds=seconds, check_every_s=check_every, out=out)
     with JobBars([job.name for job in jobs]) as bars:
-        told = compare(jobs, LocalExecutor(at_once), bars)
-    print_result(told, _print_comparison, as_json=as_json)
-    if told["failed"]:
+        result = compare(jobs, LocalExecutor(at_once), bars)
+    print_result(result, _print_comparison, as_json=as_json)
+    if result["failed"]:
         raise typer.Exit(FAILED)
 
 
-def _print_comparison(told: dict[str, Any]) -> None:
-    for failure in told["failed"]:
+def _print_comparison(result: dict[str, Any]) -> None:
+    for failure in result["failed"]:
         write_line(f"failed: {failure}")
-    kinds = [kind for kind in ("stock", "fast") if kind in told]
-    output.print(f"{told['robot']} · {told['task']}: success as lowest – median – highest", soft_wrap=True)
+    kinds = [kind for kind in ("stock", "fast") if kind in result]
+    output.print(
+        f"{result['robot']} · {result['task']}: success as lowest – median – highest", soft_wrap=True
+    )
     output.print(f"{'':<14}" + "".join(f"{kind:^26}" for kind in kinds))
-    output.print(f"{'steps/s':<14}" + "".join(f"{told[kind]['steps_per_s']:^26,.0f}" for kind in kinds))
-    arrivals = [told[kind]["time_to_0.9_s"] for kind in kinds]
+    output.print(f"{'steps/s':<14}" + "".join(f"{result[kind]['steps_per_s']:^26,.0f}" for kind in kinds))
+    arrivals = [result[kind]["time_to_0.9_s"] for kind in kinds]
     cells = ["never" if value is None else f"{value:.0f} s" for value in arrivals]
     output.print(f"{'success 0.9':<14}" + "".join(f"{cell:^26}" for cell in cells))
-    for rows in zip(*(told[kind]["curve"] for kind in kinds), strict=True):
+    for rows in zip(*(result[kind]["curve"] for kind in kinds), strict=True):
         cells = [f"{row['lowest']:.3f} – {row['success']:.3f} – {row['highest']:.3f}" for row in rows]
         output.print(f"{rows[0]['wall_s']:>8.0f} s    " + "".join(f"{cell:^26}" for cell in cells))
-    if "speed_ratio" in told:
-        output.print(f"fast is {told['speed_ratio']:.1f} times as fast as stock")
+    if "speed_ratio" in result:
+        output.print(f"fast is {result['speed_ratio']:.1f} times as fast as stock")

@@ -1,4 +1,4 @@
-"""`fulmar bundle`: look at a policy bundle, or check that it would be accepted."""
+"""`fulmar bundle`: show, sign and check policy bundles."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ import typer
 from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
 
-bundle = typer.Typer(
-    help="Look at policy bundles, and check them.", no_args_is_help=True, rich_markup_mode=None
-)
+bundle = typer.Typer(help="Show, sign and check policy bundles.", no_args_is_help=True, rich_markup_mode=None)
 FolderArgument = Annotated[Path, argument("DIR", "A policy bundle.")]
 
 

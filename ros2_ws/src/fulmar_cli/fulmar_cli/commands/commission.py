@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 def commission(
     hardware: Annotated[str, argument("HARDWARE", "A name from `fulmar list hardware`, or a .yaml file.")],
     yes: Annotated[
-        bool, flag("--yes", "The robot may move: the air is open and 0.5 m around it are free.")
+        bool, flag("--yes", "The robot can move: the air is open and 0.5 m around it are free.")
     ] = False,
     arm: ArmOption = False,
-    port: Annotated[str, option("P", "Takes the place of the hardware file's port.")] = "",
+    port: Annotated[str, option("P", "Port to use in place of the hardware file's.")] = "",
     write: Annotated[bool, flag("--write", "Write what was found into the hardware file.")] = False,
     out: Annotated[Path | None, option("FILE", "Write the corrected hardware file here instead.")] = None,
-    emulate: Annotated[bool, flag("--emulate", "An emulator speaks for the device.")] = False,
+    emulate: Annotated[bool, flag("--emulate", "An emulator replaces the device.")] = False,
     wiring: Annotated[
         str, option("W", "With --emulate: as_written, shuffled, inverted or dead (one wire, by --seed).")
     ] = "as_written",

@@ -1,4 +1,4 @@
-"""One rule for all that read bags: damage is named, and the exit code tells of it."""
+"""Damage of bags: every command that reads bags warns of it and ends with exit code 1."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def open_and_warn(path: Path) -> Bag:
-    """Open a bag, and name what of it could not be read.
+    """Open a bag, and warn of parts that could not be read.
 
     Raises:
         BagError: As `open_bag`.

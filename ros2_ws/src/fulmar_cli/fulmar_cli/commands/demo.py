@@ -1,4 +1,4 @@
-"""`fulmar demo`: the whole thing in a minute."""
+"""`fulmar demo`: two recorded runs and a report in a minute."""
 
 from __future__ import annotations
 

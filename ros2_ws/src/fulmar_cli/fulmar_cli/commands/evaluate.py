@@ -1,4 +1,4 @@
-"""`fulmar evaluate`: many episodes, every figure."""
+"""`fulmar evaluate`: evaluate a controller over many episodes."""
 
 from __future__ import annotations
 

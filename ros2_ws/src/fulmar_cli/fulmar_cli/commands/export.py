@@ -1,4 +1,4 @@
-"""`fulmar export`: a policy bundle out of a training run."""
+"""`fulmar export`: make a policy bundle from a training run."""
 
 from __future__ import annotations
 

@@ -23,9 +23,7 @@ def goals(
             "A name from `fulmar list goals`, or a path that ends in .yaml; without it they are listed.",
         ),
     ] = None,
-    robot: Annotated[
-        str | None, option("R", "Type of the robot that is to do it: a name from `fulmar list robots`.")
-    ] = None,
+    robot: Annotated[str | None, option("R", "Type of the robot: a name from `fulmar list robots`.")] = None,
     robot_name: NameOption = None,
     pose: Annotated[
         str | None,
@@ -36,16 +34,16 @@ def goals(
         ),
     ] = None,
     as_path: Annotated[
-        bool, flag("--as-path", "Tell all positions or poses at once, for tasks that pass through them.")
+        bool, flag("--as-path", "Send all positions or poses at once, for tasks that pass through them.")
     ] = False,
-    control_hz: Annotated[float, option("HZ", "Velocities come so often along a path.", min=0.01)] = 10.0,
+    control_hz: Annotated[float, option("HZ", "Rate of velocities along a path.", min=0.01)] = 10.0,
     wait: Annotated[
         bool, flag("--wait", f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default.")
     ] = False,
 ) -> None:
-    """Tell a running robot its goals, one after the other, until they are done or Ctrl-C.
+    """Send a running robot its goals, one after the other, until they are done or Ctrl-C.
 
-    Positions, poses, velocities by the clock, or a path to follow: a file in configs/goals says which; or one pose or
+    Positions, poses, velocities by the clock, or a path to follow: from a file in configs/goals; or one pose or
     position from the command line. The robot must be up, with a controller whose task takes such goals; velocities end
     in standstill.
 
@@ -82,7 +80,7 @@ def goals(
     the_robot = load_robot(robot)
     given = None if place is None else single_goal(place)
     file = given or load_goals(name or "")
-    goal_sequence(file, the_robot, as_path=as_path)  # whatever is wrong is said in one line
+    goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot)
     spec = goals_spec(
         robot,

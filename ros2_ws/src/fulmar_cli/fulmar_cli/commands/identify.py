@@ -1,4 +1,4 @@
-"""`fulmar identify`: from driven runs to the numbers of the machine that drove them."""
+"""`fulmar identify`: parameters of a robot estimated from its runs."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def identify(
 ) -> None:
     """Estimate mass, inertia, thrust, drag, wheel scale and delay from runs, with intervals of 95 % confidence.
 
-    Motion shows forces only in proportion to mass. For a platform with thrusters, say one thing more: its mass, or the
+    Motion shows forces only in proportion to mass. For a platform with thrusters, give one more value: its mass, or the
     mass of a ballast that was aboard during one of two runs. ERROR is half of a 95 % interval; without it VALUE counts
-    as exact. A boat takes the thrust curve of its YAML for true.
+    as exact. For a boat the thrust curve of its YAML is taken as exact.
 
     Try:
 
@@ -99,7 +99,7 @@ def _document(
 
 
 def _read(text: str, option: str, example: str) -> tuple[str, float, float]:
-    """Read `NAME=VALUE` or `NAME=VALUE+-ERROR`; a name may hold anything, as paths do."""
+    """Read `NAME=VALUE` or `NAME=VALUE+-ERROR`; a name can be a path."""
     name, _, quantity = text.rpartition("=")
     match = _QUANTITY.fullmatch(quantity.strip())
     if not name or match is None or float(match["value"]) <= 0.0:

@@ -1,4 +1,4 @@
-"""`fulmar import`: a policy bundle out of a policy that another stack trained."""
+"""`fulmar import`: make a policy bundle from a policy of another stack."""
 
 from __future__ import annotations
 

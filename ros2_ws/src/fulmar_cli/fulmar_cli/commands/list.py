@@ -1,4 +1,4 @@
-"""`fulmar list`: what there is."""
+"""`fulmar list`: names of robots, tasks, controllers and other files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def list_names(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the robots, tasks, controllers, policies, scenarios and files of other kinds there are.
+    """List robots, tasks, controllers, policies, scenarios and other files by name.
 
     Your own come with them: FULMAR_CONFIGS names folders that have `robots/`, `tasks/` and so on.
 

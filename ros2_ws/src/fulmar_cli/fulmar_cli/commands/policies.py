@@ -20,15 +20,13 @@ def policies(
     ] = None,
     out: Annotated[Path | None, option("DIR", "Folder of the bundles; the shipped ones by default.")] = None,
     runs: Annotated[Path, option("DIR", "Folder of the run folders.")] = Path("runs/policies"),
-    anew: Annotated[
-        bool, flag("--anew", "From the beginning, also what is made; it is kept beside its run.")
-    ] = False,
+    anew: Annotated[bool, flag("--anew", "Make all anew; what exists is moved beside its run.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make the shipped policies of configs/policies.yaml: train, judge in MuJoCo, export.
+    """Make the shipped policies of configs/policies.yaml: train, evaluate in MuJoCo, export.
 
-    A bundle that was made from the same robot, task, scenario, settings, seed and updates is left as it is; a run that
-    was broken off is resumed. So the command can be repeated until everything is there. The same seed and updates make
+    A bundle that was made from the same robot, task, scenario, settings, seed and updates is left as it is; an
+    interrupted run is resumed. So the command can be repeated until everything exists. The same seed and updates make
     the same weights on the same kind of processor.
 
     Try:
@@ -65,7 +63,9 @@ def policies(
     for job in jobs if anew else []:
         if aside := set_aside(job):
             log_line(f"{job.name}: the old one is in {aside}")
-    console.print(f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the judging")
+    console.print(
+        f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the evaluation"
+    )
     with JobBars([job.name for job in missing]) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
     if as_json:

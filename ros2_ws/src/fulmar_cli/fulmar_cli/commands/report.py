@@ -1,4 +1,4 @@
-"""`fulmar report`: one or several bags as a page to look at."""
+"""`fulmar report`: a page about one or several bags."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ def report(
     out: Annotated[
         Path | None,
         option(
-            "FILE", "An .html page or a .png picture; by default report.html in the bag, or comparison.html."
+            "FILE", "An .html page or a .png image; by default report.html in the bag, or comparison.html."
         ),
     ] = None,
     task: Annotated[
         str | None, option("T", "Task of the runs, where a bag names none; from `fulmar list tasks`.")
     ] = None,
     robot: Annotated[str | None, option("R", "Robot of the runs, where a bag names none.")] = None,
-    force: Annotated[bool, flag("--force", "Replace FILE even if it is no report of the same bags.")] = False,
+    force: Annotated[
+        bool, flag("--force", "Replace FILE even if it is not a report of the same bags.")
+    ] = False,
 ) -> None:
-    """Make a report with pictures from recorded runs.
+    """Make a report with plots from recorded runs.
 
     Bags of controllers and recorders that are not Fulmar's need --task. Without it, or where a bag holds no goal, the
     report has the path, the speed, the actuators and the rates, and says what is missing.

@@ -77,18 +77,14 @@ def run(
     ] = None,
     area: Annotated[str | None, option("x,x,y,y", AREA_HELP)] = None,
     max_run_time: Annotated[
-        float | None,
-        option("S", "Stop the robot after so many acting seconds; no limit by default.", min=0.1),
+        float | None, option("S", "Longest acting time [s]; no limit by default.", min=0.1)
     ] = None,
     recording: Annotated[str | None, option("whole|ring", RECORDING_HELP)] = None,
     copies: Annotated[
         int, option("N", "Times each command is sent, for networks that lose some.", min=1, max=3)
     ] = 1,
     controller_network: Annotated[
-        str,
-        option(
-            "NETNS", "Linux network namespace of the controller, as on another computer.", "--controller-in"
-        ),
+        str, option("NETNS", "Linux network namespace of the controller.", "--controller-in")
     ] = "",
     mocap_hz: Annotated[
         float, option("HZ", "Rate of a simulated motion capture; 200 in the Zero-G Lab.", min=0.0, max=1000.0)

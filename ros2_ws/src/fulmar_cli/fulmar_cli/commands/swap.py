@@ -1,4 +1,4 @@
-"""`fulmar swap`: go on with another policy, while a robot is driven by one."""
+"""`fulmar swap`: replace the policy of a running robot."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def swap(
     folder: Annotated[Path, argument("DIR", "A policy bundle, on the robot's own disk.")],
     as_json: JsonOption = False,
 ) -> None:
-    """Let a running robot go on with another policy.
+    """Replace the policy of a running robot.
 
     It is loaded and warmed up beside the one that runs, and takes over between two commands. A bundle that is damaged,
-    for another robot, task or rate, or not signed where that is asked for, is refused, and the policy that runs goes
-    on. Exit code 1 then.
+    for another robot, task or rate, or not signed where a signature is required, is refused, and the running policy
+    goes on. Exit code 1 then.
 
     Try:
 

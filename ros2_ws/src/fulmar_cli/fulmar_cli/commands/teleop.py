@@ -1,4 +1,4 @@
-"""`fulmar teleop`: take a running robot by hand."""
+"""`fulmar teleop`: drive a running robot by hand."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ def teleop(
     keyboard: Annotated[
         bool, flag("--keyboard/--no-keyboard", "Read keys from this terminal, beside the topic joy.")
     ] = True,
-    share: Annotated[float, option("F", "Of what the robot can, at full wish.", min=0.01, max=1.0)] = 0.5,
-    give_back: Annotated[bool, flag("--give-back", "Only give the robot back to its controller.")] = False,
+    share: Annotated[
+        float, option("F", "Share of the robot's limits at full deflection.", min=0.01, max=1.0)
+    ] = 0.5,
+    give_back: Annotated[bool, flag("--give-back", "Only return the robot to its controller.")] = False,
 ) -> None:
-    """Drive a running robot by keyboard or gamepad; a hand goes before the controller.
+    """Drive a running robot by keyboard or gamepad, with priority over the controller.
 
-    Hold a key, or the gamepad's left shoulder button: that is the dead-man switch. Let go, and the robot stands still;
-    so it does if this command dies. The controller gets it back with g, with the right shoulder button, or with
-    --give-back.
+    Hold a key or the gamepad's left shoulder button: that is the dead-man switch. The robot stops when it is released
+    or this command dies. The controller takes over again with g, with the right shoulder button, or with --give-back.
 
     Try:
 
@@ -39,7 +40,7 @@ def teleop(
     from fulmar_core.robot import load_robot
     from fulmar_core.topics import GIVE_BACK
 
-    load_robot(robot)  # a wrong name is told in one line
+    load_robot(robot)  # rejects a wrong name
     name = robot if name is None else checked_name(name)
     space = namespace_of(name)
     if give_back:
@@ -47,7 +48,7 @@ def teleop(
 
         with operator() as person:
             if not person.robots_with(GIVE_BACK, name, wait_s=FIND_S):
-                raise RunFailed(f"no plant of '{name}' is heard in this ROS domain. {person.heard_words()}")
+                raise RunFailed(f"no plant of '{name}' publishes in this ROS domain. {person.heard_words()}")
             done, words = person.ask(f"{space}/{GIVE_BACK}")
         write_line(words)
         raise typer.Exit(0 if done else FAILED)
