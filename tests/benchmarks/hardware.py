@@ -16,7 +16,6 @@ from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
-from hardware_drivers.settings import MavlinkBoat, load_hardware
 from tests.benchmarks.closed_loops import Command
 
 
@@ -30,16 +29,22 @@ class HardwareCase:
     @property
     def robot(self) -> str:
         """Whose device it is."""
+        from hardware_drivers.settings import load_hardware
+
         return load_hardware(self.name).robot
 
     def prepared(self, _seed: int) -> contextlib.AbstractContextManager[Command]:
         """An emulator stands in for the device."""
+        from hardware_drivers.settings import MavlinkBoat, load_hardware
+
         arm = ("--arm",) if isinstance(load_hardware(self.name).driver, MavlinkBoat) else ()
         device = ("--backend", "hardware", "--hardware", self.name, "--emulate", *arm)
         return contextlib.nullcontext(Command((), device, {}))
 
     def about(self) -> dict[str, Any]:
         """The device and what drives it."""
+        from hardware_drivers.settings import load_hardware
+
         return {"hardware": self.name, "driver": load_hardware(self.name).driver.kind}
 
 
