@@ -65,9 +65,9 @@ def check_plan(plan: RunPlan, *, backend: str = "") -> None:
     """
     from fulmar_bringup.system import gains_note, modules_of
 
-    for name in dict.fromkeys((plan.controller, plan.guards.fallback)):
-        if note := gains_note(plan.robot, name):
-            log_line(f"info: {note}")
+    notes = [gains_note(plan.robot, name) for name in (plan.controller, plan.guards.fallback)]
+    for note in dict.fromkeys(filter(None, notes)):
+        log_line(f"info: {note}")
     require(
         *modules_of(
             plan.controller,
