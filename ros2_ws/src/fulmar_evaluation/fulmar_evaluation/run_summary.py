@@ -235,5 +235,7 @@ def summary_text(summary: dict[str, Any]) -> str:
     if summary["beliefs"]:
         lines.append(f"  at the end: {summary['beliefs']}")
     bag = summary["bag"]
-    lines.append("  nothing was recorded" if bag is None else f"  recorded in {bag}; view it: fulmar report {bag}")
+    lines.append(
+        "  nothing was recorded" if bag is None else f"  recorded in {bag}; view it: fulmar report {bag}"
+    )
     return "\n".join(lines)
