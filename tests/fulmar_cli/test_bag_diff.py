@@ -142,5 +142,7 @@ def test_a_diff_names_the_field_and_the_time_of_the_first_difference(copy, tmp_p
 
 
 def test_a_diff_of_two_runs_ends_with_the_command_that_compares_runs():
-    assert ask("diff", POLICY, LQR).output.endswith(f"to compare the two runs: fulmar report {POLICY} {LQR}\n")
+    assert ask("diff", POLICY, LQR).output.endswith(
+        f"to compare the two runs: fulmar report {POLICY} {LQR}\n"
+    )
     assert "fulmar report" not in ask("diff", POLICY, LQR, "--json").output

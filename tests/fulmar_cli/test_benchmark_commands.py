@@ -56,5 +56,8 @@ def test_the_old_name_of_an_option_works_is_hidden_and_warns():
     assert "--picture" not in run(app, ["--help"]).output
     done = run(app, ["--picture", "a.png"])
     assert done.stdout == "a.png\n"
-    assert done.stderr == "warning: --picture is now called --plot; the old name will be removed in the next release\n"
+    assert (
+        done.stderr
+        == "warning: --picture is now called --plot; the old name will be removed in the next release\n"
+    )
     assert run(app, ["--plot", "a.png"]).stderr == ""
