@@ -27,7 +27,7 @@ from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.settings import ThrustTopic, ValveTopic, VelocityTopic, load_hardware
-from hardware_drivers.valve_message import from_message
+from hardware_drivers.valves import from_message
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches whatever they offer
 PLANT = "plant"  # name of driver nodes

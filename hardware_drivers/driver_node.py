@@ -29,7 +29,7 @@ from hardware_drivers.settings import (
     load_hardware,
 )
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
-from hardware_drivers.valve_message import to_message
+from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channel_velocity, channels
 
 

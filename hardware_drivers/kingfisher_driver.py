@@ -12,12 +12,10 @@ from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
 from hardware_drivers import kingfisher_protocol as protocol
-from hardware_drivers.attitude import attitude
-from hardware_drivers.device_time import DeviceTime
 from hardware_drivers.driver import DeviceDriver
-from hardware_drivers.feedback import Feedback, Report
-from hardware_drivers.local_frame import LocalFrame
-from hardware_drivers.nmea import Decoder
+from hardware_drivers.earth_frame import LocalFrame, attitude
+from hardware_drivers.feedback import DeviceTime, Feedback, Report
+from hardware_drivers.kingfisher_protocol import Decoder
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import KingfisherNmea
 from hardware_drivers.wiring import channels

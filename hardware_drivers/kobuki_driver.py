@@ -11,9 +11,8 @@ import numpy as np
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
-from hardware_drivers.device_time import DeviceTime
 from hardware_drivers.driver import DeviceDriver
-from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.feedback import DeviceTime, Feedback, Report
 from hardware_drivers.kobuki_protocol import (
     COUNT,
     WHEEL_RADIUS,
@@ -25,8 +24,7 @@ from hardware_drivers.kobuki_protocol import (
 )
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import Kobuki
-from hardware_drivers.standing_wheels import StandingWheels
-from hardware_drivers.wheel_odometry import WheelOdometry
+from hardware_drivers.wheel_odometry import StandingWheels, WheelOdometry
 from hardware_drivers.wiring import channel_velocity
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous

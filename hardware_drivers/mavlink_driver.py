@@ -22,7 +22,7 @@ from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.ports import patiently, write_at_once
 from hardware_drivers.settings import UNARMED, MavlinkBoat
-from hardware_drivers.thrust import bounded
+from hardware_drivers.wiring import bounded
 from hardware_drivers.wiring import channels as wired
 
 Address = tuple[int, int]  # system and component

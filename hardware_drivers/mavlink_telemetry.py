@@ -8,9 +8,8 @@ import numpy as np
 
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
-from hardware_drivers.attitude import attitude
-from hardware_drivers.device_time import DeviceTime
-from hardware_drivers.feedback import Report
+from hardware_drivers.earth_frame import attitude
+from hardware_drivers.feedback import DeviceTime, Report
 
 MILLI_G = 9.80665e-3  # [m/s²]
 FRESH_MS = 200.0  # an attitude that differs more in time says nothing about a position

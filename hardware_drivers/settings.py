@@ -11,7 +11,7 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.own_class import check_class_path
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Actuators, load_robot
-from hardware_drivers.valve_orders import VALVE_ORDERS
+from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
 
 ValveMessage = Literal["int16", "byte", "uint8"]

@@ -12,7 +12,7 @@ from fulmar_core.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.gpio import LineRequest, line_of, output_lines
 from hardware_drivers.settings import GpioValves
-from hardware_drivers.valve_timing import ValveTiming
+from hardware_drivers.valves import ValveTiming
 
 STATES = {False: Value.INACTIVE, True: Value.ACTIVE}
 

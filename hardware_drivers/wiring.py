@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 SIDES = ("left", "right")
@@ -54,3 +55,14 @@ def channel_velocity(
     half = 0.5 * track * turn_rate
     left, right = channels(wiring, speed - half, speed + half)
     return 0.5 * (left + right), (right - left) / track
+
+
+def bounded(left: float, right: float) -> tuple[float, float]:
+    """Shares of full thrust within -1 to 1.
+
+    Where one is no finite number, both propellers stand: `min` and `max` would make full thrust of it, and one alone
+    would turn the boat.
+    """
+    if not (math.isfinite(left) and math.isfinite(right)):
+        return 0.0, 0.0
+    return max(-1.0, min(1.0, left)), max(-1.0, min(1.0, right))

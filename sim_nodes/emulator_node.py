@@ -33,12 +33,10 @@ from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node, settle_memory
-from sim_nodes.emulators.device import EmulatedDevice
+from sim_nodes.emulators.device import EmulatedDevice, Link, PtyLink, TcpLink
 from sim_nodes.emulators.kingfisher import KingfisherEmulator
 from sim_nodes.emulators.kobuki import KobukiEmulator
-from sim_nodes.emulators.links import Link, PtyLink, TcpLink
-from sim_nodes.emulators.topics import BASE_TIMEOUT_S, FOR_EVER_S, TopicDevice, ValveNode
-from sim_nodes.emulators.valves import ValveBank
+from sim_nodes.emulators.outputs import BASE_TIMEOUT_S, FOR_EVER_S, TopicDevice, ValveBank, ValveNode
 from sim_nodes.emulators.wiring import STRAIGHT, Wiring
 from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.on_air import OnAir

@@ -15,7 +15,7 @@ from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_core.things import Thing
 from sim_nodes.mujoco_model import Scene
-from sim_nodes.mujoco_model.obstacles import radii_for
+from sim_nodes.mujoco_model.objects import radii_for
 from sim_nodes.one_world import OneWorld
 
 SENSORS = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), ("accelerometer", 3))

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.metrics import summary
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import roll_out_in_backends
-from fulmar_core.tasks import load_task
-from sim_nodes.mujoco_backend import MujocoBackend
-from training.network import NetworkController, load_network
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.seeds import EVALUATION_SEED, HELD_OUT_SEED
+from fulmar_core.tasks import Task, load_task
+from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
 
 
@@ -27,6 +28,8 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
     Returns:
         Success rate and every metric.
     """
+    from sim_nodes.mujoco_backend import MujocoBackend  # only here: learning itself needs no MuJoCo
+
     record = read_run_record(run)
     robot, task, world = load_robot(record["robot"]), load_task(record["task"]), load_scenario(scenario)
     controller = NetworkController(load_network(run / NETWORK_FILE), robot, task, record["control_hz"])
@@ -36,9 +39,58 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
         task,
         world,
         episodes=episodes,
-        seed=JUDGE_SEED,
+        seed=EVALUATION_SEED,
     )
     figures: dict[str, Any] = summary(trajectories, task)
-    record["mujoco"] = {"scenario": scenario, "seed": JUDGE_SEED, **figures}
+    record["mujoco"] = {"scenario": scenario, "seed": EVALUATION_SEED, **figures}
     write_run_record(run, record)
     return figures
+
+
+EPISODES = 256  # of each scenario
+Judge = Callable[[DeployedNetwork], tuple[float, float]]  # success rate and score
+
+# What a figure adds to the score beside success, where a task has it: precision, then economy.
+_WORTH = {
+    "PT2_percent": 0.005,
+    "OT2_percent": 0.001,
+    "goals_reached": 0.05,
+    "velocity_error_m_s": -1.0,
+    "yaw_rate_error_deg_s": -0.02,
+    "effort": -0.5,
+    "control_variation": -0.05,
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """One look at the learner on held-out episodes, in the batch."""
+
+    wall_s: float
+    steps: int
+    success_rate: float  # mean of the training scenario and the nominal one
+    score: float  # orders checks: success first, then precision, then economy
+
+
+def held_out_judge(robot: Robot, task: Task, scenario: Scenario) -> Judge:
+    """Judge in the training scenario and in the nominal one: a network may be good at either alone."""
+    worlds = (scenario, load_scenario("nominal"))
+
+    def judge(network: DeployedNetwork) -> tuple[float, float]:
+        controller = NetworkController(network, robot, task, robot.timing.control_hz)
+        figures = [
+            summary(
+                roll_out_in_batch(controller, robot, task, world, episodes=EPISODES, seed=HELD_OUT_SEED), task
+            )
+            for world in worlds
+        ]
+        success = _mean(figures, "success_rate")
+        worth = (weight * _mean(figures, name) for name, weight in _WORTH.items() if name in figures[0])
+        return success, success + sum(worth)
+
+    return judge
+
+
+def _mean(figures: list[dict[str, Any]], name: str) -> float:
+    values = [each[name]["mean"] if isinstance(each[name], dict) else each[name] for each in figures]
+    return float(sum(value or 0.0 for value in values)) / len(values)

@@ -160,7 +160,7 @@ def _shared(job: Job, settings: TrainingSettings) -> tuple[Job, Job]:
 def _curves(job: Job) -> KVWriter | None:
     if not job.wandb:
         return None
-    from training.wandb_curves import WandbCurves
+    from training.progress import WandbCurves
 
     return WandbCurves(job.out, project=job.wandb, name=job.name, settings=asdict(job.settings))
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
-from collections.abc import Callable
+import types
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,11 +17,11 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from training.checkpoint import save_checkpoint
-from training.checks import Check, Judge
 from training.deploy import deployed_network
+from training.evaluator import Check, Judge
 from training.fallback_policy import Specialist
+from training.learners import KlAdaptiveRate
 from training.network import DeployedNetwork
-from training.ppo import KlAdaptiveRate
 from training.progress import Watcher
 from training.settings import TrainingSettings
 from training.vec_env import BatchVecEnv
@@ -190,3 +194,23 @@ class Session(BaseCallback):
         self.story.elapsed_s = self.elapsed_s
         more: dict[str, Any] = {"story": self.story}
         save_checkpoint(self._checkpoint, self.model, more)
+
+
+@contextmanager
+def polite_interrupt() -> Iterator[threading.Event]:
+    """Let the first Ctrl-C only ask for an end, and a second one break off at once."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked
+        return
+
+    def ask(number: int, frame: types.FrameType | None) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)

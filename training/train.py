@@ -15,15 +15,14 @@ from stable_baselines3.common.logger import KVWriter, configure
 from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import JUDGING_SEEDS
 from fulmar_core.errors import ConfigError
 from fulmar_core.geofence import check_starts
 from fulmar_core.robot import Robot
+from fulmar_core.seeds import EVALUATION_SEEDS
 from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint
-from training.checks import held_out_judge
+from training.evaluator import held_out_judge
 from training.fallback_policy import Specialist
-from training.interrupt import polite_interrupt
 from training.learners import build_learner, callbacks_of
 from training.network import save_network
 from training.progress import LearningBar, Watcher
@@ -36,7 +35,7 @@ from training.run_folder import (
     write_run_record,
     write_start,
 )
-from training.session import Limits, RunIsOver, Session, Story
+from training.session import Limits, RunIsOver, Session, Story, polite_interrupt
 from training.settings import OffPolicy, TrainingSettings, write_training_settings
 from training.vec_env import BatchVecEnv
 
@@ -47,8 +46,8 @@ def check_seed(seed: int) -> None:
     Raises:
         ConfigError: If the seed is negative, or one of those kept for judging.
     """
-    if seed < 0 or seed in JUDGING_SEEDS:
-        kept = " and ".join(str(kept) for kept in JUDGING_SEEDS)
+    if seed < 0 or seed in EVALUATION_SEEDS:
+        kept = " and ".join(str(kept) for kept in EVALUATION_SEEDS)
         raise ConfigError(f"seed {seed} must not be negative, nor {kept}, which are kept for judging.")
 
 
@@ -96,7 +95,7 @@ def train(
         robot: The robot.
         task: The task.
         settings: How to learn.
-        seed: Seed of everything random, >= 0, and none of `JUDGING_SEEDS`.
+        seed: Seed of everything random, >= 0, and none of `EVALUATION_SEEDS`.
         out: Run folder; made if need be.
         time_limit_s: Wall-clock of learning; the settings' by default, none if `updates` are given [s].
         updates: How many updates to do; as many as there is time for by default.

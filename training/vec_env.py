@@ -25,8 +25,7 @@ from fulmar_core.tasks import Task
 from training.compiled import step_of
 from training.disturbance_inputs import ToldTruth
 from training.incremental_actions import KINDS, check_orders, shares_asked
-from training.spaces import action_space, observation_space, shares_space
-from training.uncontrollable import asked_for
+from training.worlds import action_space, asked_for, observation_space, shares_space
 
 
 class BatchVecEnv(VecEnv):

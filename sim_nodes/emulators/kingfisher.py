@@ -12,7 +12,7 @@ import numpy as np
 from fulmar_core.backend import Sample
 from fulmar_core.rotation import rotate_inverse
 from fulmar_core.state import RigidBodyState
-from sim_nodes.emulators.links import Link
+from sim_nodes.emulators.device import Link
 
 TIMEOUT_S = 0.5  # without $PYDIR for so long the propellers stand (heron_controller)
 NAVIGATION_S, INERTIAL_S, BATTERY_S = 0.1, 0.05, 1.0  # periods of the sentences; our values

@@ -21,7 +21,6 @@ from typing import Any, Protocol
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_core.atomic_write import write_whole
-from fulmar_core.tasks import load_task
 
 REQUIRED = 0.95  # share of episodes that reach their goal
 SLACK_S = 120.0  # what starting and stopping may take on a busy machine
@@ -82,6 +81,8 @@ class Campaign:
 
     def seconds_of(self, case: Case) -> float:
         """Length of a case's episodes [s]."""
+        from fulmar_core.tasks import load_task  # here, so that `fulmar --help` needs no NumPy
+
         return self.seconds or load_task(case.task).episode_s
 
 

@@ -101,7 +101,7 @@ def serve(arguments: argparse.Namespace) -> None:
     from fulmar_ros.controller_node import ControllerNode
     from fulmar_ros.controller_wires import ControllerWires
     from fulmar_ros.goal_messages import goal_message
-    from policy_server.shipped import policies_directory
+    from policy_server.controllers import policies_directory
 
     policy = policies_directory() / f"{arguments.robot}_{arguments.task}"
     plan = RunPlan(

@@ -84,7 +84,7 @@ def test_every_key_is_written_down(document):
 
 def test_what_was_evaluated_before_is_taken_from_the_folder(document, folder):
     again = run(FEW, "--output", str(folder), "--json", "--no-report")
-    assert again.stderr.count("judged before") == 3
+    assert again.stderr.count("evaluated before") == 3
     timing = {"wall_s", "command"}
     assert {k: v for k, v in json.loads(again.stdout).items() if k not in timing} == {
         k: v for k, v in document.items() if k not in timing

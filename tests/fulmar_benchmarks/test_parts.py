@@ -17,7 +17,7 @@ from fulmar_benchmarks.roboran.campaign import document_of
 from fulmar_benchmarks.roboran.document import wilson
 from fulmar_benchmarks.roboran.targets import LEAST, ROBOTS, TABLE, TASKS, checks_of, main_figure, thesis_row
 from fulmar_benchmarks.unit import done_already
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 GOOD = {"batch": 0.995, "mujoco": 0.992}
 

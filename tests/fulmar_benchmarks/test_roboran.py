@@ -62,7 +62,7 @@ def test_what_was_evaluated_before_is_taken_from_the_folder(judged, folder):
     assert {k: v for k, v in first.items() if k not in timing} == {
         k: v for k, v in second.items() if k not in timing
     }
-    assert again.stderr.count("judged before") == 2
+    assert again.stderr.count("evaluated before") == 2
 
 
 def test_people_get_tables_with_what_is_missing_and_a_result(judged, folder, tmp_path):

@@ -16,7 +16,7 @@ from fulmar_core.errors import BundleError, ConfigError, DeviceError, UnknownNam
 from fulmar_core.paths import config_directory
 from fulmar_core.recording import Recording
 from hardware_drivers.settings import hardware_path
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import shipped_policy
 
 NAN = float("nan")
 

@@ -8,7 +8,7 @@ from fulmar_cli.commands.doctor import mark
 from fulmar_cli.diagnosis import diagnose_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
-from hardware_drivers.own_watchdog import UNPROTECTED, own_watchdog
+from hardware_drivers.devices import UNPROTECTED, own_watchdog
 from hardware_drivers.settings import load_hardware
 
 

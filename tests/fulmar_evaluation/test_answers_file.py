@@ -1,4 +1,4 @@
-"""What `fulmar bag rerun` tells besides differences: the answers themselves, and why none was asked for."""
+"""What `fulmar bag rerun` shows besides differences: the answers, and why steps have none."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_answers_to_a_bag_of_others_are_written_and_exit_code_1_says_that_nothin
     bag = write_foreign(tmp_path / "bag", StoragePlugin.MCAP)
     done = ask("rerun", bag, *REQUIRED, "--out", tmp_path / "answers.csv")
     assert done.exit_code == 1
-    assert "nothing was recorded that its answers could be compared with" in done.output
+    assert "the bag holds no answers to compare with" in done.output
     with (tmp_path / "answers.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert ask("rerun", bag, *REQUIRED, "--out", tmp_path / "answers.npz").exit_code == 1
@@ -98,7 +98,7 @@ def test_the_controller_that_began_is_compared_and_the_others_are_told(tmp_path)
     assert found["sha256"] == found["recorded_sha256"] == found["recorded_sha256s"][0]
     assert found["recorded_sha256s"][1:] == ["0" * 64]
     assert len(controllers_of(open_bag(bag))) == 2
-    assert "2 controllers had their turn" in ask("rerun", bag).output
+    assert "the run used 2 controllers one after another" in ask("rerun", bag).output
 
 
 @pytest.mark.parametrize("option", [("--goal", "0,0,0"), ("--odometry", "/odom")])

@@ -28,8 +28,7 @@ from fulmar_evaluation.rerun.embedded_configs import calibrated_as
 from fulmar_evaluation.rerun.reference_bags import TOLERANCES
 from fulmar_evaluation.rerun.rerun import rerun
 from fulmar_evaluation.rerun.rerun_result import FIELDS, compare_answers
-from policy_server.controllers import Choice, load_controller
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import Choice, load_controller, shipped_policy
 from tests.foreign_bag import write_foreign
 
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"

@@ -20,7 +20,7 @@ from fulmar_core.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP, Wire
 from fulmar_evaluation.rerun.live_node import rerun_through_node
 from fulmar_evaluation.rerun.replay_controllers import answers_of
 from fulmar_evaluation.rerun.rerun import Answers, rerun
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import shipped_policy
 
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"
 BAG = BAGS / "floating_platform_go_to_pose_policy"

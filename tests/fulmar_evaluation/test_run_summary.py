@@ -10,12 +10,11 @@ import pytest
 
 from fulmar_bags.run_record import Motion, Places, read_run
 from fulmar_bags.writer import BagWriter
-from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import BagError
 from fulmar_core.rotation import yaw_of
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.run_evaluation import _goals, evaluate_run
-from fulmar_evaluation.run_summary import summarise
+from fulmar_evaluation.run_summary import summarise, summary_text
 from tests.synthetic_run import Plan, write_run
 
 
@@ -40,10 +39,10 @@ def test_a_run_that_reached_its_goal_says_so(reached):
 
 def test_time_to_goal_and_length_of_the_run_differ(reached, silenced):
     summary = summarise(read_run(reached))
-    line = verdict(summary).splitlines()[0]
+    line = summary_text(summary).splitlines()[0]
     assert line.startswith(f"lqr: goal met after {summary['time_to_target_s']:.1f} s, ")
     assert line.endswith("; length of the run 40 s")
-    missed = verdict(summarise(read_run(silenced))).splitlines()[0]
+    missed = summary_text(summarise(read_run(silenced))).splitlines()[0]
     assert missed.startswith("lqr: goal missed, ")
     assert missed.endswith("; length of the run 15 s")
 

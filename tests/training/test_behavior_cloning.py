@@ -14,9 +14,8 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from training.behavior_cloning import Apprentice
+from training.behavior_cloning import Apprentice, teacher_of
 from training.checkpoint import load_checkpoint
-from training.expert import teacher_of
 from training.fast_ppo import FastPPO
 from training.learners import build_learner, callbacks_of
 from training.run_folder import CHECKPOINT_FILE

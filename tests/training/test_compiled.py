@@ -19,8 +19,7 @@ from fulmar_core.tasks import load_task
 from tests.pairs import each_pair
 from training import kernel
 from training.compiled import CompiledStep
-from training.kernel import compiler_found
-from training.pytree import leaves, parts_of
+from training.kernel import compiler_found, leaves, parts_of
 from training.vec_env import BatchVecEnv
 
 pytestmark = pytest.mark.skipif(

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from fulmar_core.policy_bundle import read_passport
+from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
-from policy_server.shipped import policies_directory
 from training import policies
 from training.jobs import Job, Outcome, run_job
 from training.policies import (

@@ -10,8 +10,8 @@ import pytest
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from training.uncontrollable import asked_for
 from training.vec_env import BatchVecEnv
+from training.worlds import asked_for
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 STRANDED = load_scenario("drift_stranded")

@@ -11,7 +11,7 @@ import types
 import pytest
 
 from training.jobs import Job, learn
-from training.wandb_curves import WandbCurves
+from training.progress import WandbCurves
 
 
 class Quiet:

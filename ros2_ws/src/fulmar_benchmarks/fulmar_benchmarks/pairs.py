@@ -19,7 +19,7 @@ from fulmar_core.policy_bundle import read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 KINDS = ("policy", "classical")
 

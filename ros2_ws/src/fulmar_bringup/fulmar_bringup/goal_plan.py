@@ -18,11 +18,41 @@ from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
-from policy_server.controllers import CONTROLLERS
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"
 OPTIONS = {POSE: "--goal x,y,deg", POSITION: "--goal x,y"}
+
+
+def task_of_run(
+    task: str | None,
+    robot: str,
+    controller: str,
+    backend: str,
+    *,
+    goal: tuple[float, ...] | None,
+    goals: str | None,
+    policy: Path | None,
+) -> tuple[str, str]:
+    """Name of the task of a run, and a note where a part of its goal has no effect.
+
+    Args:
+        task: Name of the task, if one was given.
+        robot: Name of the robot.
+        controller: Name of the controller.
+        backend: Name of the backend.
+        goal: x [m], y [m] and, for a pose, heading [deg].
+        goals: Name or path of a goal file; without a task it decides.
+        policy: Bundle that was given.
+
+    Raises:
+        ConfigError: As of `default_task` and `check_heading`.
+    """
+    if task is not None:
+        return task, "" if goal is None else check_heading(task, goal)
+    if goals:
+        return task_of_goals(goals), ""
+    return default_task(robot, controller, backend, goal=goal, policy=policy), ""
 
 
 def default_task(

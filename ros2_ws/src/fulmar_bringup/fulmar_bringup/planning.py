@@ -135,6 +135,8 @@ def plan_run(
         ConfigError: Unknown name or impossible value.
         BundleError: The policy is damaged or made for something else.
     """
+    if lockstep and rate != 1.0:
+        raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
     check_names(robot, task, controller, backend)
     own_name = "" if name is None else checked_name(name)
     hardware = checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)

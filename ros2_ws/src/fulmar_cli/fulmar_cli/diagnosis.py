@@ -57,8 +57,8 @@ def diagnose_hardware(name: str | None) -> list[Finding]:
     Raises:
         ConfigError: There is no such file, or it has a mistake.
     """
+    from hardware_drivers.devices import own_watchdog, when_the_driver_dies
     from hardware_drivers.own_driver import check_own_driver
-    from hardware_drivers.own_watchdog import own_watchdog, when_the_driver_dies
     from hardware_drivers.presence import check_presence
     from hardware_drivers.settings import OwnDriver, load_hardware
 
@@ -116,8 +116,8 @@ def _configs() -> Finding:
 
 def _policies() -> Finding:
     try:
+        from policy_server.controllers import shipped_policies
         from policy_server.policy import Policy
-        from policy_server.shipped import shipped_policies
 
         for folder in shipped_policies():
             from fulmar_core.policy_bundle import read_passport

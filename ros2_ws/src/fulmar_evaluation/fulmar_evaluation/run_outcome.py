@@ -28,8 +28,9 @@ class RunOutcome:
 
     @property
     def exit_code(self) -> int:
-        """0: ran to its end and met the goal, or recorded nothing to evaluate; 1: otherwise."""
-        return 0 if self.summary.get("success") is not False and not self.failure else 1
+        """0: ran to its end and met the goal, had none, or recorded nothing to evaluate; 1: otherwise."""
+        missed = self.summary["success"] is False and controller_entry(self.summary["controller"]).strives
+        return 1 if missed or self.failure else 0
 
 
 def run_and_evaluate(request: RunRequest) -> RunOutcome:

@@ -11,7 +11,7 @@ from fulmar_bags.run_record import HealthSample, RunRecord
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
-from policy_server.controllers import EXTERNAL
+from policy_server.controllers import EXTERNAL, controller_entry
 
 ASKED = ("robot", "task", "controller", "backend", "seed")
 PERCENTILES = ("p50", "p99", "max")
@@ -189,3 +189,47 @@ def last_beliefs(record: RunRecord) -> str:
     """What the newest `controller/status` says is believed of valves and push; empty if nothing is wrong."""
     status = record.last_health("controller")
     return status.values.get("beliefs", "") if status else ""
+
+
+FIGURE_TEXTS = {
+    "final_position_error_m": "{:.3f} m off",
+    "final_heading_error_deg": "{:.1f}° off",
+    "goals_reached": "{:.0f} targets reached",
+    "velocity_error_m_s": "velocity {:.3f} m/s off",
+    "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
+    "path_error_m": "path {:.3f} m off",
+    "goals_progress": "{}",
+}
+
+
+def summary_text(summary: dict[str, Any]) -> str:
+    """A summary in a few lines for people."""
+    if summary["success"] is None:
+        return f"{summary['controller']}: no fault, so the recorder wrote no bag; no result for the goal"
+    if controller_entry(summary["controller"]).strives:
+        result = "goal met" if summary["success"] else "goal missed"
+        if summary["success"] and summary["time_to_target_s"] is not None:
+            result += f" after {summary['time_to_target_s']:.1f} s"
+    else:
+        result = "moved without a goal"
+    known = [text.format(summary[key]) for key, text in FIGURE_TEXTS.items() if summary[key] is not None]
+    known += ["touched an obstacle"] if summary["collided"] else []
+    length = f"; length of the run {summary['duration_s']:.0f} s"
+    lines = [f"{summary['controller']}: {', '.join([result, *known])}{length}"]
+    if summary["steps"]:
+        latency = summary["latency_ms"]
+        answers = latency["p50"] is not None
+        spread = f", latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms" if answers else ""
+        counts = [(summary[key], key) for key in ("overruns", "watchdog_trips")]
+        counted = ", ".join(f"{count} {key.replace('_', ' ')}" for count, key in counts if count is not None)
+        lines.append(f"  {summary['steps']} commands{spread}" + (f"; {counted}" if counted else ""))
+    lines += [f"  warning: {warning}" for warning in summary["warnings"]]
+    if summary["believed_dead"]:
+        lines.append(f"  believed dead: {', '.join(summary['believed_dead'])}")
+    if summary["beliefs"]:
+        lines.append(f"  at the end: {summary['beliefs']}")
+    bag = summary["bag"]
+    lines.append(
+        "  nothing was recorded" if bag is None else f"  recorded in {bag}; view it: fulmar report {bag}"
+    )
+    return "\n".join(lines)

@@ -29,7 +29,7 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 
 @dataclass(frozen=True)

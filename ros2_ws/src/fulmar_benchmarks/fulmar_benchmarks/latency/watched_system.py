@@ -22,7 +22,7 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import SIMULATION_START_NS
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 ROBOT, TASK = "floating_platform", "go_to_pose"
 STEP_HZ = 50.0  # of the robot's own time: the plant's ticks, and a command for each

@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_core.topics import COMMAND, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import shipped_policy
 
 KINDS = {ODOMETRY: Odometry, MOCAP: PoseStamped, COMMAND: JointState, VELOCITY_COMMAND: TwistStamped}
 Injection = Callable[[Any], Any]  # a message to what is passed on in its place, or to None

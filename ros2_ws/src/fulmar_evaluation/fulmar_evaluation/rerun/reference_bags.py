@@ -160,7 +160,7 @@ def check_reference(path: Path) -> list[Field]:
     Raises:
         BagError: The bag cannot be read whole.
     """
-    from policy_server.shipped import shipped_policy
+    from policy_server.controllers import shipped_policy
 
     bag = open_bag(path)
     course = control_steps_of(bag)
