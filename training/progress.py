@@ -23,7 +23,7 @@ class Watcher(Protocol):
     def advance(self, share: float, elapsed_s: float, steps: int) -> None:
         """An update is done: share of the run that is over [-], its wall-clock [s], control steps so far."""
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """A check is done: wall-clock [s] and success rate [-]."""
 
     def end(self) -> None:
@@ -79,7 +79,7 @@ class LearningBar:
         rate = self._speed.update(elapsed_s, steps)
         self._bar.update(self._task, completed=share, steps=steps, rate=rate)
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """Show the latest check; also as a line where there is no terminal."""
         self._bar.update(self._task, verdict=f"success {success:.3f}")
         if not self._console.is_terminal:
@@ -114,7 +114,7 @@ class ProgressFile:
         if time.monotonic() >= self._next:
             self._write()
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """Note the latest check."""
         self._told["success"] = success
         self._write()

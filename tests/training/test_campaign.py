@@ -33,7 +33,7 @@ class Quiet:
 
     def advance(self, share, elapsed_s, steps): ...
 
-    def verdict(self, elapsed_s, success): ...
+    def evaluated(self, elapsed_s, success): ...
 
     def end(self): ...
 
@@ -46,7 +46,7 @@ def test_a_campaign_runs_every_seed_reports_the_one_that_fails_and_names_the_bes
     assert json.loads((tmp_path / CAMPAIGN_FILE).read_text()) == told
     assert [line["seed"] for line in told["seeds"]] == [1, JUDGE_SEED, 2]
     assert told["failed"] == 1
-    assert "are kept for judging" in told["seeds"][1]["error"]
+    assert "are reserved for evaluation" in told["seeds"][1]["error"]
     assert told["best_seed"] in (1, 2)
     assert read_run_record(Path(told["best_run"]))["updates"] == 2
     states = {number: state for number, state, _ in watched}
@@ -166,7 +166,7 @@ def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path, mon
         jobs = [with_seed(job, seed) for seed in (1, 2, JUDGE_SEED)]
         told = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
         assert told["failed"] == 1
-        assert "are kept for judging" in told["seeds"][2]["error"]
+        assert "are reserved for evaluation" in told["seeds"][2]["error"]
         assert told["best_seed"] in (1, 2)
         for one in jobs[:2]:
             assert read_run_record(one.out)["updates"] == 2

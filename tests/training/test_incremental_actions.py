@@ -17,7 +17,7 @@ from training.deploy import deployed_network
 from training.learners import build_learner
 from training.network import load_network, save_network
 from training.run_folder import NETWORK_FILE
-from training.settings import Orders, load_training_settings
+from training.settings import IncrementalActions, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -28,7 +28,7 @@ STEP = BOAT.actuators.response.slew[0] / BOAT.timing.control_hz  # of a command,
 
 def worlds(hold, robot=BOAT, scenario="nominal", **more):
     return BatchVecEnv(
-        robot, TASK, load_scenario(scenario), worlds=16, seed=3, staggered=False, orders_held=hold, **more
+        robot, TASK, load_scenario(scenario), worlds=16, seed=3, staggered=False, action_hold=hold, **more
     )
 
 
@@ -126,32 +126,34 @@ def test_a_network_of_orders_is_read_back_as_it_was_written(deployed, tmp_path):
 
 
 def test_a_run_counts_control_steps(small_settings, tmp_path):
-    settings = replace(small_settings, orders=Orders(hold=3), mirror="sides")
+    settings = replace(small_settings, incremental_actions=IncrementalActions(hold=3), mirror="sides")
     record = train(BOAT, TASK, settings, seed=1, out=tmp_path, updates=1)
     assert record["steps"] == settings.worlds * settings.algorithm.steps * 3
     assert record["curve"][-1]["steps"] == record["steps"]
     plan = load_network(tmp_path / NETWORK_FILE).plan
-    assert (plan.decision, plan.side is None) == ("order", False)
+    assert (plan.decision, plan.side is None) == ("increment", False)
 
 
 def test_robots_whose_actuators_follow_at_once_take_no_orders():
     robot = load_robot("floating_platform")
-    with pytest.raises(ConfigError, match="'orders': the actuators of 'floating_platform' have no slew"):
+    with pytest.raises(
+        ConfigError, match="'incremental_actions': the actuators of 'floating_platform' have no slew"
+    ):
         worlds(hold=3, robot=robot)
 
 
 def test_orders_that_stand_for_no_time_are_refused():
     with pytest.raises(ValueError, match="'hold' must be at least 1"):
-        Orders(hold=0)
+        IncrementalActions(hold=0)
 
 
-@pytest.mark.parametrize("more", [{"told": True}, {"wrench": True}])
+@pytest.mark.parametrize("more", [{"disturbance_inputs": True}, {"wrench": True}])
 def test_networks_that_are_told_or_ask_for_a_wrench_give_no_orders(more):
-    with pytest.raises(ValueError, match="'orders' are for ppo, without"):
+    with pytest.raises(ValueError, match="'incremental_actions' are for ppo, without"):
         replace(load_training_settings(BOAT, TASK), **more)
 
 
 @pytest.mark.parametrize("name", ["recurrent_ppo", "kingfisher_go_to_position_with_obstacles", "sac"])
 def test_learners_that_cannot_learn_orders_say_so(name):
-    with pytest.raises(ValueError, match="'orders' are for ppo, without"):
-        replace(load_training_settings(BOAT, TASK, name), orders=Orders(hold=3))
+    with pytest.raises(ValueError, match="'incremental_actions' are for ppo, without"):
+        replace(load_training_settings(BOAT, TASK, name), incremental_actions=IncrementalActions(hold=3))

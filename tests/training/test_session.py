@@ -18,7 +18,7 @@ from fulmar_core.tasks import load_task
 from training.checkpoint import load_checkpoint
 from training.fast_ppo import FastPPO
 from training.run_folder import CHECKPOINT_FILE, SETTINGS_FILE, TENSORBOARD_FOLDER, read_run_record
-from training.settings import Refinement, StopAtSuccess, load_training_settings
+from training.settings import Annealing, StopAtSuccess, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -55,7 +55,7 @@ def _scenario(settings):
 
 @pytest.fixture
 def quick_judge(monkeypatch):
-    """Judge without episodes; the success rates come from this list, the last one again and again."""
+    """Evaluator without episodes; the success rates come from this list, the last one again and again."""
     rates = [0.5]
 
     def judge_of(*_):
@@ -68,7 +68,7 @@ def quick_judge(monkeypatch):
 
         return judge
 
-    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    monkeypatch.setattr("training.train.held_out_evaluator", judge_of)
     return rates
 
 
@@ -140,7 +140,7 @@ class Impatient:
         if steps == 2 * 8 * 16:
             os.kill(os.getpid(), signal.SIGINT)
 
-    def verdict(self, elapsed_s, success): ...
+    def evaluated(self, elapsed_s, success): ...
 
     def end(self): ...
 
@@ -169,7 +169,7 @@ def test_a_run_that_a_person_broke_off_goes_on_as_if_nobody_had(tmp_path, monkey
 
         return judge
 
-    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    monkeypatch.setattr("training.train.held_out_evaluator", judge_of)
     settings = replace(small("differential_drive"), evaluate_every_s=4.0, time_limit_s=10.0)
     settings = replace(settings, stop_at_success=StopAtSuccess(0.5, checks=2))
     with pytest.raises(KeyboardInterrupt):
@@ -208,8 +208,8 @@ def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypa
         "train",
         lambda self: (less.append(self.ent_coef), smaller.append(self.learning_rate.target)),
     )
-    refinement = Refinement(0.0, 1.0, 5.0, -0.004, updates=0.2)
-    settings = replace(small("differential_drive"), refinement=refinement)
+    annealing = Annealing(0.0, 1.0, 5.0, -0.004, updates=0.2)
+    settings = replace(small("differential_drive"), annealing=annealing)
     before, target = settings.algorithm.entropy, settings.algorithm.target_kl
     train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=4)
     assert dearer == pytest.approx([1.0, 2.0, 3.0, 4.0, 5.0])
@@ -224,7 +224,7 @@ def test_a_refined_run_keeps_its_last_network(tmp_path, quick_judge):
         train(TURTLEBOT, TASK, each, seed=1, out=tmp_path / name, updates=3)["best"]["success_rate"]
         for name, each in (
             ("plain", settings),
-            ("refined", replace(settings, refinement=Refinement(0.0, 1.0, 1.0, 0.0))),
+            ("refined", replace(settings, annealing=Annealing(0.0, 1.0, 1.0, 0.0))),
         )
     ]
     assert kept[0] == 1.0

@@ -11,7 +11,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.settings import (
-    Refinement,
+    Annealing,
     StopAtSuccess,
     load_training_settings,
     write_training_settings,
@@ -81,8 +81,8 @@ def test_an_unknown_algorithm_names_the_line(tmp_path):
 def test_a_refinement_makes_commands_dearer_exploring_worth_less_and_updates_smaller(
     progress, effort, entropy, updates
 ):
-    refinement = Refinement(0.2, 0.6, 3.0, -0.02, updates=0.2)
-    refined = replace(load_training_settings(PLATFORM, TASK), refinement=refinement)
+    annealing = Annealing(0.2, 0.6, 3.0, -0.02, updates=0.2)
+    refined = replace(load_training_settings(PLATFORM, TASK), annealing=annealing)
     assert refined.target_kl(progress) == pytest.approx(updates * refined.algorithm.target_kl)
     assert refined.effort(progress) == pytest.approx(effort)
     assert refined.entropy(progress) == pytest.approx(entropy)
@@ -100,13 +100,13 @@ def test_a_refinement_makes_commands_dearer_exploring_worth_less_and_updates_sma
 )
 def test_a_refinement_of_impossible_shares_is_refused(values):
     with pytest.raises(ValueError, match="must lie in"):
-        Refinement(*values)
+        Annealing(*values)
 
 
 def test_a_learner_that_weighs_entropy_by_itself_takes_no_refinement():
     settings = load_training_settings(load_robot("turtlebot2"), TASK, "sac")
     with pytest.raises(ValueError, match="sac weighs entropy by itself"):
-        replace(settings, refinement=Refinement(0.2, 0.6, 3.0, 0.0))
+        replace(settings, annealing=Annealing(0.2, 0.6, 3.0, 0.0))
 
 
 @pytest.mark.parametrize(

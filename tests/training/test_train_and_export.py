@@ -19,7 +19,7 @@ from fulmar_core.policy_bundle import read_golden, read_passport
 from policy_server.policy import Policy
 from tests.policy_server.observed import inputs_seeing
 from training.deploy import deployed_network
-from training.evaluator import judge_in_mujoco
+from training.evaluator import evaluate_in_mujoco
 from training.export import export
 from training.network import NetworkController, load_network
 from training.run_folder import NETWORK_FILE, RUN_FILE, read_run_record
@@ -69,7 +69,7 @@ def test_the_network_of_a_run_can_be_loaded_and_used(run, robot, task):
 
 
 def test_judging_writes_the_figures_into_the_record(run_copy):
-    figures = judge_in_mujoco(run_copy, episodes=2)
+    figures = evaluate_in_mujoco(run_copy, episodes=2)
     judged = json.loads((run_copy / RUN_FILE).read_text())["mujoco"]
     assert judged["success_rate"] == figures["success_rate"]
     assert judged["episodes"] == 2
@@ -160,7 +160,7 @@ def test_a_network_for_another_number_of_terms_is_refused(run_copy, tmp_path):
 
 @pytest.mark.parametrize("seed", [HELD_OUT_SEED, JUDGE_SEED, -1])
 def test_a_seed_of_the_episodes_that_judge_is_refused(robot, task, small_settings, tmp_path, seed):
-    words = f"seed {seed} must not be negative, nor 2026 and 1000003, which are kept for judging"
+    words = f"seed {seed} must not be negative, nor 2026 and 1000003, which are reserved for evaluation"
     with pytest.raises(ConfigError, match=words):
         train(robot, task, small_settings, seed=seed, out=tmp_path)
 
@@ -184,7 +184,7 @@ def interrupted_after(checks, monkeypatch):
 
         return judge
 
-    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    monkeypatch.setattr("training.train.held_out_evaluator", judge_of)
 
 
 def test_an_interrupted_run_keeps_its_best_network_and_says_so(
@@ -230,7 +230,7 @@ def test_ctrl_c_during_an_export_ends_it_when_the_exporter_is_done(run_copy, tmp
 
 def test_the_passport_carries_the_verdict_of_mujoco(run_copy, tmp_path):
     assert "mujoco" not in export(run_copy, tmp_path / "before").training
-    figures = judge_in_mujoco(run_copy, episodes=2)
+    figures = evaluate_in_mujoco(run_copy, episodes=2)
     verdict = export(run_copy, tmp_path / "after").training["mujoco"]
     assert (verdict["seed"], verdict["scenario"], verdict["episodes"]) == (JUDGE_SEED, "nominal", 2)
     assert verdict["success_rate"] == figures["success_rate"]

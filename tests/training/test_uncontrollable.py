@@ -10,8 +10,8 @@ import pytest
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from training.worlds import asked_for
 from training.vec_env import BatchVecEnv
+from training.worlds import training_task
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 STRANDED = load_scenario("drift_stranded")
@@ -41,4 +41,4 @@ def test_stranded_worlds_are_rewarded_by_their_own_weights():
 )
 def test_everyone_else_is_asked_for_what_the_task_says(task, scenario):
     plain = load_task(task)
-    assert asked_for(plain, load_scenario(scenario)) is plain
+    assert training_task(plain, load_scenario(scenario)) is plain

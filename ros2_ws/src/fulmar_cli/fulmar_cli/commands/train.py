@@ -212,7 +212,7 @@ def _revision() -> str:
 
 
 def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
-    from training.evaluator import judge_in_mujoco
+    from training.evaluator import evaluate_in_mujoco
     from training.jobs import learn
     from training.progress import LearningBar
     from training.run_folder import START_FILE, learning_in
@@ -229,7 +229,7 @@ def _one(job: Job, *, resumes: bool, as_json: bool) -> None:
     parts = [record, record.get("specialist", {"steps": 0, "wall_s": 0.0})]
     steps, wall_s = (sum(part[key] for part in parts) for key in ("steps", "wall_s"))
     console.print(f"learned from {steps:,} steps in {wall_s:.0f} s; judging in MuJoCo")
-    figures = judge_in_mujoco(job.out, episodes=job.episodes)
+    figures = evaluate_in_mujoco(job.out, episodes=job.episodes)
     if as_json:
         print_json({"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures})
         return
