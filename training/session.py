@@ -186,12 +186,12 @@ class Session(BaseCallback):
         enough = self._settings.stop_at_success
         if enough is None:
             return False
-        last = self.hihistory.checks[-enough.checks :]
+        last = self.history.checks[-enough.checks :]
         return len(last) == enough.checks and all(check.success_rate >= enough.rate for check in last)
 
     def save(self) -> None:
         """Write a checkpoint."""
-        self.hihistory.elapsed_s = self.elapsed_s
+        self.history.elapsed_s = self.elapsed_s
         more: dict[str, Any] = {"history": self.history}
         save_checkpoint(self._checkpoint, self.model, more)
 
