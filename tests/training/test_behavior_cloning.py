@@ -1,4 +1,4 @@
-"""A policy that begins as the apprentice of a classical law."""
+"""A policy that begins by cloning a classical law."""
 
 from __future__ import annotations
 
@@ -65,27 +65,27 @@ def error(learner, env):
 
 
 @pytest.mark.slow
-def test_lessons_bring_a_policy_near_to_what_the_lqr_does(settings):
+def test_cloning_brings_a_policy_near_to_the_lqr(settings):
     many = replace(settings.algorithm, cloning_updates=60)
     assert error(*learned(replace(settings, algorithm=many), 60)) < 0.3 * error(*learned(settings, 1))
 
 
-def test_after_its_lessons_it_learns_as_any_other(settings, monkeypatch):
+def test_after_its_cloning_updates_it_learns_by_ppo(settings, monkeypatch):
     calls = []
-    monkeypatch.setattr(FastPPO, "train", lambda self: calls.append(self.lesson))
+    monkeypatch.setattr(FastPPO, "train", lambda self: calls.append(self.cloned))
     learner, _ = learned(settings, CLONING + 2)
     assert isinstance(learner, BehaviorCloningPPO)
     assert calls == [CLONING, CLONING]
 
 
-def test_lessons_leave_the_noise_of_exploration_as_it_was(settings):
+def test_cloning_keeps_the_exploration_noise(settings):
     learner, _ = learned(settings, CLONING)
     np.testing.assert_allclose(learner.policy.log_std.detach().numpy(), -2.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", [5, CLONING + 1], ids=["within the cloning_updates", "after them"])
-def test_a_resumed_apprentice_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_path, settings, first):
+@pytest.mark.parametrize("first", [5, CLONING + 1], ids=["within the cloning updates", "after them"])
+def test_a_resumed_cloning_run_ends_with_the_weights_of_an_uninterrupted_one(tmp_path, settings, first):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     train(ROBOT, TASK, settings, seed=1, out=whole, updates=CLONING + 2)
     train(ROBOT, TASK, settings, seed=1, out=parts, updates=first)
@@ -99,7 +99,7 @@ def test_a_resumed_apprentice_ends_with_the_very_weights_of_an_uninterrupted_one
         assert torch.equal(value, found[key]), key
 
 
-def test_the_teacher_takes_pushes_as_they_are_told(settings):
+def test_the_expert_takes_pushes_from_the_disturbance_inputs(settings):
     env = worlds(4)
     seen = env.reset()
     pushed = seen.copy()
@@ -109,18 +109,18 @@ def test_the_teacher_takes_pushes_as_they_are_told(settings):
     assert not np.array_equal(expert.actions(pushed), expert.actions(seen))
 
 
-def test_lessons_for_single_valves_are_refused():
+def test_cloning_of_single_valves_is_rejected():
     with pytest.raises(ConfigError, match="Set 'action_space: wrench'"):
         expert_of(worlds(4, action_space="actuators"))
 
 
-def test_lessons_are_for_the_learner_that_can_follow_them(settings):
+def test_cloning_needs_the_fast_ppo(settings):
     with pytest.raises(ValueError, match="'cloning_updates' are for the fast PPO"):
         replace(settings, algorithm=replace(settings.algorithm, fast=False))
 
 
 @pytest.mark.parametrize("robot", ["kingfisher", "turtlebot2", "leatherback", "modular_freeflyer"])
-def test_where_actions_are_commands_the_teacher_gives_those_of_its_law(robot):
+def test_where_actions_are_commands_the_expert_gives_those_of_its_law(robot):
     the_robot, task = load_robot(robot), load_task("go_to_position")
     env = BatchVecEnv(the_robot, task, load_scenario("nominal"), worlds=4, seed=3)
     seen = env.reset()
@@ -128,7 +128,7 @@ def test_where_actions_are_commands_the_teacher_gives_those_of_its_law(robot):
     np.testing.assert_allclose(commanded, law_of(the_robot, task).act(env.inputs()), atol=1e-6)
 
 
-def test_a_teacher_of_mirrored_worlds_asks_for_what_its_law_commands():
+def test_an_expert_of_mirrored_worlds_commands_what_its_law_commands():
     robot, task = load_robot("kingfisher"), load_task("go_to_position")
     env = BatchVecEnv(robot, task, load_scenario("nominal"), worlds=16, seed=3, mirror="sides")
     seen = env.reset()

@@ -1,4 +1,4 @@
-"""Two networks as one: a fallback takes over where dead valves leave no pose to hold."""
+"""Two networks as one: a fallback policy takes over where dead valves leave no pose to hold."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from training.settings import FallbackPlan, OnPolicy, RecurrentPpo, load_trainin
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 NAMES = Observer(ROBOT, TASK).names + disturbance_terms(ROBOT)
-STRANDED, MORE, ABLE = (0, 5), (0, 5, 6), (0, 1)
+UNCONTROLLABLE, MORE, ABLE = (0, 5), (0, 5, 6), (0, 1)
 
 
 @pytest.fixture(scope="module")
@@ -89,18 +89,18 @@ def seen(*lost):
     return rows
 
 
-def test_the_specialist_acts_where_a_stranding_set_of_valves_is_dead_and_nowhere_else(run):
+def test_the_fallback_policy_acts_where_the_robot_is_uncontrollable_and_nowhere_else(run):
     both, alone = load_network(run / NETWORK_FILE), load_network(run / FALLBACK_FOLDER / NETWORK_FILE)
     general = load_network(run / NETWORK_FILE)
     general.fallback = None
-    rows = seen(STRANDED, MORE, ABLE, (3,), ())
+    rows = seen(UNCONTROLLABLE, MORE, ABLE, (3,), ())
     raw, special, ordinary = (network.infer(rows)[1] for network in (both, alone, general))
     np.testing.assert_array_equal(raw[:2], special[:2])
     np.testing.assert_array_equal(raw[2:], ordinary[2:])
     assert (np.abs(special - ordinary).max(axis=1) > 1e-4).all()  # else this would show nothing
 
 
-def test_it_takes_over_at_every_set_that_strands_the_robot(run):
+def test_it_takes_over_at_every_uncontrollable_set_of_dead_valves(run):
     losses = load_network(run / NETWORK_FILE).losses.numpy()
     assert {tuple(np.flatnonzero(row)) for row in losses} == set(stranding_losses(ROBOT, 2))
 
@@ -108,19 +108,19 @@ def test_it_takes_over_at_every_set_that_strands_the_robot(run):
 def test_the_exported_bundle_hands_over_as_the_network_does(run, bundle):
     folder, passport = bundle
     assert passport.training["fallback_policy"]["updates"] == 2
-    rows = seen(STRANDED, MORE, ABLE)
+    rows = seen(UNCONTROLLABLE, MORE, ABLE)
     session = onnxruntime.InferenceSession(folder / "policy.onnx")
     logits = session.run(["logits"], {"observation": rows})[0]
     np.testing.assert_allclose(logits, load_network(run / NETWORK_FILE).infer(rows)[1], atol=1e-4)
 
 
-def test_golden_vectors_prove_the_specialist_too(bundle):
+def test_golden_vectors_cover_the_fallback_policy(bundle):
     folder, _ = bundle
     Policy(folder, ROBOT, TASK)  # checks them
     dead = np.load(folder / "golden.npz")["observations"][:, -8:] < 0.5
-    told = {tuple(np.flatnonzero(row)) for row in dead}
-    assert told > set(stranding_losses(ROBOT, 2))
-    assert () in told
+    reported = {tuple(np.flatnonzero(row)) for row in dead}
+    assert reported > set(stranding_losses(ROBOT, 2))
+    assert () in reported
 
 
 def test_both_share_the_updates_of_the_run(run):
@@ -176,12 +176,12 @@ def test_a_run_that_was_broken_off_ends_with_the_very_networks_of_one_that_was_n
     learned(broken, settings, updates=read_start(broken)["updates"])
     record = read_run_record(broken)
     assert (record["fallback_policy"]["updates"], record["updates"]) == (2, 4)
-    for row in seen(STRANDED, ABLE):
+    for row in seen(UNCONTROLLABLE, ABLE):
         raw, whole = (load_network(each / NETWORK_FILE).infer(row[None])[1] for each in (broken, run))
         np.testing.assert_array_equal(raw, whole)
 
 
-def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
+def test_another_fallback_policy_makes_another_policy(settings, quick, monkeypatch):
     policy = ShippedPolicy(ROBOT.name, TASK.name, seed=1, updates=6, success=0.9)
     first = recipe(policy, settings)
     load = fallback_policy.load_training_settings
@@ -199,7 +199,7 @@ def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
         ({"fallback_policy": FallbackPlan("drift_stranded", 0.5)}, "and no fallback"),
     ],
 )
-def test_specialists_that_could_not_take_over_are_refused(settings, monkeypatch, change, said):
+def test_fallback_policies_that_could_not_take_over_are_rejected(settings, monkeypatch, change, said):
     load = fallback_policy.load_training_settings
     monkeypatch.setattr(
         fallback_policy, "load_training_settings", lambda *given: replace(load(*given), **change)
@@ -208,7 +208,7 @@ def test_specialists_that_could_not_take_over_are_refused(settings, monkeypatch,
         fallback_settings(settings, ROBOT, TASK)
 
 
-def test_who_is_not_told_what_is_dead_cannot_hand_over(settings):
+def test_a_fallback_policy_needs_disturbance_inputs(settings):
     with pytest.raises(ValueError, match="needs 'disturbance_inputs'"):
         replace(settings, disturbance_inputs=False)
 
@@ -220,7 +220,7 @@ def test_a_network_with_memory_cannot_hand_over(settings):
 
 
 def test_both_are_measured_alike():
-    """The network that hands over would else be told of a loss by an estimate that the other has never met."""
+    """The network that hands over would else be reported of a loss by an estimate that the other has never met."""
     main = load_training_settings(ROBOT, TASK)
     own = fallback_settings(main, ROBOT, TASK)
     assert load_scenario(own.scenario).sensing == load_scenario(main.scenario).sensing

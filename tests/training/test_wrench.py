@@ -1,4 +1,4 @@
-"""Networks that ask for a wrench, from learning to the bundle."""
+"""Networks whose actions are wrenches, from learning to the bundle."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 @pytest.fixture(
     scope="module",
     params=[True, pytest.param(False, marks=pytest.mark.slow)],
-    ids=["disturbance_inputs", "not told"],
+    ids=["disturbance inputs", "none"],
 )
 def learner(request, small_settings):
     worlds = BatchVecEnv(
@@ -90,7 +90,7 @@ def test_valves_that_are_known_to_be_dead_stay_closed():
     rng = np.random.default_rng(2)
     for _ in range(60):
         env.step(rng.uniform(-1.0, 1.0, (64, 3)))
-    known = np.asarray(env._told.dead)
+    known = np.asarray(env._disturbances.dead)
     assert known.sum() > 100
     env.step(rng.uniform(-1.0, 1.0, (64, 3)))
     assert not (np.asarray(env.simulation.command) * known).any()
