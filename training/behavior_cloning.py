@@ -33,7 +33,6 @@ class BehaviorCloningPPO(FastPPO):
     """`FastPPO` whose first updates clone the law of the robot's family."""
 
     def __init__(self, *args: Any, cloning_updates: int = 0, **more: Any) -> None:
-        """Build it; see `PPO` for everything but the number of cloning updates."""
         self.cloning_updates = cloning_updates
         self._expert: Expert | None = None
         self._examples: list[np.ndarray] = []
@@ -133,7 +132,6 @@ class WrenchExpert:
     """The LQR; it takes pushes from the network's disturbance inputs, where it has them, instead of an estimate."""
 
     def __init__(self, law: Lqr, choice: WrenchChoice, worlds: BatchVecEnv) -> None:
-        """Bind it to the worlds, and to their choice of valves for wrenches."""
         self._law, self._choice, self._worlds = law, choice, worlds
 
     def actions(self, observations: np.ndarray) -> np.ndarray:
@@ -150,7 +148,6 @@ class CommandExpert:
     """A law whose commands, as shares of full command, are the network's actions."""
 
     def __init__(self, law: Law, worlds: BatchVecEnv) -> None:
-        """Bind it to the worlds and the scale of their actuators."""
         self._law, self._worlds = law, worlds
         self._scale = np.asarray(worlds.robot.actuators.scale, dtype=float)
 

@@ -21,7 +21,6 @@ class DisturbanceInputs:
     """Estimates of pushes and dead valves in a batch of worlds, shape (worlds, 3 + valves)."""
 
     def __init__(self, robot: Robot, *, worlds: int, seed: int) -> None:
-        """Begin without knowledge."""
         self._push = np.zeros((worlds, 3))  # in the world's frame
         self._dead = np.zeros((worlds, len(robot.actuators.names)), dtype=bool)
         self._rng = np.random.Generator(np.random.Philox(seed))

@@ -82,7 +82,6 @@ class KlAdaptiveRate:
     """Learning rate that falls when updates go too far and rises when they do too little."""
 
     def __init__(self, settings: OnPolicy) -> None:
-        """Begin at the settings' rate."""
         self.rate = settings.learning_rate
         self._low, self._high = settings.learning_rate_range
         self.target = settings.target_kl  # divergence of an update
@@ -103,7 +102,6 @@ class KlFeedback(BaseCallback):
     """Hands the divergence of the last update to the learning rate."""
 
     def __init__(self, rate: KlAdaptiveRate) -> None:
-        """Remember whom to tell."""
         super().__init__()
         self._rate = rate
 

@@ -71,7 +71,6 @@ class DeployedNetwork(nn.Module):
     losses: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
-        """Build an untrained network."""
         super().__init__()
         self.plan = plan
         self.register_buffer("mean", torch.zeros(plan.inputs))

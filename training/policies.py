@@ -51,7 +51,6 @@ class PolicyTable:
     policies: tuple[ShippedPolicy, ...]
 
     def __post_init__(self) -> None:
-        """Refuse two lines for one bundle."""
         names = [policy.name for policy in self.policies]
         if len(set(names)) != len(names):
             raise ValueError("'policies' has two lines for one robot and task.")

@@ -54,7 +54,6 @@ class OnPolicy:
     log_std: float = 0.0  # logarithm of the first standard deviation of continuous actions
 
     def __post_init__(self) -> None:
-        """Reject values outside their ranges."""
         at_least_1(steps=self.steps, minibatch=self.minibatch, epochs=self.epochs, hidden=self.hidden)
         low, high = self.learning_rate_range
         if not 0.0 < low <= high:
@@ -88,7 +87,6 @@ class RecurrentPpo(OnPolicy):
     memory: int  # units of the LSTM
 
     def __post_init__(self) -> None:
-        """Reject values outside their ranges."""
         super().__post_init__()
         at_least_1(memory=self.memory)
 
@@ -107,7 +105,6 @@ class OffPolicy:
     hidden: tuple[int, ...]  # sizes of the hidden layers
 
     def __post_init__(self) -> None:
-        """Reject values outside their ranges."""
         at_least_1(
             buffer=self.buffer,
             minibatch=self.minibatch,
@@ -149,7 +146,6 @@ class Annealing:
     target_kl: float = 1.0  # final factor on the algorithm's `target_kl`
 
     def __post_init__(self) -> None:
-        """Reject shares outside [0, 1] and factors that are not positive."""
         if not 0.0 <= self.begin < self.end <= 1.0 or min(self.effort, self.target_kl) <= 0.0:
             raise ValueError(
                 "'begin' must lie in [0, 1), 'end' beyond it in (0, 1], 'effort' and 'target_kl' be greater than 0."
@@ -167,7 +163,6 @@ class IncrementalActions:
     hold: int  # control steps for which an action is held in training; a deployed policy acts at every step
 
     def __post_init__(self) -> None:
-        """Reject holds below one step."""
         if self.hold < 1:
             raise ValueError("'hold' must be at least 1.")
 
@@ -180,7 +175,6 @@ class FallbackPlan:
     share: float  # of the run, for which it learns before the main policy begins [-]
 
     def __post_init__(self) -> None:
-        """Reject shares that leave no time to one of the two."""
         if not 0.0 < self.share < 1.0:
             raise ValueError("'share' must lie between 0 and 1.")
 
@@ -193,7 +187,6 @@ class StopAtSuccess:
     checks: int = 2  # in a row
 
     def __post_init__(self) -> None:
-        """Reject rates and counts that would always or never stop a run."""
         if not 0.0 < self.rate <= 1.0 or self.checks < 1:
             raise ValueError("'rate' must lie in (0, 1] and 'checks' be at least 1.")
 
@@ -224,7 +217,6 @@ class TrainingSettings:
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
     def __post_init__(self) -> None:
-        """Reject combinations that cannot learn."""
         algorithm = self.algorithm
         wrench = self.action_space == "wrench"
         cloning = isinstance(algorithm, Ppo) and algorithm.cloning_updates > 0
