@@ -24,7 +24,6 @@ class DriverBackend:
     """Drives one robot by its driver."""
 
     def __init__(self, robot: Robot, driver: DeviceDriver) -> None:
-        """Take over a driver that is connected."""
         self.robot, self._driver = robot, driver
         self._sent = robot.actuators.safe_command
         self._writing = threading.Lock()
@@ -108,7 +107,6 @@ class FloatingDriverBackend(DriverBackend):
     """The same for a driver that switches an air bearing; see `AirBearing`."""
 
     def __init__(self, robot: Robot, driver: DeviceDriver, bearing: AirBearing) -> None:
-        """Take over a driver that is connected, and its bearing."""
         super().__init__(robot, driver)
         self._bearing = bearing
 

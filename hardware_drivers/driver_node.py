@@ -44,7 +44,6 @@ class DriverSettings(PlantSettings):
     arm: bool = False  # arm an autopilot, as `arm: true` in the hardware file
 
     def __post_init__(self) -> None:
-        """Refuse what a real device cannot do."""
         super().__post_init__()
         if self.lockstep or self.rate != 1.0:
             raise ValueError(

@@ -104,7 +104,6 @@ class Decoder:
     """
 
     def __init__(self) -> None:
-        """Begin with an empty stream."""
         self._pending = bytearray()
         self.lost = 0
 

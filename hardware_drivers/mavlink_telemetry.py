@@ -26,7 +26,6 @@ class Telemetry:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing heard."""
         self.shift = np.zeros(3)
         self.voltage, self.armed = "", False
         self._time = DeviceTime()

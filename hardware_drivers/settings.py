@@ -28,6 +28,21 @@ def check_linger(linger_s: float) -> None:
         raise ValueError(f"linger_s = {linger_s:g} must be from 0 to {LONGEST_LINGER_S:g} s.")
 
 
+def check_order(order: tuple[int, ...], count: int) -> None:
+    """Reject orders that do not name each of `count` thrusters once; raises ValueError."""
+    if sorted(order) != list(range(count)):
+        raise ValueError(f"'order' must hold each of 0 to {count - 1} once.")
+
+
+class _Wired:
+    """Settings with a wiring of two sides."""
+
+    wiring: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        check_wiring(self.wiring)
+
+
 @dataclass(frozen=True)
 class Bearing:
     """The valve that feeds the air bearing."""
@@ -40,7 +55,6 @@ class Bearing:
     )
 
     def __post_init__(self) -> None:
-        """Refuse times without meaning."""
         check_linger(self.linger_s)
         if not self.idle_off_s >= 0.0:
             raise ValueError("idle_off_s must not be negative.")
@@ -59,12 +73,10 @@ class GpioValves:
     min_on_s: float = 0.0  # an opened valve stays open so long, except when all must close [s]
 
     def __post_init__(self) -> None:
-        """Refuse two valves on one line, and times that would outlast a watchdog."""
         every = (*self.lines, self.bearing.line)
         if len(set(every)) != len(every):
             raise ValueError("each valve and the bearing need a line of their own.")
-        if sorted(self.order) != list(range(len(self.lines))):
-            raise ValueError(f"'order' must hold each of 0 to {len(self.lines) - 1} once.")
+        check_order(self.order, len(self.lines))
         if not 0.0 <= self.min_on_s <= 0.2:
             raise ValueError("min_on_s must be from 0 to 0.2 s.")
 
@@ -83,14 +95,12 @@ class ValveTopic:
     linger_s: float = 1.0  # it carries the platform so long after the last valve has closed for good [s]
 
     def __post_init__(self) -> None:
-        """Refuse orders that leave a valve out, and times without meaning."""
         check_linger(self.linger_s)
-        if sorted(self.order) != list(range(len(self.order))):
-            raise ValueError(f"'order' must hold each of 0 to {len(self.order) - 1} once.")
+        check_order(self.order, len(self.order))
 
 
 @dataclass(frozen=True)
-class Kobuki:
+class Kobuki(_Wired):
     """The base of a Turtlebot2, by its serial protocol."""
 
     kind: Literal["kobuki"]
@@ -99,13 +109,9 @@ class Kobuki:
     silent_s: float = 0.3  # a base that reports nothing for so long is gone [s]
     wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
 
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
-
 
 @dataclass(frozen=True)
-class VelocityTopic:
+class VelocityTopic(_Wired):
     """A base that somebody else drives: `geometry_msgs/Twist`, or TwistStamped."""
 
     kind: Literal["velocity_topic"]
@@ -113,22 +119,14 @@ class VelocityTopic:
     stamped: bool
     wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
 
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
-
 
 @dataclass(frozen=True)
-class ThrustTopic:
+class ThrustTopic(_Wired):
     """A boat that somebody else drives: `std_msgs/Float32MultiArray`, one share of full thrust a propeller."""
 
     kind: Literal["thrust_topic"]
     topic: str
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
-
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,6 @@ class Geodetic:
     longitude: float  # [deg]
 
     def __post_init__(self) -> None:
-        """Refuse places that are not on Earth, and the poles, where east has no meaning."""
         if not (abs(self.latitude) < 89.0 and abs(self.longitude) <= 180.0):
             raise ValueError("latitude must be within 89° and longitude within 180°.")
 
@@ -152,13 +149,12 @@ class Thrust:
     astern: float  # [N]
 
     def __post_init__(self) -> None:
-        """Refuse propellers that do not push."""
         if min(self.ahead, self.astern) <= 0.0:
             raise ValueError("'ahead' and 'astern' must be greater than 0.")
 
 
 @dataclass(frozen=True)
-class KingfisherNmea:
+class KingfisherNmea(_Wired):
     """Kingfisher, Heron or M200, by the NMEA sentences of its front seat."""
 
     kind: Literal["kingfisher_nmea"]
@@ -168,10 +164,6 @@ class KingfisherNmea:
     baud: int = 115200
     silent_s: float = 1.0  # a boat that reports nothing for so long is gone [s]
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
-
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -191,7 +183,6 @@ class MavlinkBoat:
     arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; without it, it only listens
 
     def __post_init__(self) -> None:
-        """Refuse channels that MAVLink's override does not have, and pulses beyond those of servos."""
         check_wiring(self.wiring)
         channels = {self.steering_channel, self.throttle_channel}
         if len(channels) != 2 or not channels <= set(range(1, 9)):
@@ -219,14 +210,12 @@ class OwnDriver:
     options: dict[str, Any] = field(default_factory=dict)  # whatever else the class reads
 
     def __post_init__(self) -> None:
-        """Refuse what is no dotted path, a wiring that leaves a side out, and times without meaning."""
         try:
             check_class_path(self.kind)
         except ConfigError as error:
             raise ValueError(str(error)) from error
         check_wiring(self.wiring)
-        if sorted(self.order) != list(range(len(self.order))):
-            raise ValueError(f"'order' must hold each of 0 to {len(self.order) - 1} once.")
+        check_order(self.order, len(self.order))
         if not self.device_timeout_s >= 0.0:
             raise ValueError("device_timeout_s must not be negative.")
         if self.baud <= 0:

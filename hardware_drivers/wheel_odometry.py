@@ -74,7 +74,6 @@ class StandingWheels:
     """Watches one encoder for each wheel."""
 
     def __init__(self) -> None:
-        """Begin with the next reading."""
         self._counts: np.ndarray | None = None
 
     def problem(self, told: np.ndarray, counts: np.ndarray, time_s: float) -> str:

@@ -61,7 +61,6 @@ class EmulatorSettings(PlantSettings):
     dead: tuple[int, ...] = (NONE,)  # wires that are cut
 
     def __post_init__(self) -> None:
-        """Refuse devices that do not exist."""
         super().__post_init__()
         if self.device not in DEVICES:
             raise ValueError(str(UnknownNameError("device", self.device, DEVICES)))

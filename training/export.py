@@ -73,7 +73,7 @@ def export(run: Path, out: Path) -> Passport:
             key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
         }
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
-        | {key: record[key] for key in ("recipe", "specialist") if key in record}
+        | {key: record[key] for key in ("recipe", "fallback_policy") if key in record}
         | {"curve": _curve(record)}
         | _verdict(record),
     )
@@ -149,7 +149,7 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
 def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
     """What the network makes of held-out episodes at their start, a few commands later, and at limits.
 
-    Where it hands over to a specialist, every other robot is told of a loss that strands it.
+    Where it hands over to a fallback, every other robot is told of a loss that strands it.
     """
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
@@ -167,7 +167,7 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
         inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
         seen = with_disturbances(loop.observer, inputs) if network.plan.disturbances else inputs.observation
         seen = seen.astype(np.float32)
-        if network.specialist is not None:
+        if network.fallback is not None:
             losses = network.losses.numpy()
             stranded = seen[::2, -losses.shape[1] :]
             stranded[:] = 1.0 - np.resize(losses, stranded.shape)

@@ -17,7 +17,7 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from training.worlds import Worlds, action_space, observation_space
+from training.worlds import Worlds, actuator_space, observation_space
 
 Infos = dict[str, Any]
 
@@ -41,7 +41,7 @@ class TaskEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         self._world = Worlds(robot, task, scenario, worlds=1, seed=seed, training=training)
         self.observation_space = observation_space(self._world.terms)
-        self.action_space = action_space(robot)
+        self.action_space = actuator_space(robot)
         self._fresh = True  # the first episode has not been handed out yet
 
     @property
@@ -114,7 +114,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarra
         self.num_envs = num_envs
         self._worlds = Worlds(robot, task, scenario, worlds=num_envs, seed=seed, training=training)
         self.single_observation_space = observation_space(self._worlds.terms)
-        self.single_action_space = action_space(robot)
+        self.single_action_space = actuator_space(robot)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._fresh = True  # the first episodes have not been handed out yet

@@ -115,7 +115,6 @@ class _Adapter:
     """What stands before and after a network of RoboRAN."""
 
     def __init__(self, robot: Robot, names: tuple[str, ...], layout: Layout) -> None:
-        """Prepare for a robot, the names of our terms, and what the network takes instead of them."""
         self.memory = len(robot.actuators.names)  # the last actions
         self._actuators, self._names, self._layout = robot.actuators, names, layout
 

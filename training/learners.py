@@ -14,7 +14,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
-from training.behavior_cloning import Apprentice
+from training.behavior_cloning import BehaviorCloningPPO
 from training.fast_ppo import FastPPO
 from training.settings import Algorithm, OnPolicy, Ppo, RecurrentPpo, Td3
 
@@ -22,8 +22,8 @@ from training.settings import Algorithm, OnPolicy, Ppo, RecurrentPpo, Td3
 def learner_class(settings: Algorithm) -> type[BaseAlgorithm]:
     """The class that settings build, which also loads what it has saved."""
     if isinstance(settings, Ppo):
-        if settings.lessons:
-            return Apprentice
+        if settings.cloning_updates:
+            return BehaviorCloningPPO
         return FastPPO if settings.fast else PPO
     if isinstance(settings, RecurrentPpo):
         return RecurrentPPO
@@ -82,7 +82,6 @@ class KlAdaptiveRate:
     """Learning rate that falls when updates go too far and rises when they do too little."""
 
     def __init__(self, settings: OnPolicy) -> None:
-        """Begin at the settings' rate."""
         self.rate = settings.learning_rate
         self._low, self._high = settings.learning_rate_range
         self.target = settings.target_kl  # divergence of an update
@@ -103,7 +102,6 @@ class KlFeedback(BaseCallback):
     """Hands the divergence of the last update to the learning rate."""
 
     def __init__(self, rate: KlAdaptiveRate) -> None:
-        """Remember whom to tell."""
         super().__init__()
         self._rate = rate
 
@@ -141,8 +139,8 @@ def build_ppo(
         policy["lstm_hidden_size"] = settings.memory
     elif settings.fast:
         kind, more = FastPPO, {"precision": settings.precision}
-        if settings.lessons:
-            kind, more = Apprentice, more | {"lessons": settings.lessons}
+        if settings.cloning_updates:
+            kind, more = BehaviorCloningPPO, more | {"cloning_updates": settings.cloning_updates}
     return kind(
         "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy",
         env,

@@ -23,7 +23,7 @@ class Watcher(Protocol):
     def advance(self, share: float, elapsed_s: float, steps: int) -> None:
         """An update is done: share of the run that is over [-], its wall-clock [s], control steps so far."""
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """A check is done: wall-clock [s] and success rate [-]."""
 
     def end(self) -> None:
@@ -34,7 +34,6 @@ class Speed:
     """Control steps per second, lately."""
 
     def __init__(self) -> None:
-        """Begin without knowing."""
         self._last: tuple[float, int] | None = None
         self.rate = 0.0
 
@@ -79,7 +78,7 @@ class LearningBar:
         rate = self._speed.update(elapsed_s, steps)
         self._bar.update(self._task, completed=share, steps=steps, rate=rate)
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """Show the latest check; also as a line where there is no terminal."""
         self._bar.update(self._task, verdict=f"success {success:.3f}")
         if not self._console.is_terminal:
@@ -99,7 +98,6 @@ class ProgressFile:
     EVERY_S = 0.5
 
     def __init__(self, path: Path) -> None:
-        """Write to this file."""
         self._path, self._speed, self._next = path, Speed(), 0.0
         self._told: dict[str, float | int | None] = {"share": 0.0, "steps": 0, "rate": 0.0, "success": None}
 
@@ -114,7 +112,7 @@ class ProgressFile:
         if time.monotonic() >= self._next:
             self._write()
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """Note the latest check."""
         self._told["success"] = success
         self._write()
@@ -134,7 +132,6 @@ class JobBars:
     """Is a `Watch` while its context is open."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Prepare a bar for each job, by its name."""
         self._console = Console(stderr=True, highlight=False)
         self._bars = Progress(
             TextColumn("{task.description}"),
@@ -150,18 +147,15 @@ class JobBars:
         ]
 
     def __enter__(self) -> JobBars:
-        """Start drawing."""
         self._bars.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop drawing."""
         self._bars.stop()
 
     def __call__(self, number: int, state: str, progress: dict[str, Any]) -> None:
-        """Show how far a job is."""
         task = self._tasks[number]
         success = progress.get("success")
         known = "" if success is None else f"  success {success:.3f}"

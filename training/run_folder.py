@@ -7,7 +7,7 @@ network.pt      the best weights, as a robot would run them
 checkpoint.pkl  everything a run needs to go on exactly where it was
 tensorboard/    curves
 calibration.yaml what was measured on the robot it learns for, where that was given
-specialist/     the run folder of the network that takes over from this one, where it has such
+fallback/     the run folder of the network that takes over from this one, where it has such
 progress.json   how far it is, for whoever watches from outside
 """
 
@@ -31,7 +31,7 @@ CHECKPOINT_FILE = "checkpoint.pkl"
 TENSORBOARD_FOLDER = "tensorboard"
 CALIBRATION_FILE = "calibration.yaml"
 PROGRESS_FILE = "progress.json"
-SPECIALIST_FOLDER = "specialist"
+FALLBACK_FOLDER = "fallback_policy"
 
 _NEEDED = (
     "robot",

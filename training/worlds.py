@@ -43,7 +43,7 @@ class Worlds:
             raise ConfigError(f"num_envs: found {worlds}, need at least 1.")
         if seed < 0:
             raise ConfigError(f"seed: found {seed}, need 0 or more.")
-        self._robot, self._task, self._scenario = robot, asked_for(task, scenario), scenario
+        self._robot, self._task, self._scenario = robot, training_task(task, scenario), scenario
         self._worlds, self._training = worlds, training
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         self.begin(seed)
@@ -71,7 +71,7 @@ class Worlds:
         return np.asarray(self.simulation.observe(worlds))
 
     def step(self, actions: np.ndarray) -> Outcome:
-        """Move one control step; actions of shape (worlds, actuators) are elements of `action_space`."""
+        """Move one control step; actions of shape (worlds, actuators) are elements of `actuator_space`."""
         command = np.asarray(actions, dtype=np.float32) * self._scale
         reward, over, seen = observed_step(self.simulation, command, effort=self._robot.costs.effort)
         self._age += 1
@@ -85,7 +85,7 @@ def observation_space(terms: int) -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(-np.inf, np.inf, (terms,), np.float32)
 
 
-def action_space(robot: Robot) -> gymnasium.Space[Any]:
+def actuator_space(robot: Robot) -> gymnasium.Space[Any]:
     """One entry for each actuator: 0 or 1 for on/off valves, else a share of the full command in [-1, 1]."""
     count = len(robot.actuators.names)
     return gymnasium.spaces.MultiBinary(count) if robot.actuators.binary else shares_space(count)
@@ -96,8 +96,13 @@ def shares_space(count: int) -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(-1.0, 1.0, (count,), np.float32)
 
 
-def asked_for(task: Task, scenario: Scenario) -> Task:
-    """The task with the weights that count in a scenario: other ones where all failures strand the robot."""
+def training_task(task: Task, scenario: Scenario) -> Task:
+    """The task with its reward for a scenario: another one where every failure makes the robot uncontrollable.
+
+    Where no mean wrench is left in some direction (`fulmar_core.holdability`), a platform that turns its working
+    nozzles towards where it brakes can still come to rest at its goal. A reward for the heading on the way keeps it
+    from learning that.
+    """
     if not (scenario.actuation.stranding and isinstance(task, GoToPose) and task.stranded_weights):
         return task
     return replace(task, reward_weights=task.stranded_weights)

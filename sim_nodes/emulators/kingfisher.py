@@ -29,7 +29,6 @@ class KingfisherEmulator:
     """
 
     def __init__(self, link: Link) -> None:
-        """Switch it on."""
         self._link, self.address = link, link.address
         self._pending = b""
         self._command, self._commanded_s = np.zeros(2), -math.inf

@@ -37,7 +37,6 @@ class Floater:
         return self.water is None
 
     def __init__(self, robot: Robot) -> None:
-        """Prepare for `add`."""
         assert isinstance(robot.actuators, Thrusters | Propellers)  # `machine_of` has others for wheels
         self._robot, self._actuators = robot, robot.actuators
         self._body = 0

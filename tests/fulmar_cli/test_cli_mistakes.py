@@ -109,7 +109,7 @@ def broken_configs(tmp_path, monkeypatch):
         (["report", __file__], Path(__file__).name),
         (["export", "/nowhere", "--out", "x"], "/nowhere: no finished training run"),
         (["train", "floating_platform", "go_to"], "unknown task 'go_to'"),
-        (["train", "floating_platform", "go_to_pose", "--seed", "1000003"], "kept for judging"),
+        (["train", "floating_platform", "go_to_pose", "--seed", "1000003"], "reserved for evaluation"),
     ],
     ids=lambda value: " ".join(value)[-45:] if isinstance(value, list) else "",
 )  # fmt: skip

@@ -113,7 +113,9 @@ def learned(monkeypatch):
         return {"steps": 1000, "wall_s": 2.0}
 
     monkeypatch.setattr("training.jobs.learn", learn)
-    monkeypatch.setattr("training.evaluator.judge_in_mujoco", lambda run, episodes: {"success_rate": 0.875})
+    monkeypatch.setattr(
+        "training.evaluator.evaluate_in_mujoco", lambda run, episodes: {"success_rate": 0.875}
+    )
     return jobs
 
 

@@ -90,7 +90,7 @@ def train(
 
 
 def _learn_once(job: Job, *, resumes: bool, as_json: bool) -> None:
-    from training.evaluator import judge_in_mujoco
+    from training.evaluator import evaluate_in_mujoco
     from training.jobs import learn
     from training.progress import LearningBar
     from training.run_folder import CHECKPOINT_FILE, NETWORK_FILE, RUN_FILE, START_FILE, learning_in
@@ -115,7 +115,7 @@ def _learn_once(job: Job, *, resumes: bool, as_json: bool) -> None:
     parts = [record, record.get("specialist", {"steps": 0, "wall_s": 0.0})]
     steps, wall_s = (sum(part[key] for part in parts) for key in ("steps", "wall_s"))
     log_line(f"learned from {steps:,} steps in {wall_s:.0f} s; evaluating in MuJoCo")
-    figures = judge_in_mujoco(job.out, episodes=job.episodes)
+    figures = evaluate_in_mujoco(job.out, episodes=job.episodes)
     if as_json:
         print_json({"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures})
         return

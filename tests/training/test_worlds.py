@@ -11,10 +11,10 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.vec_env import BatchVecEnv
-from training.worlds import asked_for
+from training.worlds import training_task
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
-STRANDED = load_scenario("drift_stranded")
+UNCONTROLLABLE = load_scenario("drift_stranded")
 
 
 def rewards(task, scenario):
@@ -23,12 +23,11 @@ def rewards(task, scenario):
     return worlds.step(np.zeros((16, 8), dtype=np.int8))[1]
 
 
-def test_stranded_worlds_are_rewarded_by_their_own_weights():
+def test_uncontrollable_robots_are_rewarded_by_their_own_weights():
     meant = replace(TASK, reward_weights=TASK.stranded_weights, stranded_weights=None)
-    np.testing.assert_array_equal(rewards(TASK, STRANDED), rewards(meant, STRANDED))
-    assert (
-        np.abs(rewards(replace(TASK, stranded_weights=None), STRANDED) - rewards(meant, STRANDED)).max() > 0.1
-    )
+    np.testing.assert_array_equal(rewards(TASK, UNCONTROLLABLE), rewards(meant, UNCONTROLLABLE))
+    plain = rewards(replace(TASK, stranded_weights=None), UNCONTROLLABLE)
+    assert np.abs(plain - rewards(meant, UNCONTROLLABLE)).max() > 0.1
 
 
 @pytest.mark.parametrize(
@@ -41,4 +40,4 @@ def test_stranded_worlds_are_rewarded_by_their_own_weights():
 )
 def test_everyone_else_is_asked_for_what_the_task_says(task, scenario):
     plain = load_task(task)
-    assert asked_for(plain, load_scenario(scenario)) is plain
+    assert training_task(plain, load_scenario(scenario)) is plain
