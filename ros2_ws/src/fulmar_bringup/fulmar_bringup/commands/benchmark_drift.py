@@ -12,7 +12,7 @@ import typer
 from fulmar_bringup.commands.arguments import JsonOption, PolicyOption, SeedOption
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.episode import JUDGE_SEED, episode_steps
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.exit_codes import FAILED
 
@@ -74,7 +74,7 @@ def drift(
     fulmar benchmark drift --rows ideal,torque --controllers lqr --through mujoco
     """
     from fulmar_bringup.benchmark.drift.campaign import Request, run_drift
-    from fulmar_bringup.benchmark.drift.conditions import ROWS
+    from fulmar_bringup.benchmark.drift.conditions import POSE_TASK, ROBOT, ROWS
     from fulmar_bringup.benchmark.drift.tables import print_tables
     from fulmar_bringup.benchmark.drift.unit import DriftUnit
     from fulmar_bringup.benchmark.judged import Judged
@@ -82,6 +82,9 @@ def drift(
     from fulmar_bringup.commands.benchmark_roboran import chosen
     from fulmar_bringup.evaluation import WAYS
     from fulmar_bringup.extras import require
+    from fulmar_core.counts import check_episodes
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
     from policy_server.controllers import CONTROLLERS
 
     if through not in WAYS:
@@ -95,6 +98,10 @@ def drift(
         require("mujoco")
     if report:
         require("matplotlib")
+    jobs = jobs or len(os.sched_getaffinity(0))
+    robot = load_robot(ROBOT)
+    steps = episode_steps(load_task(POSE_TASK), 1.0 / robot.timing.control_hz)
+    check_episodes(robot, episodes=episodes, steps=steps, jobs=jobs)
     request = Request(
         rows=ROWS if rows is None else chosen(rows, "row", ROWS),
         controllers=known if "all" in names else names,
@@ -104,7 +111,7 @@ def drift(
         folder=out,
         policy=policy,
         tracking_policy=tracking_policy,
-        jobs=jobs or len(os.sched_getaffinity(0)),
+        jobs=jobs,
         fresh=fresh,
         command="fulmar " + " ".join(sys.argv[1:]),
     )

@@ -83,8 +83,11 @@ def roboran(
     from fulmar_bringup.benchmark.thesis import ROBOTS, TASKS
     from fulmar_bringup.benchmark.unit import Unit
     from fulmar_bringup.extras import require
+    from fulmar_core.counts import check_episodes
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.paths import config_names
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
     from policy_server.controllers import controller_entry
 
     load_scenario(scenario)
@@ -96,16 +99,23 @@ def roboran(
         require("mujoco")
     if report:
         require("matplotlib")
+    the_robots = ROBOTS if robots is None else chosen(robots, "robot", tuple(config_names("robots")))
+    the_tasks = TASKS if tasks is None else chosen(tasks, "task", tuple(config_names("tasks")))
+    counts, jobs = {way: episodes or EPISODES[way] for way in ways}, jobs or len(os.sched_getaffinity(0))
+    longest_s = max(load_task(name).episode_s for name in the_tasks)
+    for robot in map(load_robot, the_robots):
+        steps = round(longest_s * robot.timing.control_hz)
+        check_episodes(robot, episodes=max(counts.values()), steps=steps, jobs=jobs)
     request = Request(
-        robots=ROBOTS if robots is None else chosen(robots, "robot", tuple(config_names("robots"))),
-        tasks=TASKS if tasks is None else chosen(tasks, "task", tuple(config_names("tasks"))),
+        robots=the_robots,
+        tasks=the_tasks,
         kinds=kinds,
-        episodes={way: episodes or EPISODES[way] for way in ways},
+        episodes=counts,
         seed=seed,
         scenario=scenario,
         folder=out,
         policies=policies,
-        jobs=jobs or len(os.sched_getaffinity(0)),
+        jobs=jobs,
         fresh=fresh,
         command="fulmar " + " ".join(sys.argv[1:]),
     )

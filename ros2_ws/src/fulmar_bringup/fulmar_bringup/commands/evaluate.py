@@ -108,6 +108,7 @@ def evaluate(
     from fulmar_bringup.planning import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, gains_note, modules_of
     from fulmar_core.calibration import use_calibration
+    from fulmar_core.counts import check_episodes
     from fulmar_core.disturbances.scenario import check_delays, load_scenario
     from fulmar_core.robot import load_robot
     from fulmar_core.rollout import WORLDS
@@ -138,6 +139,14 @@ def evaluate(
             f"an episode of {duration_s:g} s is shorter than the {window_s:g} s that '{task}' is held in the end. "
             "Make it longer."
         )
+    episodes = episodes or (BATCH_EPISODES if through == "batch" else EPISODES)
+    check_episodes(
+        the_robot,
+        episodes=episodes,
+        steps=steps or round(duration_s / control_dt),
+        worlds=(worlds or WORLDS) if through == "batch" else None,
+        jobs=(jobs or 1) if through == "ros" else 1,
+    )
     policy = chosen_policy(controller, policy, the_robot, the_task, hz)
     if note := gains_note(robot, controller):
         console.print(f"info: {note}", markup=False, soft_wrap=True)
@@ -154,7 +163,6 @@ def evaluate(
         duration_s=duration_s,
         lockstep=True,
     )
-    episodes = episodes or (BATCH_EPISODES if through == "batch" else EPISODES)
     trial = Trial(plan, through, episodes, worlds or WORLDS, jobs or _cores(), bounds or BOUNDED_EPISODES)
     began = time.monotonic()
     with step_bar("judging", episodes * episode_steps(trial.task, control_dt)) as progress:

@@ -14,6 +14,7 @@ from fulmar_bringup.commands.arguments import CalibrationOption, JsonOption, See
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.extras import require
 from fulmar_core.calibration import use_calibration
+from fulmar_core.counts import check_count, check_episodes
 from fulmar_core.errors import ConfigError
 from fulmar_core.exit_codes import FAILED
 
@@ -141,6 +142,8 @@ def train(
         job = replace(job, settings=replace(job.settings, stop_at_success=enough))
     if control_hz is not None:
         job = _commanded_at(job, control_hz)
+    check_count("--seeds", seeds)
+    _check_judgement(job)
     job = replace(job, name=f"{job.robot}_{job.task}_{job.seed}")
     if resume and seeds > 1:
         raise ConfigError(
@@ -160,6 +163,15 @@ def _remember_limits(job: Job) -> None:
 
     limits = {"time_limit_s": job.time_limit_s, "updates": job.updates}
     write_start(job.out, read_start(job.out) | limits)
+
+
+def _check_judgement(job: Job) -> None:
+    from fulmar_core.robot import load_robot
+    from fulmar_core.tasks import load_task
+
+    robot = load_robot(job.robot)
+    hz = job.settings.control_hz or robot.timing.control_hz
+    check_episodes(robot, episodes=job.episodes, steps=round(load_task(job.task).episode_s * hz))
 
 
 def _commanded_at(job: Job, control_hz: float) -> Job:
