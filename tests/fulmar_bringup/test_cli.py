@@ -6,6 +6,7 @@ import contextlib
 import json
 import re
 import sys
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -27,6 +28,10 @@ def test_without_a_command_the_help_is_shown_as_bad_usage(fulmar):
     code, out, err = fulmar()
     assert (code, out) == (2, "")
     assert err.lstrip().startswith("Usage: fulmar")
+
+
+def test_the_version_is_that_of_the_distribution(fulmar):
+    assert fulmar("--version") == (0, f"fulmar {version('fulmar')}\n", "")
 
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["bundle", "show", "--help"]])

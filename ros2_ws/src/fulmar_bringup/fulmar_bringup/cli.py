@@ -6,7 +6,9 @@ import os
 import signal
 import sys
 from collections import namedtuple
+from importlib.metadata import version
 from types import FrameType
+from typing import Annotated
 
 import typer
 
@@ -32,7 +34,7 @@ from fulmar_bringup.commands.swap import swap
 from fulmar_bringup.commands.teleop import teleop
 from fulmar_bringup.commands.train import train
 from fulmar_bringup.commands.up import up
-from fulmar_bringup.console import console, showing_warnings
+from fulmar_bringup.console import console, output, showing_warnings
 from fulmar_bringup.extras import advice_for
 from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
 from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
@@ -43,10 +45,27 @@ app = typer.Typer(
     name="fulmar",
     help="Robots driven by learned and classical controllers over ROS 2: simulate, run, record, train, judge.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        output.print(f"fulmar {version('fulmar')}", markup=False)
+        raise typer.Exit(DONE)
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    """Options of the whole program; its help is that of `app`."""
+
+
 app.command("list")(list_names)
 app.command()(run)
 app.command()(up)
