@@ -114,6 +114,13 @@ def first_targets(file: GoalFile) -> np.ndarray:
     return np.zeros((1, 3)) if isinstance(file, FollowedPath) else file.targets()
 
 
+def places_of(file: GoalFile) -> np.ndarray:
+    """Where a file leads, shape (n, 2 or 3), x and y first [m]; no place for velocities."""
+    if isinstance(file, FollowedPath):
+        return np.asarray(file.planner().points)
+    return np.zeros((0, 3)) if isinstance(file, Velocities) else file.targets()
+
+
 def start_of(file: GoalFile) -> PoseTuple | None:
     """Where to begin; None for places: anywhere about the first of them."""
     if isinstance(file, FollowedPath):
