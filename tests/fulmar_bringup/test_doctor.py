@@ -131,7 +131,7 @@ def test_shared_memory_that_killed_processes_left_is_counted_and_can_be_given_ba
         os.utime(tmp_path / name, (time.time() - HOUR,) * 2)
     finding = check_shared_memory(tmp_path)
     assert finding.level == "advice"
-    assert "1 pieces left by killed processes" in finding.found
+    assert "pieces left by killed processes: 1" in finding.found
     assert len(list(tmp_path.iterdir())) == 2  # it looks, and removes nothing
     done = subprocess.run(finding.fix.split(), capture_output=True, text=True, check=True)
     assert done.stdout.startswith("removed ")

@@ -37,7 +37,7 @@ def test_the_first_of_some_places_that_is_outside_is_named_with_the_area():
     with pytest.raises(ConfigError) as caught:
         check_places("the goal", [(1.0, -1.0), (1.0, 2.0, 90.0)], LAB)
     assert str(caught.value) == (
-        "the goal x = 1 m, y = 2 m lies outside the area of x 0 to 5 m, y -3 to 0 m. Give a place inside it, in metres."
+        "the goal x = 1 m, y = 2 m lies outside the area of x 0 to 5 m, y -3 to 0 m. Give another place, in metres."
     )
 
 

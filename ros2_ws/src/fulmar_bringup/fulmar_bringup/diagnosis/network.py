@@ -109,7 +109,7 @@ def check_shared_memory(folder: Path = SHARED_MEMORY, *, least_bytes: int = FREE
         return Finding(what, "wrong", f"{folder} cannot be written", mount)
     free, left = shutil.disk_usage(folder).free, count_abandoned_memory(folder)
     found = f"{free / 1e6:,.0f} MB free in {folder}" + (
-        f", {left} pieces left by killed processes" if left else ""
+        f"; pieces left by killed processes: {left}" if left else ""
     )
     if free < least_bytes:
         grow = f"sudo mount -o remount,size=50% {folder}   # in a container: docker run --shm-size=1g"

@@ -73,7 +73,7 @@ def check_places(what: str, places: Iterable[Sequence[float]], area: Sequence[fl
     """
     problem = unreachable(what, places, area)
     if problem:
-        raise ConfigError(f"{problem} Give a place inside it, in metres.")
+        raise ConfigError(f"{problem} Give another place, in metres.")
 
 
 def _sides(area: Sequence[float]) -> str:
