@@ -221,6 +221,7 @@ def _motion(found: Odometries) -> Motion:
     return Motion(
         stamp_s=found.stamp_ns / NS,
         log_s=found.log_ns / NS,
+        publish_s=found.publish_ns / NS,
         position=found.pose[:, :3],
         quat_xyzw=quat,
         velocity_in_world=rotate(quat, found.twist[:, :3]),
@@ -229,7 +230,7 @@ def _motion(found: Odometries) -> Motion:
 
 
 def _actuation(found: Vectors) -> Actuation:
-    return Actuation(found.stamp_ns / NS, found.log_ns / NS, found.names, found.values)
+    return Actuation(found.stamp_ns / NS, found.log_ns / NS, found.publish_ns / NS, found.names, found.values)
 
 
 def _health(found: Decoded, name: str) -> tuple[HealthSample, ...]:

@@ -314,8 +314,8 @@ def _of_goals(plan: RunPlan) -> dict[str, Any]:
 def _nothing_recorded(request: RunRequest) -> RunRecord:
     """The record of a run that left no bag: what was asked for, and nothing else."""
     none, vectors = np.empty(0), np.empty((0, 3))
-    motion = Motion(none, none, vectors, np.empty((0, 4)), vectors, none)
-    actuation = Actuation(none, none, (), np.empty((0, 0)))
+    motion = Motion(none, none, none, vectors, np.empty((0, 4)), vectors, none)
+    actuation = Actuation(none, none, none, (), np.empty((0, 0)))
     return RunRecord(
         path=request.record,
         info=asdict(request.plan),

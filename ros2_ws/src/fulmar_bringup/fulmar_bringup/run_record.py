@@ -16,7 +16,8 @@ class Motion:
     """States of one body over time; all arrays begin with the same axis."""
 
     stamp_s: np.ndarray  # (n,) time of measurement [s]
-    log_s: np.ndarray  # (n,) when the recorder got it [s]
+    log_s: np.ndarray  # (n,) when the recorder received it, by its wall clock [s]
+    publish_s: np.ndarray  # (n,) when it was sent, by the sender's wall clock [s]
     position: np.ndarray  # (n, 3) in the world [m]
     quat_xyzw: np.ndarray  # (n, 4) [-]
     velocity_in_world: np.ndarray  # (n, 3) [m/s]
@@ -45,6 +46,7 @@ class Actuation:
 
     stamp_s: np.ndarray  # (n,) [s]
     log_s: np.ndarray  # (n,) [s]
+    publish_s: np.ndarray  # (n,) [s]
     names: tuple[str, ...]  # of the columns
     effort: np.ndarray  # (n, m)
 

@@ -235,10 +235,11 @@ def _checked(
             names,
             found.stamp_ns[:0],
             found.log_ns[:0],
+            found.publish_ns[:0],
             np.zeros((0, len(names))),
             found.left_out + len(found),
         )
-    return found if len(found) else Vectors(names, found.stamp_ns, found.log_ns, np.zeros((0, len(names))), 0)
+    return found if len(found) else replace(found, names=names, values=np.zeros((0, len(names))), left_out=0)
 
 
 def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int, int]]:

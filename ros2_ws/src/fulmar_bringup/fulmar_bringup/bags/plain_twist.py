@@ -27,7 +27,7 @@ def plain_vectors(topic: Topic) -> Vectors:
     found = messages(topic)
     log_ns = np.array([log for log, _ in found], dtype=np.int64)
     values = np.array([(m.linear.x, m.angular.z) for _, m in found], dtype=float).reshape(-1, 2)
-    return Vectors(("speed", "yaw_rate"), log_ns, log_ns, values, len(topic) - len(found))
+    return Vectors(("speed", "yaw_rate"), log_ns, log_ns, log_ns, values, len(topic) - len(found))
 
 
 def answers_within(steps_ns: np.ndarray, commands_ns: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ SHORTEST_MS = 0.01
 
 
 def draw_latency(axes: Axes, runs: Sequence[View]) -> None:
-    """Share of commands by the time from measurement to answer, with p50 and p99.
+    """Share of commands by the time from sending a measurement to sending its answer, with p50 and p99.
 
     The scale is logarithmic, because a few answers take ten times as long as most.
     """
@@ -42,6 +42,6 @@ def draw_latency(axes: Axes, runs: Sequence[View]) -> None:
     axes.xaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("from measurement to command, as recorded [ms]")
+    axes.set_xlabel("from measurement sent to command sent [ms]")
     axes.set_ylabel("commands [%]")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8.5, handlelength=1.2)
