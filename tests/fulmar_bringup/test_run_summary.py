@@ -77,9 +77,11 @@ def test_a_run_of_exactly_the_window_is_long_enough_whatever_its_stamps_round_to
 def before_the_start(record, count):
     """The record with commands that answer nothing, as a controller sends them before the plant starts."""
     first = record.commanded
+    times = np.concatenate((first.log_s[0] - 10.0 * np.arange(count, 0, -1), first.log_s))
     early = {
         "stamp_s": np.concatenate((np.zeros(count), first.stamp_s)),
-        "log_s": np.concatenate((first.log_s[0] - 10.0 * np.arange(count, 0, -1), first.log_s)),
+        "log_s": times,
+        "publish_s": times,
         "effort": np.concatenate((np.zeros((count, 8)), first.effort)),
     }
     return dataclasses.replace(record, commanded=dataclasses.replace(first, **early))
@@ -281,6 +283,7 @@ def test_a_run_on_hardware_is_judged_from_its_first_actuation_on_for_as_long_as_
         applied,
         stamp_s=applied.stamp_s[first:],
         log_s=applied.log_s[first:],
+        publish_s=applied.publish_s[first:],
         effort=applied.effort[first:],
     )
     info = {**record.info, "backend": "hardware", "duration_s": 20.0}

@@ -37,9 +37,9 @@ def export(
 ) -> None:
     """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
 
-    The dataset follows version 2.1 of LeRobot's format: `meta/info.json`, tasks, episodes and their statistics as JSON
-    lines, and a parquet file for each episode, with `observation.state` and `action` as the controller saw and said
-    them. It needs the extra 'datasets'.
+    The dataset follows version 3.0 of LeRobot's format: `meta/info.json`, `meta/stats.json`, tasks, episodes and frames
+    as parquet, with `observation.state` and `action` as the controller received and sent them. It needs the extra
+    'datasets'.
     """
     from fulmar_bringup.bags.tables import write_csv, write_npz
 
@@ -56,6 +56,7 @@ def export(
         file, left_out = write_npz(opened[0], path.with_suffix(".npz"))
         files = [file]
     else:
+        from fulmar_bringup.bags.carried import knowing_what_it_carries
         from fulmar_bringup.bags.course import course_of
         from fulmar_bringup.bags.lerobot import write_lerobot
 
@@ -64,9 +65,10 @@ def export(
                 raise BagError(
                     f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
                 )
-        courses = [course_of(bag, task=task) for bag in opened]
-        titles = [course.task.title for course in courses]
-        folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
+        with knowing_what_it_carries(*opened):
+            courses = [course_of(bag, task=task) for bag in opened]
+            titles = [course.task.title for course in courses]
+            folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
         files, left_out = [folder], []
         warn(notes)
     warn(f"left out: {line}" for line in left_out)

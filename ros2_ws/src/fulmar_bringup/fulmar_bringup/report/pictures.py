@@ -141,7 +141,8 @@ def _latency(runs: Sequence[View]) -> Picture:
     axes = figure.subplots()
     draw_latency(axes, runs)
     caption = """
-    Time from sending a measurement to sending the command that answers it; the scale is logarithmic. The solid line is the median (p50); 99 of 100 commands come before the dashed one (p99)."""
+    Time from sending a measurement to sending the command that answers it; the scale is logarithmic.
+    The solid line is the median (p50); 99 of 100 commands come before the dashed one (p99)."""
     return Picture("How fast the controller answers", _words(caption), figure)
 
 
