@@ -12,7 +12,7 @@ from fulmar_bringup.bag_reader import read_run
 from fulmar_bringup.commands.run import verdict
 from fulmar_bringup.run_judgement import _goals, judge
 from fulmar_bringup.run_record import Motion, Places
-from fulmar_bringup.run_summary import summarise
+from fulmar_bringup.run_summary import latencies_ms, summarise
 from fulmar_core.errors import BagError
 from fulmar_core.rotation import yaw_of
 from fulmar_core.tasks import load_task
@@ -117,6 +117,16 @@ def test_figures_of_the_nodes_are_taken_over(reached):
 def test_latency_comes_from_the_bag_where_the_plant_does_not_tell_it(reached):
     latency = summarise(read_run(reached))["latency_ms"]
     assert 1.5 < latency["p50"] < latency["p99"] <= latency["max"] < 6.0
+
+
+def test_latency_does_not_count_how_late_the_recorder_received_a_command(reached):
+    record = dataclasses.replace(read_run(reached), health=())
+    late = dataclasses.replace(record.commanded, log_s=record.commanded.log_s + 0.5)
+    record = dataclasses.replace(record, commanded=late)
+    assert summarise(record)["latency_ms"]["max"] < 6.0
+    sent_later = dataclasses.replace(late, publish_s=late.publish_s + 0.001)
+    before, after = (latencies_ms(dataclasses.replace(record, commanded=each)) for each in (late, sent_later))
+    np.testing.assert_allclose(after, before + 1.0, atol=1e-3)
 
 
 def test_latency_of_the_plant_counts_where_it_tells_it(reached):
