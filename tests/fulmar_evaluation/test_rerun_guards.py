@@ -42,7 +42,8 @@ def saying(bag: Bag, wire: Wire, *said: tuple[int, object]) -> Bag:
     kind = type_store().types[wire.type]
     data = [bytes(type_store().serialize_cdr(kind(data=what), wire.type)) for _, what in said]
     name = f"/{bag.robot}/{wire.name}"
-    topic = Topic(name, wire.type, data, [log for log, _ in said], [0] * len(said))
+    logs = [log for log, _ in said]
+    topic = Topic(name, wire.type, data, logs, logs, [0] * len(said))
     return replace(bag, topics={**bag.topics, name: topic})
 
 
