@@ -105,8 +105,8 @@ class AdapterNode(Node):
     def _receive(self, message: Any) -> None:
         if self._comes_from_our_plant():
             self.get_logger().error(
-                f"{self._subscription.topic_name} is the topic of this robot's own driver: its commands would come back "
-                "as new ones, and the watchdog would never act. Give the topic of the other controllers, such as "
+                f"{self._subscription.topic_name} is the topic of this robot's own driver: its commands would come "
+                "back as new ones, and the watchdog would never act. Give the topic of the other controllers, such as "
                 "-p topic:=/fp_cmd_mux/autonomous_control_input."
             )
             self._request_exit(BAD_USAGE)
