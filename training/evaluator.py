@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.episode import HELD_OUT_SEED, JUDGE_SEED
 from fulmar_core.metrics import summary
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.seeds import EVALUATION_SEED, HELD_OUT_SEED
 from fulmar_core.tasks import Task, load_task
 from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
@@ -87,9 +87,9 @@ def evaluate_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -
         task,
         world,
         episodes=episodes,
-        seed=JUDGE_SEED,
+        seed=EVALUATION_SEED,
     )
     figures: dict[str, Any] = summary(trajectories, task)
-    record["mujoco"] = {"scenario": scenario, "seed": JUDGE_SEED, **figures}
+    record["mujoco"] = {"scenario": scenario, "seed": EVALUATION_SEED, **figures}
     write_run_record(run, record)
     return figures

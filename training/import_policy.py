@@ -11,11 +11,11 @@ import onnx
 import torch
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import FORMAT, PASSPORT, Golden, Passport, action_of, write_bundle
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.seeds import HELD_OUT_SEED
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from training.agent_config import Activations, find_activations

@@ -15,10 +15,10 @@ from stable_baselines3.common.logger import KVWriter, configure
 from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import JUDGING_SEEDS
 from fulmar_core.errors import ConfigError
 from fulmar_core.geofence import check_starts
 from fulmar_core.robot import Robot
+from fulmar_core.seeds import EVALUATION_SEEDS
 from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint
 from training.evaluator import held_out_evaluator
@@ -46,8 +46,8 @@ def check_seed(seed: int) -> None:
     Raises:
         ConfigError: The seed is negative or reserved.
     """
-    if seed < 0 or seed in JUDGING_SEEDS:
-        reserved = " and ".join(map(str, JUDGING_SEEDS))
+    if seed < 0 or seed in EVALUATION_SEEDS:
+        reserved = " and ".join(map(str, EVALUATION_SEEDS))
         raise ConfigError(
             f"seed {seed} must not be negative, nor {reserved}, which are reserved for evaluation."
         )
@@ -97,7 +97,7 @@ def train(
         robot: The robot.
         task: The task.
         settings: Of the run.
-        seed: Seed of everything random, >= 0, and not one of `JUDGING_SEEDS`.
+        seed: Seed of everything random, >= 0, and not one of `EVALUATION_SEEDS`.
         out: Run folder; made if need be.
         time_limit_s: Wall-clock of learning; the settings' by default, none if `updates` are given [s].
         updates: Number of updates; by default the time limit decides.

@@ -23,9 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 WARM_UP_STEPS = 300  # not counted: discovery, first calls, caches
-BLOCK_STEPS = (
-    25  # timed together; of all blocks the median counts, so that one in which a pair was held does not
-)
+# Steps that are timed together; of all blocks the median counts, so that one in which a pair was held does not.
+BLOCK_STEPS = 25
 TURN_S = 0.5
 CONTROLLERS = ("lqr", "policy")
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,8 +92,8 @@ class Stopwatch:
 
 def serve(arguments: argparse.Namespace) -> None:
     """Start a plant, run the controller node in this process for some steps, and print the figures."""
-    from fulmar_bringup.node_table import RunPlan
     from fulmar_bringup.processes import command_line
+    from fulmar_bringup.run_plan import RunPlan
     from fulmar_bringup.system_rows import system_rows
     from fulmar_core.goal import goal_at
     from fulmar_core.robot import load_robot
@@ -172,15 +171,8 @@ class Pair:
         self, root: Path, controller: str, mode: str, domain: int, arguments: argparse.Namespace
     ) -> None:
         steps = arguments.steps if mode == "profile" else arguments.rate_steps
-        command = [
-            root / ".venv" / "bin" / "python",
-            __file__,
-            "--serve",
-            "--mode",
-            mode,
-            "--steps",
-            str(steps),
-        ]
+        command = [root / ".venv" / "bin" / "python", __file__, "--serve", "--mode", mode]
+        command += ["--steps", str(steps)]
         command += ["--controller", controller, "--robot", arguments.robot, "--task", arguments.task]
         own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         self.root = root

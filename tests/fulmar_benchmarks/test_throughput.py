@@ -108,7 +108,7 @@ def test_without_a_compiler_numpy_computes_the_batch_and_says_so(command, monkey
 
 
 @ONE_OR_TWO_CORES
-def test_whoever_asks_for_compiled_steps_is_told_that_a_compiler_is_missing(command, monkeypatch, cores):
+def test_whoever_asks_for_compiled_steps_reads_that_a_compiler_is_missing(command, monkeypatch, cores):
     pytest.importorskip("torch")
     monkeypatch.setenv("CXX", "no-such-compiler")
     assert "python3-dev" in str(command(*SMALL, "--cores", cores, library="compiled").exception)

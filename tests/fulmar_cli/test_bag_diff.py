@@ -9,9 +9,9 @@ import pytest
 from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.enums import StoragePlugin
 
+from fulmar_bags.comparison import differing
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import messages, stamp_of
-from fulmar_bags.difference import differing
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagWriter
 from fulmar_core.topics import ODOMETRY
@@ -139,3 +139,10 @@ def test_a_diff_names_the_field_and_the_time_of_the_first_difference(copy, tmp_p
     assert field["found"] - field["recorded"] == pytest.approx(0.25)
     assert log == topic.log_ns[7]
     assert answer("diff", copy, tmp_path / "changed", "--tolerance", "0.3")["same"]
+
+
+def test_a_diff_of_two_runs_ends_with_the_command_that_compares_runs():
+    assert ask("diff", POLICY, LQR).output.endswith(
+        f"to compare the two runs: fulmar report {POLICY} {LQR}\n"
+    )
+    assert "fulmar report" not in ask("diff", POLICY, LQR, "--json").output

@@ -11,19 +11,18 @@ import numpy as np
 import pytest
 
 from fulmar_bags.contents import open_bag
-from fulmar_bags.control_steps import course_of
-from fulmar_bags.run_reader import read_run
-from fulmar_bringup import external_ready
+from fulmar_bags.control_steps import control_steps_of
+from fulmar_bags.run_record import read_run
+from fulmar_bringup import readiness
 from fulmar_bringup.bag_origin import attachments
-from fulmar_bringup.external_ready import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import plan_run
+from fulmar_bringup.readiness import command_input, wait_for_publisher, wait_for_reader
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
-from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_core.wire_check import Offer
-from fulmar_evaluation.run_summary import summarise
+from fulmar_evaluation.run_summary import summarise, summary_text
 from fulmar_ros.recorder_health import COMMANDERS
 from tests.fulmar_cli.command_line import complaint
 from tests.synthetic_run import Plan, write_run
@@ -126,7 +125,7 @@ class Overseer:
 
 def wait(monkeypatch, *looks: list[Offer], recorded: str = "1") -> None:
     times = iter(range(1000))
-    monkeypatch.setattr(external_ready, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
+    monkeypatch.setattr(readiness, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
     monkeypatch.setenv("ROS_DOMAIN_ID", "7")
     wait_for_publisher(PLAN, Overseer(*looks, recorded=recorded), lambda: None)
 
@@ -161,7 +160,7 @@ def test_without_a_fitting_publisher_a_run_fails_with_one_line(offer, recorded, 
 @pytest.mark.parametrize(("mode", "message"), [("inactive", ""), ("waiting", "waiting: 1 of 2 listen")])
 def test_a_plant_in_lock_step_that_nothing_answers_fails_its_run_in_one_line(mode, message, monkeypatch):
     times = iter(range(1000))
-    monkeypatch.setattr(external_ready, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
+    monkeypatch.setattr(readiness, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
     overseer = Overseer([STAMPED])
     overseer.plant = Report("ok", message, {"mode": mode})
     wait_for_reader(PLAN, overseer, lambda: None)  # by the clock the plant waits for nothing
@@ -190,14 +189,14 @@ def test_commands_without_a_stamp_count_and_have_no_latency(external):
     assert summary["control_rate_hz"] == pytest.approx(5.0, rel=0.01)
     for figure in ("latency_ms", "inference_ms", "period_error_ms"):
         assert summary[figure] == {"p50": None, "p99": None, "max": None}
-    assert "  81 commands; 2 overruns, 0 watchdog trips\n" in verdict(summary)
+    assert "  81 commands; 2 overruns, 0 watchdog trips\n" in summary_text(summary)
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
 def test_what_is_unknown_of_a_run_is_not_printed(external):
     summary = summarise(replace(read_run(external), health=()))
     assert (summary["watchdog_trips"], summary["overruns"]) == (None, None)
-    assert "  81 commands\n" in verdict(summary)
+    assert "  81 commands\n" in summary_text(summary)
 
 
 def test_the_bag_of_an_external_controller_is_described_compared_and_reported(external, reached, fulmar):
@@ -216,8 +215,8 @@ def test_a_rerun_refuses_an_external_controller_and_compares_another(external, r
         line = complaint(fulmar("bag", "rerun", external, *words))
         assert "an external controller drove" in line
         assert "--controller classical --from odometry" in line
-    course = course_of(open_bag(external))
-    stamped = course_of(open_bag(reached))
+    course = control_steps_of(open_bag(external))
+    stamped = control_steps_of(open_bag(reached))
     np.testing.assert_array_equal(course.stamp_ns, stamped.stamp_ns[: len(course)])
     np.testing.assert_array_equal(course.commands, stamped.commands[: len(course)])
     code, out, _ = fulmar(
@@ -231,4 +230,4 @@ def test_a_rerun_refuses_an_external_controller_and_compares_another(external, r
 @pytest.mark.parametrize("through", ["batch", "mujoco", "ros"])
 def test_an_evaluation_refuses_an_external_controller(through, fulmar):
     words = ("turtlebot2", "go_to_position", "--controller", "external", "--through", through)
-    assert "a node of your own, which no evaluation can begin anew" in complaint(fulmar("evaluate", *words))
+    assert "a node of your own, which no evaluation can restart" in complaint(fulmar("evaluate", *words))

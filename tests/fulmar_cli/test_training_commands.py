@@ -145,7 +145,7 @@ def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_pat
         raise KeyboardInterrupt
 
     monkeypatch.setattr("training.jobs.learn", broken_off)
-    monkeypatch.setattr("fulmar_cli.commands.train.console", Console(file=said, width=500))
+    monkeypatch.setattr("fulmar_bringup.console.console", Console(file=said, width=500))
     assert call(train, *PLATFORM, "--out", run)[0] != 0
     offers = {"--resume": f"fulmar train --resume {run}", "export": f"fulmar export {run} --out"}
     assert {word for word, offer in offers.items() if offer in said.getvalue()} == told
@@ -170,7 +170,7 @@ def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):
 )
 def test_training_says_when_it_ends_early(learned, monkeypatch, tmp_path, more, line):
     printed = io.StringIO()
-    monkeypatch.setattr("fulmar_cli.commands.train.console", Console(file=printed, width=500))
+    monkeypatch.setattr("fulmar_bringup.console.console", Console(file=printed, width=500))
     assert call(train, *PLATFORM, *more, "--out", tmp_path / "run")[0] == 0
     assert line in printed.getvalue()
 

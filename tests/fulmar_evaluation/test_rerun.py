@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from fulmar_bags.comparison import compare, first_difference, read_tolerances
 from fulmar_bags.contents import open_bag
-from fulmar_bags.control_steps import course_of
+from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.main import app
 from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
@@ -24,10 +24,10 @@ from fulmar_core.policy_bundle import NETWORK, Golden, read_golden, read_passpor
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY
 from fulmar_evaluation.rerun import live_node
-from fulmar_evaluation.rerun.calibration import calibrated_as
+from fulmar_evaluation.rerun.embedded_configs import calibrated_as
 from fulmar_evaluation.rerun.reference_bags import TOLERANCES
 from fulmar_evaluation.rerun.rerun import rerun
-from fulmar_evaluation.rerun.rerun_result import FIELDS, judge_answers
+from fulmar_evaluation.rerun.rerun_result import FIELDS, compare_answers
 from policy_server.controllers import Choice, load_controller, shipped_policy
 from tests.foreign_bag import write_foreign
 
@@ -37,13 +37,13 @@ EXACT = dict.fromkeys(FIELDS, 0.0)
 
 
 def answered(bag: Path, controller: str, source: str = "observations", course=None):
-    course = course or course_of(open_bag(bag))
+    course = course or control_steps_of(open_bag(bag))
     folder = shipped_policy(course.robot.name, course.task.name) if controller == "policy" else ""
     hz = course.settings.control_rate(course.robot)
     loaded = load_controller(controller, course.robot, course.task, Choice(hz, str(folder)))
     # Another processor rounds a sine otherwise, of which observations are made anew.
     limits = TOLERANCES if source == "odometry" else EXACT
-    return judge_answers(course, rerun(course, loaded, source=source), limits)
+    return compare_answers(course, rerun(course, loaded, source=source), limits)
 
 
 def ask(*words: str) -> tuple[int, dict]:
@@ -139,7 +139,7 @@ def test_minus_zero_is_not_the_same_bits_as_zero():
     assert field.differing == 1
 
 
-def test_tolerances_are_told_by_field_and_refused_where_they_make_no_sense():
+def test_tolerances_are_reported_by_field_and_refused_where_they_make_no_sense():
     assert read_tolerances(["1e-3", "action=2"], FIELDS)["action"] == 2.0
     assert read_tolerances(["1e-3"], FIELDS)["command"] == 1e-3
     for wrong in ("-1", "action=much", "acton=1", "nan"):
@@ -148,7 +148,7 @@ def test_tolerances_are_told_by_field_and_refused_where_they_make_no_sense():
 
 
 def test_observations_of_another_controller_are_refused_with_the_way_out():
-    course = course_of(open_bag(POLICY))
+    course = control_steps_of(open_bag(POLICY))
     fewer = replace(
         course, observation_names=course.observation_names[:-1], observations=course.observations[:, :-1]
     )
@@ -157,7 +157,7 @@ def test_observations_of_another_controller_are_refused_with_the_way_out():
 
 
 def test_a_controller_forgets_at_a_pause_as_in_the_node():
-    course = course_of(open_bag(POLICY))
+    course = control_steps_of(open_bag(POLICY))
     seen = []
 
     class Forgetful:
@@ -204,6 +204,6 @@ def test_the_node_is_fed_the_odometry_that_was_chosen(monkeypatch):
     bag = replace(bag, topics={**bag.topics, "/other/odom": other})
     monkeypatch.setattr(live_node.ProcessGroup, "start", lambda group, spec: None)
     monkeypatch.setattr(live_node, "_exchange", lambda raw, *_: (raw["odometry"], None))
-    course = course_of(open_bag(POLICY))
+    course = control_steps_of(open_bag(POLICY))
     fed, _ = live_node.rerun_through_node(bag, course, "policy", "", "/other/odom")
     assert fed == other.data

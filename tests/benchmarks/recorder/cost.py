@@ -21,9 +21,9 @@ import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup, command_line
-from fulmar_bringup.starting import while_starting
+from fulmar_bringup.readiness import while_starting
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.disturbances.scenario import load_scenario
@@ -46,12 +46,7 @@ TURNS = (True, False, False, True)  # drift of the machine falls on both alike
 
 
 def cost_of_recording(
-    plan: RunPlan,
-    *,
-    stretches: int,
-    stretch_s: float,
-    out: Path,
-    progress: Callable[[], None],
+    plan: RunPlan, *, stretches: int, stretch_s: float, out: Path, progress: Callable[[], None]
 ) -> dict[str, Any]:
     """Measure.
 
@@ -60,7 +55,7 @@ def cost_of_recording(
         stretches: With a recorder, and as many without, >= 1.
         stretch_s: Length of each [s].
         out: Folder of the bags.
-        progress: Told of each stretch.
+        progress: Called after each stretch.
 
     Returns:
         Figures by name, ready for JSON.

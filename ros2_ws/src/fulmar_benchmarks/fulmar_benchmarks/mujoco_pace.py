@@ -110,12 +110,7 @@ class AfloatPace:
         self._control[:, 0, : thrusts.shape[1]] = thrusts
         self._control[:, 0, -6:] = self._water.wrench(qpos[:, 2], to_world, qvel, thrusts, self._calm)
         states, _ = mujoco.rollout.rollout(
-            self._model,
-            self._datas,
-            self.states,
-            self._control,
-            control_spec=_CONTROL,
-            persistent_pool=True,
+            self._model, self._datas, self.states, self._control, control_spec=_CONTROL, persistent_pool=True
         )
         self.states = states[:, 0]
 

@@ -1,4 +1,4 @@
-"""Judging a controller through the nodes it is deployed with: the plant here, the controller in its own process.
+"""Evaluation of a controller through the nodes it is deployed with: the plant here, the controller in its own process.
 
 Plant and controller are the very nodes of `fulmar run`, in lock step over DDS. Only the truth is read directly from
 the simulator, as no deployed node may.
@@ -23,8 +23,9 @@ import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.domains import reserved_domains
-from fulmar_bringup.node_table import RunPlan, run_goals_spec
+from fulmar_bringup.node_table import run_goals_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.backend import Sample
@@ -59,7 +60,7 @@ def roll_out_through_ros(
             own; its start does not matter.
         episodes: Number of episodes, >= 1.
         jobs: Number of pairs, >= 1.
-        progress: Told how many control steps have been done.
+        progress: Called with how many control steps have been done.
 
     Returns:
         What happened, from the true states.
@@ -122,7 +123,7 @@ def _wait_for_all(futures: list[Future[Trajectories]], tick: Callable[[], None])
 
 @contextlib.contextmanager
 def _shut_down_in_the_end(pool: ProcessPoolExecutor) -> Iterator[None]:
-    """Wait for the workers; after an error or Ctrl-C, tell them to stop first."""
+    """Wait for the workers; after an error or Ctrl-C, ask them to stop first."""
     try:
         yield
     except BaseException:
@@ -147,14 +148,14 @@ _counts: list[Any] = []
 
 
 def _begin_worker(counts: list[Any], parent: int) -> None:
-    """Keep the shared counters in a worker, which must be handed over when it starts, and end when told to."""
+    """Keep the shared counters in a worker, which must be handed over when it starts, and end on a signal."""
     _counts[:] = counts
     for number in STOPS:
         signal.signal(number, _on_stop)
     end_with(parent, signal.SIGINT)
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)
-    except SystemExit:  # told to stop before it began; the pool would print where
+    except SystemExit:  # asked to stop before it began; the pool would print where
         os._exit(1)
 
 
@@ -165,7 +166,7 @@ def _on_stop(_number: int, _frame: FrameType | None) -> None:
 
 
 def _work(plan: RunPlan, numbers: range, domain: int, index: int) -> Trajectories:
-    """Do a share; a worker that is told to stop meanwhile stops its children and takes no further share."""
+    """Do a share; a worker that is asked to stop meanwhile stops its children and takes no further share."""
     try:
         return _roll_out_share(plan, numbers, domain, index)
     except SystemExit:
@@ -235,7 +236,7 @@ def _episodes(
         episode = draw_episode(robot, task, scenario, seed=plan.seed, number=number)
         # The same instant twice would be the same goal: the clock moves on between episodes.
         plant.clock.advance(control_dt)
-        judge = Judge(task, episode.goal, control_dt)
+        counter = Judge(task, episode.goal, control_dt)
         truths: list[PlanarState] = []
         goals: list[Goal] = []
         commands: list[np.ndarray] = []
@@ -243,17 +244,17 @@ def _episodes(
         def on_step(
             sample: Sample,
             command: np.ndarray,
-            judge: Judge = judge,
+            counter: Judge = counter,
             truths: list[PlanarState] = truths,
             goals: list[Goal] = goals,
             commands: list[np.ndarray] = commands,
         ) -> None:
             assert sample.truth is not None
             truths.append(planar_of(sample.truth))
-            goals.append(judge.see(truths[-1], sample.things))
+            goals.append(counter.see(truths[-1], sample.things))
             commands.append(np.array(command))
 
-        with _goal_told(plan, episode, plant, overseer, group, alive):
+        with _goal_given(plan, episode, plant, overseer, group, alive):
             try:
                 plant.run_episode(episode, number=number, seed=plan.seed, steps=steps, on_step=on_step)
             except LockstepError:
@@ -266,10 +267,10 @@ def _episodes(
 
 
 @contextlib.contextmanager
-def _goal_told(
+def _goal_given(
     plan: RunPlan, episode: Episode, plant: PlantNode, overseer: Supervisor, group: ProcessGroup, alive: Alive
 ) -> Iterator[None]:
-    """While an episode lasts: the supervisor has told its goal, or a goal node tells it with each odometry."""
+    """While an episode lasts: the supervisor has given its goal, or a goal node publishes it with each odometry."""
     if not plan.goals:
         overseer.give_goal(episode.goal, time_ns=plant.clock.now_ns, alive=alive)
         yield

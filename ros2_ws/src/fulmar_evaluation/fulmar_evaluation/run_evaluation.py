@@ -24,7 +24,7 @@ LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its s
 
 
 @dataclass(frozen=True)
-class Judgement:
+class RunResult:
     """What the task says about a run; times count from its first state.
 
     As in `fulmar_core.metrics`, a step is the state at its end: the first state itself is none.
@@ -80,7 +80,7 @@ class Judgement:
 
     @property
     def window_start_s(self) -> float:
-        """Where the closing window begins, which success is judged in [s]."""
+        """Where the closing window begins, in which success is decided [s]."""
         return max(0.0, self.duration_s - self.task.tolerance.hold_s)
 
     def figure(self, name: str) -> float | None:
@@ -89,14 +89,11 @@ class Judgement:
         return float(value) if np.isfinite(value) else None
 
 
-def judge(record: RunRecord) -> Judgement | None:
-    """Judge a run by its task.
-
-    Args:
-        record: The run.
+def evaluate_run(record: RunRecord) -> RunResult | None:
+    """Evaluate a run by its task.
 
     Returns:
-        The judgement; None if the record has fewer than two states.
+        The result; None if the record has fewer than two states.
 
     Raises:
         BagError: The record names no task or no goal.
@@ -120,7 +117,7 @@ def judge(record: RunRecord) -> Judgement | None:
     run = Trajectories(
         **{name: np.swapaxes(getattr(columns, name), 0, 1) for name in COLUMNS}, control_dt=float(time_s[0])
     )
-    return Judgement(
+    return RunResult(
         robot=robot,
         task=task,
         targets=goals[-1].targets,
@@ -136,12 +133,12 @@ def judge(record: RunRecord) -> Judgement | None:
 
 
 def _of_goal_file(record: RunRecord) -> dict[str, Any]:
-    """What the node that tells goals from a file said last, and the path of that file."""
+    """What the goal node reported last, and the path of that file."""
     said = record.last_health("goals")
     asked = bool(record.info.get("goals"))
     finished = said is not None and said.values.get("mode") == "finished"
     return {
-        "progress": (said.values.get("progress", "") if said else "nothing was told") if asked else None,
+        "progress": (said.values.get("progress", "") if said else "nothing was reported") if asked else None,
         "unfinished": asked and not finished and not record.info.get("endless"),
         "path": np.array(record.info.get("path") or np.empty((0, 2)), dtype=float).reshape(-1, 2),
     }
@@ -178,7 +175,7 @@ def _goals(record: RunRecord, task: Task) -> list[GivenGoal]:
 def _newest(record: RunRecord, task: Task, given: list[GivenGoal]) -> np.ndarray:
     """Which of the goals counts at each state, shape (n,).
 
-    Places count from when they came. Velocities, and whatever a goal node tells, are stamped with the time when they
+    Places count from when they came. Velocities, and goals of a goal node, are stamped with the time when they
     begin; messages of one time need not come into the bag in their order.
     """
     motion = record.motion
@@ -208,22 +205,22 @@ def _goals_at(
     things: dict[str, np.ndarray],
     dt: float,
 ) -> Goal:
-    """The goal that a judge counts at each step: its current target alone, shape (n,)."""
+    """The goal that counts at each step: its current target alone, shape (n,)."""
     # A thing without a message counts as being where the robot is.
     unseen = np.stack((states.x, states.y, states.yaw), axis=-1)
     things = {thing.name: unseen for thing in task.things} | things
     counted: list[Goal] = []
-    number, before, judge = -1, 0.0, None
+    number, before, counter = -1, 0.0, None
     last = first
     for step, which in enumerate(newest):
-        if judge is None or which != number:
-            if judge is not None:  # what was reached so far counts on; of velocities, one more is over
-                before += float(judge.goal.done) + (task.goal_topic == "goal_velocity")
+        if counter is None or which != number:
+            if counter is not None:  # what was reached so far counts on; of velocities, one more is over
+                before += float(counter.goal.done) + (task.goal_topic == "goal_velocity")
             now = {name: pose[step] for name, pose in things.items()}
             begun = task.begun(Goal(given[which].targets, np.asarray(0.0), obstacles, now), last)
-            judge, number = Judge(task, begun, dt), which
+            counter, number = Judge(task, begun, dt), which
         last = states[step]
-        goal = judge.see(last, {name: pose[step] for name, pose in things.items()})
+        goal = counter.see(last, {name: pose[step] for name, pose in things.items()})
         discs = goal.obstacles if len(goal.obstacles) else np.zeros((1, 3))
         done = np.asarray(before + goal.done)
         counted.append(replace(goal, targets=goal.current[None], done=done, obstacles=discs))

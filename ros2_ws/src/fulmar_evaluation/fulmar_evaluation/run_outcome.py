@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.run_reader import read_run
-from fulmar_bags.run_record import Actuation, Motion, RunRecord
-from fulmar_bringup.external_ready import command_input
+from fulmar_bags.run_record import Actuation, Motion, RunRecord, read_run
 from fulmar_bringup.planning import RunRequest
+from fulmar_bringup.readiness import command_input
 from fulmar_bringup.run_executor import Execution, execute
 from fulmar_core.errors import FulmarError
 from fulmar_evaluation.run_summary import summarise
@@ -29,15 +28,13 @@ class RunOutcome:
 
     @property
     def exit_code(self) -> int:
-        """0: ran to its end and met the goal, or recorded nothing to evaluate; 1: otherwise."""
-        return 0 if self.summary.get("success") is not False and not self.failure else 1
+        """0: ran to its end and met the goal, had none, or recorded nothing to evaluate; 1: otherwise."""
+        missed = self.summary["success"] is False and controller_entry(self.summary["controller"]).strives
+        return 1 if missed or self.failure else 0
 
 
 def run_and_evaluate(request: RunRequest) -> RunOutcome:
     """Run once and evaluate the bag.
-
-    Args:
-        request: What to run.
 
     Returns:
         The outcome; a failed run has one too, with whatever was recorded.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_benchmarks.latency.watched_system import STEP_HZ, request_at, watched_system
 
 ALLOWED_MB = 5.0
@@ -26,7 +26,7 @@ def endure(
         simulated_s: How long, in the robot's own time [s].
         rate: Seconds of it a second of the wall clock.
         folder: Where policy and bag come; must not exist.
-        progress: Told how much is over [s].
+        progress: Called with how much is over [s].
 
     Returns:
         Figures by name, ready for JSON.

@@ -1,4 +1,4 @@
-"""A whole system in real time at a rate that is asked for, and what its nodes say and use."""
+"""A whole system in real time at a given rate, and what its nodes say and use."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import psutil
 
 from fulmar_bringup.bag_origin import run_info
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_bringup.processes import ProcessGroup
-from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.readiness import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import RunFailed
@@ -74,7 +74,7 @@ def request_at(hz: float, folder: Path) -> RunRequest:
     """A system that steps and commands so often a second of the wall clock.
 
     The robot's own time goes `hz / 50` times as fast as ours, so that all rates are steps of the same physics. The
-    policy is the shipped one with 50 Hz in its passport: what it is asked for is its time, not its skill.
+    policy is the shipped one with 50 Hz in its passport: only its computing time counts, not its skill.
 
     Args:
         hz: Steps and commands a second.

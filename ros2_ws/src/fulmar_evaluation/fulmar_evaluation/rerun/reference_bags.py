@@ -11,7 +11,7 @@ from typing import Any
 
 from fulmar_bags.comparison import Field, first_difference
 from fulmar_bags.contents import Bag, Topic, open_bag
-from fulmar_bags.control_steps import course_of
+from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.decode import stamps_ns
 from fulmar_bringup.domains import own_domain
 from fulmar_core.errors import RunFailed
@@ -28,7 +28,7 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
 )
 from fulmar_evaluation.rerun.replay_controllers import answers_of
-from fulmar_evaluation.rerun.rerun_result import judge_answers
+from fulmar_evaluation.rerun.rerun_result import compare_answers
 
 STEPS = 100  # control steps of each
 SEED = 11
@@ -71,14 +71,11 @@ REFERENCES = (
 
 
 def record_reference(reference: Reference, folder: Path) -> Path:
-    """Run through the deployed nodes in MuJoCo, and keep what a controller was told and answered.
+    """Run through the deployed nodes in MuJoCo, and keep what a controller received and answered.
 
     Args:
         reference: What to run.
         folder: Where the reference bags are; an older one of the same name is replaced.
-
-    Returns:
-        The bag.
 
     Raises:
         RunFailed: The run did not come to its end.
@@ -157,9 +154,6 @@ def _stamps(topic: Topic) -> list[int]:
 def check_reference(path: Path) -> list[Field]:
     """Run a reference bag again, from its odometry on: gates, observations, actions, commands.
 
-    Args:
-        path: The bag.
-
     Returns:
         Every field, with where it differs.
 
@@ -169,8 +163,8 @@ def check_reference(path: Path) -> list[Field]:
     from policy_server.controllers import shipped_policy
 
     bag = open_bag(path)
-    course = course_of(bag)
+    course = control_steps_of(bag)
     name = str((bag.info or {}).get("controller"))
     folder = shipped_policy(course.robot.name, course.task.name) if name == "policy" else None
     answers, _ = answers_of(course, name, str(folder or ""), "odometry")
-    return judge_answers(course, answers, TOLERANCES)
+    return compare_answers(course, answers, TOLERANCES)
