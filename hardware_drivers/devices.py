@@ -1,4 +1,4 @@
-"""From a hardware file to the driver that it asks for; only that one's library is imported."""
+"""Driver of a hardware file, importing only its library, and what stops the device if the driver dies."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
 
     Args:
         robot: The robot.
-        hardware: What is wired to it.
+        hardware: Its hardware file.
         port: Takes the place of the file's port; empty: the file's.
         patience_s: Wait so long for the device [s].
 
@@ -89,14 +89,14 @@ MOVES_ON: dict[type, str] = {
 
 
 def own_watchdog(driver: Driver) -> OwnWatchdog | None:
-    """What stops the device when the driver dies; None if nothing is known to."""
+    """The watchdog that stops the device when the driver dies; None if none is known."""
     if isinstance(driver, OwnDriver) and driver.device_timeout_s:
         return OwnWatchdog("the device, says its hardware file", driver.device_timeout_s)
     return WATCHDOGS.get(type(driver))
 
 
 def when_the_driver_dies(driver: Driver) -> str:
-    """One sentence for people, in capitals where nothing stops the device."""
+    """One sentence for the user, in capitals where nothing stops the device."""
     watchdog = own_watchdog(driver)
     if watchdog is not None:
         return f"if the driver dies, stopped within {watchdog.within_s:g} s by {watchdog.by}"

@@ -1,4 +1,4 @@
-"""Places on Earth as metres east and north of an origin."""
+"""Local frame and attitude of boats: from WGS 84 and north-east-down to ROS' east-north-up."""
 
 from __future__ import annotations
 

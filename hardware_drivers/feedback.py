@@ -1,4 +1,4 @@
-"""The newest that a device has said of itself, handed from the thread that reads to the one that steps."""
+"""Newest report of a device, from the reading thread to the stepping one, and its time in the host's clock."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class Report:
 
 
 class Feedback:
-    """Newest report, and how long ago it came."""
+    """Newest report of a device, and its age."""
 
     def __init__(self, device: str, silent_s: float) -> None:
         """Begin with none.
 
         Args:
-            device: What it is, for messages.
-            silent_s: A device that says nothing for so long is gone [s].
+            device: Its name, for messages.
+            silent_s: A device without a report for so long is gone [s].
         """
         self._device, self._silent_ns = device, round(silent_s * 1e9)
         self._changed = threading.Condition()
@@ -37,13 +37,13 @@ class Feedback:
         self._failure = ""
 
     def put(self, report: Report) -> None:
-        """A report has come; from the thread that reads."""
+        """Store a report; called by the reading thread."""
         with self._changed:
             self._newest, self._came_ns = report, time.monotonic_ns()
             self._changed.notify_all()
 
     def fail(self, reason: str) -> None:
-        """No report will come any more; from the thread that reads."""
+        """End the reports with a reason; called by the reading thread."""
         with self._changed:
             self._failure = reason
             self._changed.notify_all()
@@ -70,7 +70,7 @@ class Feedback:
             return self._newest
 
     def read(self) -> Report:
-        """The newest report, if it is young enough.
+        """The newest report, if it is recent.
 
         Raises:
             DeviceError: The device is gone.
@@ -93,7 +93,7 @@ FORGET = 512  # reports after which the least delay is looked for anew, so that 
 class DeviceTime:
     """Maps a device's clock to the host's by the report that came with the least delay.
 
-    What is left is that least delay itself: the time that bytes need on the wire, which no clock of one side can see.
+    The error is that least delay itself: the time of the bytes on the wire, which no clock of one side can measure.
     """
 
     def __init__(self, wrap_ms: int = 0) -> None:
@@ -105,7 +105,7 @@ class DeviceTime:
         self._wrap, self._last, self._turns = wrap_ms, 0.0, 0
         self._least: float | None = None
         self._next: float | None = None
-        self._heard = 0
+        self._reports = 0
 
     def stamp_ns(self, device_ms: float, now_ns: int) -> int:
         """When a report was measured.
@@ -119,7 +119,7 @@ class DeviceTime:
         """
         if self._wrap and device_ms < self._last - self._wrap / 2:
             self._turns += 1
-        elif device_ms < self._last - 1.0 and not self._wrap:  # it was switched off and on
+        elif device_ms < self._last - 1.0 and not self._wrap:  # the device was restarted
             self._least = self._next = None
         self._last = device_ms
         measured_ns = (device_ms + self._turns * self._wrap) * 1e6
@@ -127,7 +127,7 @@ class DeviceTime:
         if self._least is None or delay < self._least or abs(delay - self._least) > 1e9:
             self._least = delay
         self._next = delay if self._next is None else min(self._next, delay)
-        self._heard += 1
-        if self._heard % FORGET == 0:
+        self._reports += 1
+        if self._reports % FORGET == 0:
             self._least, self._next = self._next, None
         return min(now_ns, round(measured_ns + self._least))

@@ -165,7 +165,7 @@ def checksum(body: bytes) -> int:
 
 
 class Decoder:
-    """Finds sentences in a stream of bytes, however it is cut or spoilt.
+    """Finds sentences in a byte stream; skips damaged ones, keeps partial ones.
 
     Attributes:
         lost: Lines that were no sound sentence.

@@ -97,7 +97,7 @@ def base_control(speed: float, turn_rate: float) -> bytes:
 
 
 class Decoder:
-    """Finds packets in a stream of bytes, however it is cut or spoilt.
+    """Finds packets in a byte stream; skips damaged ones, keeps partial ones.
 
     Attributes:
         lost: Bytes that belong to no sound packet.

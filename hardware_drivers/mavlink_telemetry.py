@@ -1,4 +1,4 @@
-"""What an ArduPilot boat says of itself, in ROS' frames; no link of its own."""
+"""Telemetry of an ArduPilot boat in ROS' frames; knows messages, not the link."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from hardware_drivers.earth_frame import attitude
 from hardware_drivers.feedback import DeviceTime, Report
 
 MILLI_G = 9.80665e-3  # [m/s²]
-FRESH_MS = 200.0  # an attitude that differs more in time says nothing about a position
+FRESH_MS = 200.0  # an attitude and a position further apart in time make no report
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 
 
 class Telemetry:
-    """Puts an autopilot's messages together to reports.
+    """Assembles reports from an autopilot's messages.
 
     Attributes:
         shift: From where the autopilot's frame begins to where `odom` does, shape (3,) [m].

@@ -1,4 +1,4 @@
-"""What is wired to a robot, as read from `configs/hardware/*.yaml`."""
+"""Hardware of a robot, as read from `configs/hardware/*.yaml`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from hardware_drivers.wiring import AS_NAMED, check_wiring
 ValveMessage = Literal["int16", "byte", "uint8"]
 ValveOrder = Annotated[tuple[int, ...], Named(VALVE_ORDERS)]  # a list, or the name of one
 
-# A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
+# A launcher kills a process 5 s after asking it to end, and closing takes longer than the lingering.
 LONGEST_LINGER_S = 2.0
-UNARMED = "not armed: arm: true or --arm"  # what a device reports that may not be armed
+UNARMED = "not armed: arm: true or --arm"  # warning of a device that must not be armed
 
 
 def check_linger(linger_s: float) -> None:
-    """Refuse times without meaning, and those that a launcher would not wait for; raises ValueError."""
+    """Reject negative times, and those that a launcher would not wait for; raises ValueError."""
     if not 0.0 <= linger_s <= LONGEST_LINGER_S:
         raise ValueError(f"linger_s = {linger_s:g} must be from 0 to {LONGEST_LINGER_S:g} s.")
 
@@ -112,7 +112,7 @@ class Kobuki(_Wired):
 
 @dataclass(frozen=True)
 class VelocityTopic(_Wired):
-    """A base that somebody else drives: `geometry_msgs/Twist`, or TwistStamped."""
+    """A base behind a node of another stack: `geometry_msgs/Twist`, or TwistStamped."""
 
     kind: Literal["velocity_topic"]
     topic: str
@@ -122,7 +122,7 @@ class VelocityTopic(_Wired):
 
 @dataclass(frozen=True)
 class ThrustTopic(_Wired):
-    """A boat that somebody else drives: `std_msgs/Float32MultiArray`, one share of full thrust a propeller."""
+    """A boat behind a node of another stack: `std_msgs/Float32MultiArray`, one share of full thrust a propeller."""
 
     kind: Literal["thrust_topic"]
     topic: str
@@ -180,7 +180,7 @@ class MavlinkBoat:
     span_us: int = 400  # of a full deflection
     silent_s: float = 1.0
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each side of its mixer turns, `-left` where backwards
-    arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; without it, it only listens
+    arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; else it only receives
 
     def __post_init__(self) -> None:
         check_wiring(self.wiring)
@@ -201,13 +201,13 @@ class OwnDriver:
     baud: int = 115200  # of a serial port
     order: ValveOrder = ()  # of valves: which thruster, counted from 0, each channel opens; empty: 0, 1, 2, ...
     wiring: tuple[str, ...] = AS_NAMED  # wheel or propeller that each channel turns, `-left` where backwards
-    # Who knows where the robot is: motion capture, the device itself by `read`, or another node that publishes `odom`.
+    # Source of odometry: motion capture, the device itself by `read`, or another node that publishes `odom`.
     odometry: Literal["motion_capture", "device", "other_node"] = "motion_capture"
     air_bearing: bool = False  # the class has `bearing_on` and `set_bearing` of `AirBearing`
     # Whether the device may be armed: without it, or --arm, nothing is written. None: it has nothing to arm.
     arm: bool | None = None
     device_timeout_s: float = 0.0  # after the last command, when the device itself stops; 0: it does not [s]
-    options: dict[str, Any] = field(default_factory=dict)  # whatever else the class reads
+    options: dict[str, Any] = field(default_factory=dict)  # for the class
 
     def __post_init__(self) -> None:
         try:
@@ -232,9 +232,9 @@ NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
     MavlinkBoat: ("pymavlink",),
 }
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
-SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that motion capture alone knows the place of
+SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that only motion capture localises
 FLOATS = (GpioValves, ValveTopic)  # drivers that switch an air bearing
-MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device knows where it is
+MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device measures odometry
 FITS = {
     "thrusters": (GpioValves, ValveTopic),
     "differential_drive": (Kobuki, VelocityTopic),
@@ -252,22 +252,22 @@ class Hardware:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Modules that its driver imports, which not every machine has."""
+        """Modules that its driver imports, from the extra `hardware`."""
         return NEEDS.get(type(self.driver), ())
 
     @property
     def arms(self) -> bool:
-        """Whether the device has to be armed, which a person allows."""
+        """Whether the device has to be armed, which the user must allow."""
         return getattr(self.driver, "arm", None) is not None
 
     @property
     def opens_valves(self) -> bool:
-        """Whether its wires open valves, which can be heard without any motion."""
+        """Whether its wires open valves, which are audible without any motion."""
         return load_robot(self.robot).actuators.kind == "thrusters"
 
     @property
     def measures_odometry(self) -> bool:
-        """Whether the device knows where it is; if not, motion capture or another node says so."""
+        """Whether the device measures odometry; if not, motion capture or another node does."""
         if isinstance(self.driver, OwnDriver):
             return self.driver.odometry == "device"
         return isinstance(self.driver, MEASURES)
@@ -281,7 +281,7 @@ class Hardware:
 
     @property
     def seen_from_outside(self) -> bool:
-        """Whether motion capture alone knows where the robot is."""
+        """Whether only motion capture localises the robot."""
         if isinstance(self.driver, OwnDriver):
             return self.driver.odometry == "motion_capture"
         return isinstance(self.driver, SEEN_FROM_OUTSIDE)
@@ -297,16 +297,10 @@ def hardware_path(name: str) -> Path:
 
 
 def load_hardware(name: str) -> Hardware:
-    """Read a hardware file and check that it fits its robot.
-
-    Args:
-        name: A name of `configs/hardware`, or a path that ends in `.yaml`.
-
-    Returns:
-        What is wired to the robot.
+    """Read a hardware file and check that it fits its robot; `name` is as of `hardware_path`.
 
     Raises:
-        ConfigError: Unknown name, a mistake in the file, or a driver that the robot's actuators do not go with.
+        ConfigError: Unknown name, a mistake in the file, or a driver that does not fit the robot's actuators.
     """
     path = hardware_path(name)
     hardware = load_config(Hardware, path)

@@ -1,8 +1,4 @@
-"""Orders of valves by name: which thruster, counted from 0, each entry after the bearing opens.
-
-Public sources disagree about the wiring of the Zero-G Lab's platform; each order belongs to its own numbering of its
-nozzles.
-"""
+"""Valves of a floating platform: their wiring orders, minimum on-time, and the message of a valve node."""
 
 from __future__ import annotations
 
@@ -10,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+# Wiring orders by name: the thruster, counted from 0, that each entry after the bearing opens. Public sources disagree
+# about the wiring of the Zero-G Lab's platform; each order belongs to its own numbering of the nozzles.
 VALVE_ORDERS: dict[str, tuple[int, ...]] = {
     # snt-spacer/RoboRAN-deploy-to-robot at eeefb9a, robot_interfaces/floating_platform.py; for the nozzles of RoboRAN's
     # FloatingPlatform (pairs at 0, 90, 180 and 270°).
@@ -35,7 +33,7 @@ class ValveTiming:
         self._open = np.zeros(count, dtype=bool)
 
     def allowed(self, wanted: np.ndarray, now_ns: int) -> np.ndarray:
-        """What to do now.
+        """Valves that may open or close now.
 
         Args:
             wanted: Zeros and ones, shape (n,).
@@ -53,7 +51,7 @@ class ValveTiming:
 
 
 def to_message(valves: np.ndarray, *, bearing: bool, order: Sequence[int]) -> list[int]:
-    """What the valve node is told.
+    """The nine numbers of a valve node: the bearing, then the valves in the order of their wiring.
 
     Args:
         valves: Zeros and ones in the robot's order, shape (n,).
@@ -67,14 +65,14 @@ def to_message(valves: np.ndarray, *, bearing: bool, order: Sequence[int]) -> li
 
 
 def from_message(data: Sequence[int], order: Sequence[int]) -> tuple[bool, np.ndarray] | None:
-    """What a controller that speaks to the valve node wants.
+    """Parse a message for a valve node.
 
     Args:
         data: The message.
         order: As of `to_message`.
 
     Returns:
-        Whether the bearing shall be on, and zeros and ones in the robot's order, shape (n,); None where the message has
+        Whether the bearing is on, and zeros and ones in the robot's order, shape (n,); None where the message has
         another length, or holds anything but zeros and ones.
     """
     if len(data) != len(order) + 1 or not set(data) <= {0, 1}:

@@ -1,4 +1,4 @@
-"""The seam between an emulated device and the physics behind it."""
+"""Interface of emulated devices, and their end of the wire: a pseudo-terminal or a TCP server for one host."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class EmulatedDevice(Protocol):
     address: str
 
     def command(self, now_s: float) -> np.ndarray:
-        """Read what has come, and say what the device now does by itself, its own timeout included.
+        """Read the input, and return what the device does now, its own timeout included.
 
         Args:
             now_s: Monotonic clock [s].
@@ -40,7 +40,7 @@ class EmulatedDevice(Protocol):
         ...
 
     def close(self) -> None:
-        """Take the wire away."""
+        """Close the wire."""
         ...
 
 
@@ -48,7 +48,7 @@ CHUNK = 4096
 
 
 class Link(Protocol):
-    """Bytes to and from a host that may not be there.
+    """Bytes to and from a host, which may be absent.
 
     Attributes:
         address: Where the host finds it.
@@ -57,15 +57,15 @@ class Link(Protocol):
     address: str
 
     def read(self) -> bytes:
-        """What has come since the last call; never waits."""
+        """Bytes since the last call; never waits."""
         ...
 
     def write(self, data: bytes) -> None:
-        """Send; what nobody takes is lost, as on a cable."""
+        """Send; without a host the bytes are lost, as on a cable."""
         ...
 
     def close(self) -> None:
-        """Take it away."""
+        """Close it."""
         ...
 
 
@@ -77,7 +77,7 @@ class PtyLink:
         self._end, slave = pty.openpty()
         tty.setraw(slave)
         os.set_blocking(self._end, False)
-        self._slave = slave  # kept open, so that the device does not see a hang-up between two hosts
+        self._slave = slave  # kept open, so that no hang-up comes between two hosts
         path.unlink(missing_ok=True)
         path.symlink_to(os.ttyname(slave))
         self._path, self.address = path, str(path)
@@ -91,7 +91,7 @@ class PtyLink:
 
     def write(self, data: bytes) -> None:
         """See `Link`."""
-        with contextlib.suppress(OSError):  # full: nobody reads
+        with contextlib.suppress(OSError):  # full: no host reads
             os.write(self._end, data)
 
     def close(self) -> None:

@@ -89,7 +89,7 @@ class KingfisherEmulator:
 
 
 def _shares(line: bytes) -> np.ndarray | None:
-    """What a `$PYDIR` asks for, -1 to 1 a side; None where it is none, or spoilt."""
+    """Shares of a `$PYDIR`, -1 to 1 a side; None for other or damaged sentences."""
     body, _, total = line.removeprefix(b"$").partition(b"*")
     name, *values = body.split(b",")
     try:

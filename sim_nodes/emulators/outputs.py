@@ -1,4 +1,4 @@
-"""Eight valves and a bearing on the pins of a GPIO chip that is a file of levels."""
+"""Emulated devices without measurements: valves on GPIO pins, and nodes of other stacks that take commands."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from fulmar_core.robot import Robot
 
 
 class ValveBank:
-    """Valves do what their pins say, for ever: nobody closes them when the driver dies."""
+    """Valves and bearing on the pins of a GPIO chip that is a file; they keep their state when the driver dies."""
 
     def __init__(self, path: Path, robot: Robot, *, order: tuple[int, ...], active_low: bool) -> None:
-        """Make the chip, all pins at rest.
+        """Make the chip, with all pins inactive.
 
         Args:
             path: The file to make.
@@ -34,7 +34,7 @@ class ValveBank:
         self.address = f"file://{path}"
 
     def command(self, now_s: float) -> np.ndarray:
-        """See `EmulatedDevice`; a platform without air stands on the floor, whatever its valves do."""
+        """See `EmulatedDevice`; without air the platform stands on the floor."""
         levels = self.levels()
         valves = np.zeros(self._count)
         if levels[self._count] == self._open_level:
@@ -61,18 +61,18 @@ class ValveBank:
 
 
 BASE_TIMEOUT_S = 0.6  # kobuki_node: cmd_vel_timeout_sec
-FOR_EVER_S = math.inf  # neither the lab's valve node nor the public part of RoboRAN's bridge has a timeout
+NO_TIMEOUT_S = math.inf  # neither the lab's valve node nor the public part of RoboRAN's bridge has a timeout
 
 
 class TopicDevice:
-    """Does what the newest message says, for as long as its own timeout lets it."""
+    """Device behind a node of another stack: executes the newest message until its own timeout."""
 
     def __init__(self, address: str, count: int, *, timeout_s: float) -> None:
         """Begin at rest.
 
         Args:
             address: Topic that it takes commands from.
-            count: Values of a command.
+            count: Number of values of a command.
             timeout_s: It stops after so long without a message [s].
         """
         self.address, self._count, self._timeout_s = address, count, timeout_s
@@ -109,7 +109,7 @@ class ValveNode(TopicDevice):
             order: Which thruster each value opens, counted from 0.
             inverted: Whether a valve opens at 0; the bearing does not.
         """
-        super().__init__(address, len(order) + 1, timeout_s=FOR_EVER_S)
+        super().__init__(address, len(order) + 1, timeout_s=NO_TIMEOUT_S)
         self._order, self._open = list(order), float(not inverted)
 
     @property
@@ -118,7 +118,7 @@ class ValveNode(TopicDevice):
         return bool(self._values[0] > 0.5)
 
     def command(self, now_s: float) -> np.ndarray:
-        """See `EmulatedDevice`; a platform without air stands on the floor, whatever its valves do."""
+        """See `EmulatedDevice`; without air the platform stands on the floor."""
         values = super().command(now_s)
         valves = np.zeros(len(self._order))
         if self.air:

@@ -36,7 +36,7 @@ class Car(Chassis):
         )
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
-        """Add chassis, steering, wheels and servos; see `Machine.add`."""
+        """Add chassis, steering, wheels and servos; see `RobotModel.add`."""
         body = super().add(spec)
         for name, (x, y) in self.places.items():
             carrier, place = body, (x, y, 0.0)
@@ -49,14 +49,14 @@ class Car(Chassis):
         return body
 
     def bind(self, model: mujoco.MjModel) -> None:
-        """See `Machine.bind`."""
+        """See `RobotModel.bind`."""
         super().bind(model)
         names = [*(f"front_{side}_steering" for side, _ in SIDES), *self.places]
         self._dofs = np.array([model.joint(name).dofadr[0] for name in names])
         self._controls = np.array([model.actuator(name).id for name in names])
 
     def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
-        """See `Machine.place`; the wheels start straight."""
+        """See `RobotModel.place`; the wheels start straight."""
         super().place(model, data, start)
         ahead, _ = start.velocity_in_body
         data.qvel[self._dofs[2:]] = data.act[:] = float(ahead) / self._car.wheel_radius
@@ -69,7 +69,7 @@ class Car(Chassis):
         gain: np.ndarray,
         outside: tuple[float, float, float],
     ) -> None:
-        """Set steering angles and wheel speeds; see `Machine.drive`."""
+        """Set steering angles and wheel speeds; see `RobotModel.drive`."""
         speed, steering = applied * gain
         data.ctrl[self._controls] = self.wheel_targets(float(speed), float(steering))
         self.push(data, outside)

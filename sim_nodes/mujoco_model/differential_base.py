@@ -30,7 +30,7 @@ class DifferentialBase(Chassis):
         )
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
-        """Add chassis, wheels, casters and servos; see `Machine.add`."""
+        """Add chassis, wheels, casters and servos; see `RobotModel.add`."""
         drive, body = self._drive, super().add(spec)
         for name, (x, y) in self.places.items():
             self.add_wheel(body, name, (x, y, 0.0))
@@ -42,7 +42,7 @@ class DifferentialBase(Chassis):
         return body
 
     def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
-        """See `Machine.place`."""
+        """See `RobotModel.place`."""
         super().place(model, data, start)
         ahead, _ = start.velocity_in_body
         data.qvel[6:8] = data.act[:] = self._drive.wheel_speeds(np.array([ahead, start.yaw_rate]))
@@ -55,6 +55,6 @@ class DifferentialBase(Chassis):
         gain: np.ndarray,
         outside: tuple[float, float, float],
     ) -> None:
-        """Set the speeds of the wheels; see `Machine.drive`."""
+        """Set the speeds of the wheels; see `RobotModel.drive`."""
         data.ctrl[:] = self._drive.wheel_speeds(applied * gain)
         self.push(data, outside)

@@ -1,4 +1,4 @@
-"""Upright cylinders that stand about and do not move, placed anew for every episode."""
+"""Obstacles (fixed upright cylinders) and blocks to push, placed anew for every episode."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fulmar_core.dynamics.pushing import Block
 from sim_nodes.mujoco_model.surroundings import FLOOR_BIT, THING_BIT
 
 HEIGHT = 1.0  # higher than any robot [m]
-FAR = 1000.0  # where those wait that an episode has no use for [m]
+FAR = 1000.0  # place of obstacles that an episode does not use [m]
 
 
 def radii_for(obstacles: np.ndarray) -> tuple[float, ...]:
@@ -27,7 +27,7 @@ def radii_for(obstacles: np.ndarray) -> tuple[float, ...]:
     return tuple(float(r) for r in np.where(radii > 0.0, radii, radii.max()))
 
 
-def there_is_room(radii: tuple[float, ...], obstacles: np.ndarray) -> bool:
+def has_room(radii: tuple[float, ...], obstacles: np.ndarray) -> bool:
     """Whether a model with cylinders of these radii can show these obstacles, row by row."""
     here = obstacles[:, 2]
     if not np.any(here > 0.0):

@@ -29,7 +29,7 @@ SETTLE_S = 1.0  # time in which a model comes to rest after its compilation [s]
 
 
 class Chassis:
-    """A body on wheels; a family of robots on wheels adds its wheels and drives them (see `Machine`).
+    """A body on wheels; a family of robots on wheels adds its wheels and drives them (see `RobotModel`).
 
     Attributes:
         steady: The floor's forces are MuJoCo's own.
