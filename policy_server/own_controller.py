@@ -15,7 +15,7 @@ import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.errors import ConfigError
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.own_class import construct, load_class, settings_beside, source_of
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task

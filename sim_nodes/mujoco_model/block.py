@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 
-from fulmar_core.dynamics.pushing import Block
+from fulmar_core.dynamics.contact import Block
 from sim_nodes.mujoco_model.obstacles import FAR
 from sim_nodes.mujoco_model.surroundings import FLOOR_BIT, THING_BIT
 

@@ -14,7 +14,7 @@ from fulmar_core.controllers.classical import LAWS
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_in_float64
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.paths import config_names
 from fulmar_core.planar import at_rest
 from fulmar_core.policy_bundle import read_passport

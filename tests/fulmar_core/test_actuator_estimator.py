@@ -11,7 +11,7 @@ from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.actuator_estimator import ActuatorEstimator
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation

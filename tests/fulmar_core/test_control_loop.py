@@ -9,7 +9,7 @@ from fulmar_core.control_loop import ControlLoop, unknown_inputs
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.goal import goal_at, stack_goals
 from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.observation import Observer
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import load_robot

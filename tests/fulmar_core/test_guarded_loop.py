@@ -10,9 +10,8 @@ from fulmar_core.goal import goal_at
 from fulmar_core.guarded_loop import ENDED, GuardedLoop
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import BEARING_OFF, Mode
+from fulmar_core.safety.fallback import Standby, Succession
 from fulmar_core.safety.input_gate import JUMP_M, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from tests.states import planar_state
 

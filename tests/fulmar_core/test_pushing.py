@@ -10,8 +10,7 @@ import pytest
 
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.dynamics.outline import outline_of
-from fulmar_core.dynamics.pushing import SIDEWAYS, push
+from fulmar_core.dynamics.contact import SIDEWAYS, outline_of, push
 from fulmar_core.goal import goal_at, offset_to
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState

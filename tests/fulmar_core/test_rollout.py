@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot

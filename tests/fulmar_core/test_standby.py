@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
-from fulmar_core.standby import WARM_UP, ready
+from fulmar_core.safety.fallback import WARM_UP, ready
 from fulmar_core.tasks import load_task
 
 ROBOT = load_robot("turtlebot2")

@@ -9,8 +9,8 @@ import pytest
 
 from fulmar_core.disturbances.scenario import Actuation, Push, Scenario, Wave, load_scenario
 from fulmar_core.errors import ConfigError
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.health.thruster_health import ThrusterHealth, can_be_watched
-from fulmar_core.health.trust import Suspicion
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot

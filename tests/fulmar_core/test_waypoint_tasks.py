@@ -11,13 +11,12 @@ import pytest
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
-from fulmar_core.references.race_corners import draw_corners
+from fulmar_core.references.race_track import draw_corners
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.race_gates import LAST, crossings
-from fulmar_core.tasks.race_track import RaceTrack
+from fulmar_core.tasks.waypoint_courses import Course, RaceTrack, headings_along
 from fulmar_core.tasks.waypoint_tasks import PassingTask
-from fulmar_core.tasks.waypoints import Course, headings_along
 from fulmar_core.trajectories import Judge
 
 NAMES = ("go_through_positions", "go_through_poses", "race_waypoints", "race_wayposes", "race_gates")

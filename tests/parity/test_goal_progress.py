@@ -19,10 +19,9 @@ from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.paths import config_names
 from fulmar_core.planar import COLUMNS, PlanarState, rigid_of
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.fallback import Standby, Succession
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.safety.succession import Succession
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 

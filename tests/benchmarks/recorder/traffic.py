@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 
 from fulmar_bringup.node_table import RunPlan
 from fulmar_core.errors import RunFailed
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
+from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from fulmar_ros.convert import stamp_of

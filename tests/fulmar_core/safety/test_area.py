@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fulmar_core.safety.area import NO_AREA, check_area, outside
+from fulmar_core.safety.geofence import NO_AREA, check_area, outside
 
 LAB = (0.0, 5.0, -3.0, 0.0)
 

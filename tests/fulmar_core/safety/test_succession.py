@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fulmar_core.safety.command_gate import REJECTIONS_TO_LATCH
-from fulmar_core.safety.succession import Succession
+from fulmar_core.safety.fallback import Succession
 
 
 def reject(succession, times=REJECTIONS_TO_LATCH):

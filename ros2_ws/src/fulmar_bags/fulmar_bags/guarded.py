@@ -9,8 +9,8 @@ from fulmar_bags.contents import Bag, json_object
 from fulmar_bags.decode import messages
 from fulmar_bags.received import Told
 from fulmar_core.errors import BagError
-from fulmar_core.safety.area import NO_AREA
 from fulmar_core.safety.estop import TIMEOUT_NS, EstopWatch
+from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP
 
 # A message reaches the controller and the recorder at different times; what lies within is for the record to tell.

@@ -6,7 +6,7 @@ from fulmar_bringup.remapping import TOPIC
 from fulmar_bringup.system import Guards, default_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
-from fulmar_core.safety.area import NO_AREA
+from fulmar_core.safety.geofence import NO_AREA
 from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
 from policy_server.controllers import EXTERNAL, controller_entry
 

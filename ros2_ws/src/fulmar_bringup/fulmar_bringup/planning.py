@@ -30,8 +30,7 @@ from fulmar_core.controllers.classical import has_law
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.settings import load_estimator
-from fulmar_core.geofence import check_starts
+from fulmar_core.estimation.motion_filter import load_estimator
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.own_class import is_own
@@ -40,6 +39,7 @@ from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import checked_name
+from fulmar_core.safety.geofence import check_starts
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
 from hardware_drivers.own_driver import check_own_driver

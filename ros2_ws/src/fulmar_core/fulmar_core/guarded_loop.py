@@ -17,10 +17,9 @@ from fulmar_core.mission import Mission
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
-from fulmar_core.safety.area import outside
+from fulmar_core.safety.fallback import Standby, Succession
+from fulmar_core.safety.geofence import outside
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import Task
 
 ENDED = "the e-stop stopped this goal"

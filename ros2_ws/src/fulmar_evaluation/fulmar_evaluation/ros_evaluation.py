@@ -33,9 +33,9 @@ from fulmar_core.episode import Episode, draw_episode, episode_steps
 from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.goal import Goal
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
-from fulmar_core.parent_watch import end_with
 from fulmar_core.path_task import judged_task
 from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.process import end_with
 from fulmar_core.robot import load_robot
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import SWITCH_INTERVAL_S, settle_memory, spinning

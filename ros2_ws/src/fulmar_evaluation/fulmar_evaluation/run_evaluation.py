@@ -14,9 +14,9 @@ from fulmar_bags.run_record import Actuation, GivenGoal, Motion, Places, RunReco
 from fulmar_core.errors import BagError
 from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targets, episode_metrics, successes
+from fulmar_core.mission import LONGEST_AHEAD_NS, SLACK_NS
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.schedule import LONGEST_AHEAD_NS, SLACK_NS
 from fulmar_core.tasks import Task, load_recorded_task
 from fulmar_core.trajectories import COLUMNS
 

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_core.process import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.phase_lock import ArrivalPhase
 

@@ -17,8 +17,7 @@ from fulmar_bags.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
 from fulmar_core.control_loop import Step
 from fulmar_core.controller_settings import POLICY, ControllerSettings
 from fulmar_core.controllers.controller import Controller, Inputs
-from fulmar_core.errors import FulmarError, TaskError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, FulmarError, TaskError
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.beliefs import BeliefReader, Beliefs
@@ -26,8 +25,8 @@ from fulmar_core.health.thruster_health import can_be_watched
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.estop import EstopWatch
+from fulmar_core.safety.fallback import Standby
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ODOMETRY
 from fulmar_ros.control_beat import ControlBeat

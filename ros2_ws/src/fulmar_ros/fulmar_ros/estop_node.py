@@ -17,7 +17,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
 from fulmar_core.topics import (

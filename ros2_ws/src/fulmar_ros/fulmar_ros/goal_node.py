@@ -16,7 +16,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from fulmar_bags.message_reader import measurement_of
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile, load_goals
 from fulmar_core.goal_sequence import STANDSTILL, goal_sequence

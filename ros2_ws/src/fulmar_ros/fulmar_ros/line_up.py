@@ -10,8 +10,7 @@ from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
 from fulmar_core.robot import Robot
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby, ready
+from fulmar_core.safety.fallback import Standby, Succession, ready
 from fulmar_core.tasks import Task
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]

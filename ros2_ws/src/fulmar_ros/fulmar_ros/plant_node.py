@@ -12,8 +12,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
-from fulmar_core.errors import ConfigError, FulmarError
-from fulmar_core.exit_codes import BAD_USAGE, FAILED
+from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopWatch

@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
 from fulmar_core.planar import at_rest, rigid_of
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.input_gate import BACK_NS

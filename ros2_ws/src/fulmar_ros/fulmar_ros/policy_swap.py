@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable
 
 from fulmar_core.errors import FulmarError
-from fulmar_core.priority import give_up_priority
-from fulmar_core.standby import Standby
+from fulmar_core.process import give_up_priority
+from fulmar_core.safety.fallback import Standby
 
 LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path
 

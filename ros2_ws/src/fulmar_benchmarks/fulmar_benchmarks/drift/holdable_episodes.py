@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.disturbances.outside import outside_wrench
+from fulmar_core.disturbances.world import outside_wrench
 from fulmar_core.episode import Episode
 from fulmar_core.holdability import LEAST_MARGIN, hold_margin
 from fulmar_core.planar import at_rest

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.safety.area import check_area
+from fulmar_core.safety.geofence import check_area
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")]
 NameOption = Annotated[

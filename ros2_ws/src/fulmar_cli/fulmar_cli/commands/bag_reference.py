@@ -9,8 +9,7 @@ import typer
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED, UnknownNameError
 
 
 def reference(

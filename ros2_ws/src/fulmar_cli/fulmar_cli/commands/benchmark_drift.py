@@ -13,8 +13,7 @@ from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, PolicyOption, SeedOption
 from fulmar_core.episode import JUDGE_SEED
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, UnknownNameError
 
 
 def drift(

@@ -9,8 +9,7 @@ import typer
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED, ConfigError, UnknownNameError
 
 
 def commission(

@@ -11,7 +11,7 @@ from rich.table import Table
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED
 
 if TYPE_CHECKING:
     from fulmar_evaluation.faults.fault_result import Finding

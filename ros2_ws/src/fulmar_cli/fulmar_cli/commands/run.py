@@ -26,8 +26,7 @@ from fulmar_cli.commands.arguments import (
     read_goal,
     read_pose,
 )
-from fulmar_core.errors import ConfigError
-from fulmar_core.exit_codes import DONE
+from fulmar_core.errors import DONE, ConfigError
 
 
 def run(

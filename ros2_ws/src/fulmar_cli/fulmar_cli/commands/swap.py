@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import output, print_json
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED
 from fulmar_core.paths import config_names
 from fulmar_core.robot_name import checked_name
 

@@ -14,8 +14,7 @@ from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import CalibrationOption, JsonOption, SeedOption
 from fulmar_cli.extras import require
 from fulmar_core.calibration import use_calibration
-from fulmar_core.errors import ConfigError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, ConfigError
 
 if TYPE_CHECKING:
     from training.executors import Executor

@@ -21,7 +21,7 @@ from fulmar_cli.commands.arguments import (
     SeedOption,
     read_pose,
 )
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED
 
 
 def up(

@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_core.goal import Goal
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.planar import PlanarState
 
 

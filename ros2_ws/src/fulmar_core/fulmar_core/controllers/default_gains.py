@@ -24,8 +24,8 @@ from fulmar_core.controllers.lqr import LqrWeights
 from fulmar_core.controllers.polar import PolarGains
 from fulmar_core.controllers.pure_pursuit import PurePursuitGains
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.health.thruster_health import can_be_watched
-from fulmar_core.health.trust import Suspicion
 from fulmar_core.robot import Robot
 
 Gains = TypeVar("Gains")

@@ -10,8 +10,8 @@ import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.health.thruster_health import can_be_watched
-from fulmar_core.health.trust import Suspicion
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 

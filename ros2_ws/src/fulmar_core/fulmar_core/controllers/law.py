@@ -12,9 +12,8 @@ import numpy as np
 
 from fulmar_core.controllers.body_frame import BodyFrame, Vector
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.free_space import room_ahead
-from fulmar_core.controllers.guidance import passing_speed
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.controllers.guidance import passing_speed, room_ahead
+from fulmar_core.health.filters import Suspicion
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task

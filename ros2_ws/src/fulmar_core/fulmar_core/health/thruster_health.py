@@ -19,9 +19,7 @@ import numpy as np
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.applied import Applied
-from fulmar_core.health.hold_detector import HoldDetector
-from fulmar_core.health.push_filter import PushFilter
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HoldDetector, PushFilter, Suspicion
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
 

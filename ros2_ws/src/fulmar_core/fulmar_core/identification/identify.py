@@ -13,7 +13,7 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.calibration import Calibration, Measured
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.identification.boat import BoatModel
-from fulmar_core.identification.drive import Drive
+from fulmar_core.identification.drives import Drive
 from fulmar_core.identification.fit import Estimate, Fit, fit
 from fulmar_core.identification.model import Known, Model, Unknown
 from fulmar_core.identification.platform import PlatformModel, ballast_name

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.actuators.slowdown import slowed
+from fulmar_core.actuators.actuation import slowed
 from fulmar_core.robot import Actuators, Rolling
-from fulmar_core.safety.command_gate import command_problem, name_problem
-from fulmar_core.safety.command_writers import CommandWriters
+from fulmar_core.safety.command_gate import CommandWriters, command_problem, name_problem
 from fulmar_core.safety.estop import EstopWatch
 from fulmar_core.safety.watchdog import Watchdog
 

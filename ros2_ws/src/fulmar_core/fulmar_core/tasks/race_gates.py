@@ -13,8 +13,8 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.race_track import RaceTrack
 from fulmar_core.tasks.terms import Errors, pose_errors
+from fulmar_core.tasks.waypoint_courses import RaceTrack
 from fulmar_core.tasks.waypoint_tasks import PassingTask, WaypointReward, bearing_of, newly_done, path_terms
 
 LAST = "robot_a_step_ago"  # pose that a goal keeps

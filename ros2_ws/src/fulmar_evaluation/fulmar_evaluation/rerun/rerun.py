@@ -22,9 +22,8 @@ from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.observation import Observer
 from fulmar_core.rotation import rotate
+from fulmar_core.safety.fallback import Standby, Succession, ready
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby, ready
 from fulmar_core.state import RigidBodyState
 
 FROM = ("observations", "odometry")

@@ -1,9 +1,13 @@
-"""The area that a robot must not leave: walls of a laboratory, a buoyed piece of water."""
+"""Geofence and area: how far a robot may be from its goal, and where it may be."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
 
 NO_AREA = (0.0, 0.0, 0.0, 0.0)  # an area without extent stands for none
 
@@ -32,3 +36,23 @@ def outside(x: float, y: float, area: Sequence[float]) -> str:
         f"the robot was at x = {x:.2f} m, y = {y:.2f} m, outside its area of x {area[0]:g} to {area[1]:g} m, "
         f"y {area[2]:g} to {area[3]:g} m. Bring it back by hand, then give a goal."
     )
+
+
+def check_starts(robot: Robot, task: Task, *, training: bool = False) -> None:
+    """Refuse a robot whose geofence is smaller than the distances that a task draws its starts from.
+
+    Args:
+        robot: Has the geofence.
+        task: Draws the starts.
+        training: Of the starts for learning, not those for evaluation.
+
+    Raises:
+        ConfigError: Episodes would start beyond the geofence.
+    """
+    key, farthest = task.farthest_start(training=training)
+    if farthest > robot.limits.geofence:
+        raise ConfigError(
+            f"'limits.geofence' = {robot.limits.geofence:g} m of robot '{robot.name}' is smaller than the starts of "
+            f"task '{task.name}', up to {farthest:g} m from the goal ('{key}'). Give the robot a geofence of at least "
+            f"{farthest:g} m, give the task nearer starts, or run it with --start and --goal."
+        )
