@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.episode import EVALUATION_SEED
 from fulmar_core.metrics import summary
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends
@@ -36,9 +36,9 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
         task,
         world,
         episodes=episodes,
-        seed=JUDGE_SEED,
+        seed=EVALUATION_SEED,
     )
     figures: dict[str, Any] = summary(trajectories, task)
-    record["mujoco"] = {"scenario": scenario, "seed": JUDGE_SEED, **figures}
+    record["mujoco"] = {"scenario": scenario, "seed": EVALUATION_SEED, **figures}
     write_run_record(run, record)
     return figures

@@ -62,7 +62,7 @@ class WrenchTeacher:
     def actions(self, observations: np.ndarray) -> np.ndarray:
         """Shares of the wanted wrench; see `Teacher`."""
         inputs = self._worlds.inputs()
-        now = self._law.frame.situation(inputs)
+        now = self._law.frame.body_state(inputs)
         if self._worlds.told:
             terms = inputs.observation.shape[1]
             now = replace(now, push=np.asarray(observations[:, terms : terms + len(PUSH_TERMS)], dtype=float))

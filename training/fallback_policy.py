@@ -14,7 +14,7 @@ import numpy as np
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import stranding_losses
+from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from training.network import DeployedNetwork, load_network
@@ -41,7 +41,7 @@ def specialist_settings(settings: TrainingSettings, robot: Robot, task: Task) ->
     name = settings.specialist.training
     own = load_training_settings(robot, task, name)
     stranded = load_scenario(own.scenario).actuation
-    if not stranded.stranding or not stranding_losses(robot, stranded.failures):
+    if not stranded.stranding or not uncontrollable_losses(robot, stranded.failures):
         raise ConfigError(
             f"'specialist': '{own.scenario}', the scenario of '{name}', must have 'stranding: true', and "
             f"'{robot.name}' thrusters that strand it when they are lost."
@@ -69,7 +69,7 @@ def load_specialist(run: Path, robot: Robot, settings: TrainingSettings) -> Spec
         FileNotFoundError: The run has left no network.
     """
     valves = len(robot.actuators.names)
-    lost = stranding_losses(robot, load_scenario(settings.scenario).actuation.failures)
+    lost = uncontrollable_losses(robot, load_scenario(settings.scenario).actuation.failures)
     losses = np.zeros((len(lost), valves), dtype=np.float32)
     for row, which in zip(losses, lost, strict=True):
         row[list(which)] = 1.0

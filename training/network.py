@@ -153,7 +153,7 @@ class DeployedNetwork(nn.Module):
         self.choice_commands.copy_(torch.as_tensor(choice.commands))
         self.choice_slope.copy_(torch.as_tensor(choice.slope))
         self.choice_offset.copy_(torch.as_tensor(choice.offset))
-        self.choice_gas.copy_(torch.as_tensor(choice.gas))
+        self.choice_gas.copy_(torch.as_tensor(choice.valve_costs))
 
     def take_specialist(self, specialist: DeployedNetwork, losses: np.ndarray) -> None:
         """Take over who acts where all valves of a row of `losses` are dead (1), shape (k, valves)."""

@@ -11,7 +11,7 @@ from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.goal import Goal
 from fulmar_core.planar import COLUMNS, PlanarState
 
-Moving = dict[str, Any]  # as of `Moves.moving`, with dictionaries in it
+Moving = dict[str, Any]  # as of `MutableState.mutable_state`, with dictionaries in it
 Parts = dict[str, Any]  # the same without; what was in a dictionary has a name of two words
 
 _RECORDS = {PlanarState: COLUMNS, World: FIELDS}

@@ -15,7 +15,7 @@ from stable_baselines3.common.logger import KVWriter, configure
 from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import JUDGING_SEEDS
+from fulmar_core.episode import EVALUATION_SEEDS
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_core.safety.geofence import check_starts
@@ -47,8 +47,8 @@ def check_seed(seed: int) -> None:
     Raises:
         ConfigError: If the seed is negative, or one of those kept for judging.
     """
-    if seed < 0 or seed in JUDGING_SEEDS:
-        kept = " and ".join(str(kept) for kept in JUDGING_SEEDS)
+    if seed < 0 or seed in EVALUATION_SEEDS:
+        kept = " and ".join(str(kept) for kept in EVALUATION_SEEDS)
         raise ConfigError(f"seed {seed} must not be negative, nor {kept}, which are kept for judging.")
 
 
@@ -96,7 +96,7 @@ def train(
         robot: The robot.
         task: The task.
         settings: How to learn.
-        seed: Seed of everything random, >= 0, and none of `JUDGING_SEEDS`.
+        seed: Seed of everything random, >= 0, and none of `EVALUATION_SEEDS`.
         out: Run folder; made if need be.
         time_limit_s: Wall-clock of learning; the settings' by default, none if `updates` are given [s].
         updates: How many updates to do; as many as there is time for by default.

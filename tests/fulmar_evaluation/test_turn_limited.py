@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 from fulmar_core.actuators.response import Response
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import JUDGE_SEED, draw_episodes
+from fulmar_core.episode import EVALUATION_SEED, draw_episodes
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
@@ -188,12 +188,12 @@ def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least, pas
         commands = drives[robot].astype(np.float32) / 1000.0
     machine, task, scenario = load_robot(robot), load_task("go_through_positions"), load_scenario("nominal")
     numbers = np.arange(len(commands))
-    sim = BatchSimulation(machine, task, scenario, worlds=len(numbers), seed=JUDGE_SEED)
+    sim = BatchSimulation(machine, task, scenario, worlds=len(numbers), seed=EVALUATION_SEED)
     track = []
     for command in commands.swapaxes(0, 1):
         sim.step(command)
         track.append(np.stack((sim.truth.x, sim.truth.y), axis=-1))
-    drawn = draw_episodes(machine, task, scenario, seed=JUDGE_SEED, numbers=numbers)
+    drawn = draw_episodes(machine, task, scenario, seed=EVALUATION_SEED, numbers=numbers)
     places = drawn.goal.targets[..., :2]
     goals = goals_reached(np.stack(track, axis=1), places, radius=RADIUS)
     start = np.stack((drawn.start.x, drawn.start.y), axis=-1)

@@ -19,7 +19,7 @@ from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.paths import config_names
 from fulmar_core.planar import COLUMNS, PlanarState, rigid_of
 from fulmar_core.robot import load_robot
-from fulmar_core.safety.fallback import Standby, Succession
+from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
@@ -162,7 +162,11 @@ def in_the_node(task, series, monkeypatch):
     for world in range(EPISODES):
         recorder, goal = Recorder(), goal_in_float64(drawn(task).goal)[world]
         guard = GuardedLoop(
-            ROBOT, task, ControllerSettings(lockstep=True), Succession(Standby(recorder, "{}", "")), NoEstop()
+            ROBOT,
+            task,
+            ControllerSettings(lockstep=True),
+            ControllerSwitch(Standby(recorder, "{}", "")),
+            NoEstop(),
         )
         guard.activate()
         if task.goal_topic == "goal_velocity":

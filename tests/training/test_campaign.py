@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.episode import EVALUATION_SEED
 from training.campaign import CAMPAIGN_FILE, run_campaign, summarised
 from training.executors import LocalExecutor
 from training.jobs import Job, Outcome, run_job
@@ -41,10 +41,10 @@ class Quiet:
 @pytest.mark.slow
 def test_a_campaign_runs_every_seed_reports_the_one_that_fails_and_names_the_best(job, tmp_path):
     watched = []
-    jobs = [with_seed(job, seed) for seed in (1, JUDGE_SEED, 2)]
+    jobs = [with_seed(job, seed) for seed in (1, EVALUATION_SEED, 2)]
     told = run_campaign(jobs, LocalExecutor(2), tmp_path, lambda *args: watched.append(args))
     assert json.loads((tmp_path / CAMPAIGN_FILE).read_text()) == told
-    assert [line["seed"] for line in told["seeds"]] == [1, JUDGE_SEED, 2]
+    assert [line["seed"] for line in told["seeds"]] == [1, EVALUATION_SEED, 2]
     assert told["failed"] == 1
     assert "are kept for judging" in told["seeds"][1]["error"]
     assert told["best_seed"] in (1, 2)
@@ -163,7 +163,7 @@ def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path, mon
         executor = ray_executor.RayExecutor(cluster.address)
         assert sum(node["Alive"] for node in ray.nodes()) == 2
         watched = []
-        jobs = [with_seed(job, seed) for seed in (1, 2, JUDGE_SEED)]
+        jobs = [with_seed(job, seed) for seed in (1, 2, EVALUATION_SEED)]
         told = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
         assert told["failed"] == 1
         assert "are kept for judging" in told["seeds"][2]["error"]

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.episode import EVALUATION_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.metrics import summary
@@ -310,6 +310,6 @@ def test_imported_policy_drives_the_base_to_its_goals_in_mujoco(tmp_path):
     policy = Policy(tmp_path / "out", robot, task)
     world = load_scenario("nominal")
     trajectories = roll_out_in_backends(
-        policy, lambda: MujocoBackend.of(robot, task, world), task, world, episodes=4, seed=JUDGE_SEED
+        policy, lambda: MujocoBackend.of(robot, task, world), task, world, episodes=4, seed=EVALUATION_SEED
     )
     assert summary(trajectories, task)["success_rate"] == 1.0

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from fulmar_core.episode import HELD_OUT_SEED, JUDGE_SEED
+from fulmar_core.episode import EVALUATION_SEED, HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.policy_bundle import read_golden, read_passport
 from policy_server.policy import Policy
@@ -158,7 +158,7 @@ def test_a_network_for_another_number_of_terms_is_refused(run_copy, tmp_path):
         export(run_copy, tmp_path / "out")
 
 
-@pytest.mark.parametrize("seed", [HELD_OUT_SEED, JUDGE_SEED, -1])
+@pytest.mark.parametrize("seed", [HELD_OUT_SEED, EVALUATION_SEED, -1])
 def test_a_seed_of_the_episodes_that_judge_is_refused(robot, task, small_settings, tmp_path, seed):
     words = f"seed {seed} must not be negative, nor 2026 and 1000003, which are kept for judging"
     with pytest.raises(ConfigError, match=words):
@@ -168,7 +168,7 @@ def test_a_seed_of_the_episodes_that_judge_is_refused(robot, task, small_setting
 def test_evaluate_judges_with_a_seed_that_no_run_has_learned_from():
     from fulmar_cli.commands.evaluate import evaluate
 
-    assert inspect.signature(evaluate).parameters["seed"].default == JUDGE_SEED
+    assert inspect.signature(evaluate).parameters["seed"].default == EVALUATION_SEED
 
 
 def interrupted_after(checks, monkeypatch):
@@ -232,7 +232,7 @@ def test_the_passport_carries_the_verdict_of_mujoco(run_copy, tmp_path):
     assert "mujoco" not in export(run_copy, tmp_path / "before").training
     figures = judge_in_mujoco(run_copy, episodes=2)
     verdict = export(run_copy, tmp_path / "after").training["mujoco"]
-    assert (verdict["seed"], verdict["scenario"], verdict["episodes"]) == (JUDGE_SEED, "nominal", 2)
+    assert (verdict["seed"], verdict["scenario"], verdict["episodes"]) == (EVALUATION_SEED, "nominal", 2)
     assert verdict["success_rate"] == figures["success_rate"]
     shares = [f"{kind}{limit}_percent" for kind in ("PT", "OT") for limit in (5, 2, 1)]
     assert {name: verdict[name] for name in [*shares, "AAS"]} == {

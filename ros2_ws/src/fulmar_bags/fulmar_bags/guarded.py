@@ -9,7 +9,7 @@ from fulmar_bags.contents import Bag, json_object
 from fulmar_bags.decode import messages
 from fulmar_bags.received import Told
 from fulmar_core.errors import BagError
-from fulmar_core.safety.estop import TIMEOUT_NS, EstopWatch
+from fulmar_core.safety.estop import TIMEOUT_NS, EstopMonitor
 from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP
 
@@ -131,7 +131,7 @@ class RecordedEstop:
     @property
     def heard(self) -> bool:
         """Whether it was received, and stopped everything without a doubt, at the time of the last call."""
-        return self._stops and self._late.watch.heard and self._early.watch.heard
+        return self._stops and self._late.watch.received and self._early.watch.received
 
     def reason(self, now_ns: int) -> str:
         """Why nothing may move at a time of the record, not before the one of the last call [ns]; empty if it may."""
@@ -146,7 +146,7 @@ class _Ear:
     """Hears everything somewhat earlier or later than the recorder."""
 
     def __init__(self, presses: tuple[Told, ...], required: bool, offset_ns: int) -> None:
-        self.watch = EstopWatch(required=required)
+        self.watch = EstopMonitor(required=required)
         self._rest = iter(presses)
         self._next = next(self._rest, None)
         self._offset_ns = offset_ns
@@ -157,6 +157,6 @@ class _Ear:
             if self._next.what == RELEASED:
                 self.watch.release(self._next.log_ns)
             else:
-                self.watch.hear(self._next.what, self._next.log_ns)
+                self.watch.receive(self._next.what, self._next.log_ns)
             self._next = next(self._rest, None)
         return self.watch.reason(now_ns)

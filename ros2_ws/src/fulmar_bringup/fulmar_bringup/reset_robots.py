@@ -72,7 +72,7 @@ def release_without_node(node: Node, space: str) -> Answer:
         node.create_subscription(
             kind,
             name,
-            lambda message: button.hear_command(name, not moves(message), time.monotonic_ns()),
+            lambda message: button.receive_command(name, not moves(message), time.monotonic_ns()),
             subscriber_qos(wire),
         )
 

@@ -18,9 +18,9 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
-JUDGE_SEED = 2026  # of episodes that finished controllers are judged on
+EVALUATION_SEED = 2026  # of episodes that finished controllers are judged on
 HELD_OUT_SEED = 1_000_003  # of episodes that learners are checked on
-JUDGING_SEEDS = (JUDGE_SEED, HELD_OUT_SEED)  # no training seeds: no run shall have learned from them
+EVALUATION_SEEDS = (EVALUATION_SEED, HELD_OUT_SEED)  # no training seeds: no run shall have learned from them
 
 
 @dataclass(frozen=True, slots=True)

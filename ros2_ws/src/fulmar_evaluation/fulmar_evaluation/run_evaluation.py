@@ -13,7 +13,14 @@ import numpy as np
 from fulmar_bags.run_record import Actuation, GivenGoal, Motion, Places, RunRecord
 from fulmar_core.errors import BagError
 from fulmar_core.goal import Goal, stack_goals
-from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targets, episode_metrics, successes
+from fulmar_core.metrics import (
+    TargetCounter,
+    Trajectories,
+    TrajectoryLog,
+    counts_targets,
+    episode_metrics,
+    successes,
+)
 from fulmar_core.mission import LONGEST_AHEAD_NS, SLACK_NS
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot, load_robot
@@ -208,22 +215,22 @@ def _goals_at(
     things: dict[str, np.ndarray],
     dt: float,
 ) -> Goal:
-    """The goal that a judge counts at each step: its current target alone, shape (n,)."""
+    """The goal that counts at each step: its current target alone, shape (n,)."""
     # A thing without a message counts as being where the robot is.
     unseen = np.stack((states.x, states.y, states.yaw), axis=-1)
     things = {thing.name: unseen for thing in task.things} | things
     counted: list[Goal] = []
-    number, before, judge = -1, 0.0, None
+    number, before, counter = -1, 0.0, None
     last = first
     for step, which in enumerate(newest):
-        if judge is None or which != number:
-            if judge is not None:  # what was reached so far counts on; of velocities, one more is over
-                before += float(judge.goal.done) + (task.goal_topic == "goal_velocity")
+        if counter is None or which != number:
+            if counter is not None:  # what was reached so far counts on; of velocities, one more is over
+                before += float(counter.goal.done) + (task.goal_topic == "goal_velocity")
             now = {name: pose[step] for name, pose in things.items()}
             begun = task.begun(Goal(given[which].targets, np.asarray(0.0), obstacles, now), last)
-            judge, number = Judge(task, begun, dt), which
+            counter, number = TargetCounter(task, begun, dt), which
         last = states[step]
-        goal = judge.see(last, {name: pose[step] for name, pose in things.items()})
+        goal = counter.update(last, {name: pose[step] for name, pose in things.items()})
         discs = goal.obstacles if len(goal.obstacles) else np.zeros((1, 3))
         done = np.asarray(before + goal.done)
         counted.append(replace(goal, targets=goal.current[None], done=done, obstacles=discs))

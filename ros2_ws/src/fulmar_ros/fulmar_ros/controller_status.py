@@ -55,7 +55,7 @@ class ControllerStatus:
             deadlines: The beat.
             beliefs: Of the actuators, where they are a warning.
         """
-        mission, succession, refusal = guard.mission, guard.succession, guard.refusal
+        mission, succession, refusal = guard.mission, guard.switch, guard.refusal
         standby, last_input_ns = succession.current, guard.flags.last_input_ns
         changed = (
             decision.mode,

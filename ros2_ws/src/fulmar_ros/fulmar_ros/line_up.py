@@ -10,7 +10,7 @@ from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
 from fulmar_core.robot import Robot
-from fulmar_core.safety.fallback import Standby, Succession, ready
+from fulmar_core.safety.fallback import ControllerSwitch, Standby, warm_up
 from fulmar_core.tasks import Task
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
@@ -22,7 +22,7 @@ def line_up(
     task: Task,
     settings: ControllerSettings,
     complain: Callable[[str], object],
-) -> Succession[Standby]:
+) -> ControllerSwitch[Standby]:
     """The controller that was asked for, or, where it is refused and one is named, its fallback.
 
     Args:
@@ -38,13 +38,13 @@ def line_up(
     """
     fallback = _fallback(robot, task, settings)
     try:
-        first = ready(make_controller(robot, task, settings), robot, task)
+        first = warm_up(make_controller(robot, task, settings), robot, task)
     except (FulmarError, ImportError) as error:
         if fallback is None:
             raise
         complain(f"falling back to {settings.fallback}: {error}")
-        return Succession(None, fallback, refused=str(error))
-    return Succession(first, fallback)
+        return ControllerSwitch(None, fallback, refused=str(error))
+    return ControllerSwitch(first, fallback)
 
 
 def load_other(
@@ -59,7 +59,7 @@ def load_other(
     Raises:
         FulmarError: It cannot take the place of the one that runs.
     """
-    return ready(make_controller(robot, task, dataclasses.replace(settings, policy=folder)), robot, task)
+    return warm_up(make_controller(robot, task, dataclasses.replace(settings, policy=folder)), robot, task)
 
 
 def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby | None:
@@ -68,4 +68,4 @@ def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby
         return None
     law = None if name == "classical" else name
     controller = load_classical(robot, task, control_hz=settings.control_rate(robot), law=law)
-    return ready(controller, robot, task, said={"fallback": True})
+    return warm_up(controller, robot, task, said={"fallback": True})

@@ -242,7 +242,7 @@ class PlantWires:
 
     def _on_estop(self, message: Bool) -> None:
         with self.lock:
-            self._guard.estop.hear(bool(message.data), time.monotonic_ns())
+            self._guard.estop.receive(bool(message.data), time.monotonic_ns())
 
     def _on_estop_released(self, _message: String) -> None:
         with self.lock:
@@ -264,7 +264,7 @@ class PlantWires:
         """Report to the guard which nodes publish commands."""
         writers = writers_of(self._node, self._commands)
         with self.lock:
-            self._guard.writers.see(writers, time.monotonic_ns())
+            self._guard.publishers.see(writers, time.monotonic_ns())
 
     @property
     def _plant_ns(self) -> int | None:

@@ -12,7 +12,7 @@ import typer
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, PolicyOption, SeedOption
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.episode import EVALUATION_SEED
 from fulmar_core.errors import FAILED, UnknownNameError
 
 
@@ -31,7 +31,7 @@ def drift(
     episodes: Annotated[
         int, typer.Option(metavar="N", min=1, help="Trajectories of each condition; paths have at most 4.")
     ] = 256,
-    seed: SeedOption = JUDGE_SEED,
+    seed: SeedOption = EVALUATION_SEED,
     policy: PolicyOption = None,
     tracking_policy: Annotated[
         Path | None,

@@ -12,7 +12,7 @@ import typer
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, SeedOption
-from fulmar_core.episode import JUDGE_SEED
+from fulmar_core.episode import EVALUATION_SEED
 from fulmar_core.errors import FAILED, UnknownNameError
 
 ALL = "all"
@@ -47,7 +47,7 @@ def roboran(
         int | None,
         typer.Option(metavar="N", min=1, help="In every way; 4,096, 256 and 16 through ros by default."),
     ] = None,
-    seed: SeedOption = JUDGE_SEED,
+    seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Where outcomes are kept, and the report with its pictures.")

@@ -22,7 +22,7 @@ from fulmar_cli.commands.arguments import (
     SeedOption,
     TaskArgument,
 )
-from fulmar_core.episode import JUDGE_SEED, episode_steps
+from fulmar_core.episode import EVALUATION_SEED, episode_steps
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.figures import FIGURES, meanings
 
@@ -52,7 +52,7 @@ def evaluate(
             help="Number of episodes; 4,096 in the batch, 256 elsewhere.",
         ),
     ] = None,
-    seed: SeedOption = JUDGE_SEED,
+    seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",
     calibration: CalibrationOption = None,
     control_hz: Annotated[

@@ -81,15 +81,16 @@ def identify(
             name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit}
             for name, e in found.fit.estimates.items()
         },
-        "untold": list(found.untold),
+        "untold": list(found.undetermined),
         "residuals": dict(zip(("x_m", "y_m", "heading_rad"), found.fit.noise, strict=True)),
         "windows": found.fit.windows,
         "calibration": None if out is None else str(out),
     }
-    if found.untold:
+    if found.undetermined:
         warn(
             [
-                f"the runs tell nothing of {', '.join(found.untold)}: left out of the calibration. Drive more briskly."
+                f"the runs tell nothing of {', '.join(found.undetermined)}: left out of the calibration. "
+                "Drive more briskly."
             ]
         )
     if not found.trusted:

@@ -10,15 +10,15 @@ from array_api_compat import device
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.disturbances.world import World
-from fulmar_core.mutable_state import Moves
+from fulmar_core.mutable_state import MutableState
 from fulmar_core.robot import Actuators, Rolling
 from fulmar_core.rotation import Array
 
 
-class ActuationState(Moves):
+class ActuationState(MutableState):
     """What the actuators of a batch of worlds do now; actuators first, worlds last."""
 
-    MOVING = ("_before", "_wanted", "applied", "gain", "_since_s", "_late", "_open_late")
+    MUTABLE = ("_before", "_wanted", "applied", "gain", "_since_s", "_late", "_open_late")
 
     def __init__(
         self,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.health.applied import Applied
-from fulmar_core.health.filters import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.health.thruster_health import Health, ThrusterHealth
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
@@ -77,7 +77,7 @@ class ActuatorEstimate:
 class ActuatorEstimator:
     """Bank of filters over lost valves, with trials of those that are believed dead; see `ThrusterHealth`."""
 
-    def __init__(self, robot: Robot, suspicion: Suspicion) -> None:
+    def __init__(self, robot: Robot, suspicion: HealthSettings) -> None:
         """Build the filters.
 
         Args:

@@ -12,7 +12,7 @@ MAY_BE_0 = ("held", "retry_s")
 
 
 @dataclass(frozen=True)
-class Suspicion:
+class HealthSettings:
     """Standard deviations and chances; our values, chosen on the conditions of the DRIFT benchmark."""
 
     position: float = 0.0015  # of a measured coordinate [m]
@@ -53,7 +53,7 @@ SETTLED = 1e-4  # relative change of a gain from step to step below which it sta
 class PushFilter:
     """Three coordinates (x, y, heading), each with velocity and push; states in the order pose, velocity, push."""
 
-    def __init__(self, robot: Robot, suspicion: Suspicion, dt: float) -> None:
+    def __init__(self, robot: Robot, suspicion: HealthSettings, dt: float) -> None:
         """Prepare for measurements that come every `dt` seconds, a multiple of the physics step."""
         inertia = np.array([robot.body.mass, robot.body.mass, robot.body.inertia[2]])
         s = suspicion
@@ -114,7 +114,7 @@ RELEASE = 6.0  # evidence for motion that ends a standstill: a third of a second
 class HoldDetector:
     """Evidence that bodies are held, for one or for many at once; arrays of shape (...,)."""
 
-    def __init__(self, suspicion: Suspicion, shape: tuple[int, ...]) -> None:
+    def __init__(self, suspicion: HealthSettings, shape: tuple[int, ...]) -> None:
         """Begin with bodies that are free.
 
         Args:

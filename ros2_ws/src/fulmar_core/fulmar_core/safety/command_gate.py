@@ -68,7 +68,7 @@ class Rejections:
 SETTLE_NS = 1_000_000_000  # the safe state lasts this long after one of two publishers is gone
 
 
-class CommandWriters:
+class CommandPublishers:
     """Reports why commands are not carried out, from the nodes that publish them. No clock, no ROS.
 
     The hold is not latched. A controller that is started again overlaps for some seconds with the one that has died,

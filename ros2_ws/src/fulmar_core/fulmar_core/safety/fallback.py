@@ -32,7 +32,9 @@ class Standby:
     sha256: str
 
 
-def ready(controller: Controller, robot: Robot, task: Task, *, said: dict[str, Any] | None = None) -> Standby:
+def warm_up(
+    controller: Controller, robot: Robot, task: Task, *, said: dict[str, Any] | None = None
+) -> Standby:
     """Warm a controller up, on the start of an episode of its task.
 
     Args:
@@ -64,7 +66,7 @@ def ready(controller: Controller, robot: Robot, task: Task, *, said: dict[str, A
 T = TypeVar("T")
 
 
-class Succession(Generic[T]):
+class ControllerSwitch(Generic[T]):
     """Changes happen between two control steps only; `propose` may be called from any thread.
 
     Attributes:
@@ -105,11 +107,11 @@ class Succession(Generic[T]):
         return self._past_rejections + self._rejections.total
 
     def propose(self, candidate: T) -> None:
-        """Let somebody take over at the next `turn`."""
+        """Let somebody take over at the next `apply`."""
         with self._lock:
             self._next = candidate
 
-    def turn(self) -> bool:
+    def apply(self) -> bool:
         """Between two steps: let the candidate take over, if there is one.
 
         Returns:
@@ -123,7 +125,7 @@ class Succession(Generic[T]):
         self._change(candidate, "")
         return True
 
-    def judge(self, problem: str | None) -> str | None:
+    def note(self, problem: str | None) -> str | None:
         """Note the verdict on a command of `current`.
 
         Args:

@@ -14,7 +14,7 @@ CANDIDATES = 12  # places tried for each waypoint, then their mirror images; all
 
 
 @dataclass(frozen=True)
-class Course:
+class WaypointCourse:
     """A closed course of waypoints in a square."""
 
     count: int  # waypoints; after the last one the first comes again

@@ -25,7 +25,7 @@ from fulmar_core.tasks.terms import (
     motion_terms,
     pose_errors,
 )
-from fulmar_core.tasks.waypoint_courses import Course, RaceTrack, headings_along
+from fulmar_core.tasks.waypoint_courses import RaceTrack, WaypointCourse, headings_along
 
 PLACE_TERMS = ("direction_x_in_body", "direction_y_in_body", "distance")
 TURN_TERMS = ("cos_heading_error", "sin_heading_error")
@@ -65,7 +65,7 @@ class WaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PassingTask(Task):
+class WaypointTask(Task):
     """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
 
     name: str
@@ -202,7 +202,7 @@ class PoseWaypointReward(WaypointReward):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PosePassingTask(PassingTask):
+class PoseWaypointTask(WaypointTask):
     """Pass through poses: a target counts where place and heading are right at the same time."""
 
     reach_heading_deg: (
@@ -222,7 +222,7 @@ class PosePassingTask(PassingTask):
             )
 
     def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
-        """Whether the current target is passed with the right heading; see `PassingTask.reached`."""
+        """Whether the current target is passed with the right heading; see `WaypointTask.reached`."""
         limit = math.radians(self.reach_heading_deg if strict else self.tolerance.heading_deg)
         errors = self.errors(state, goal)
         return (errors.position < radius) & (array_namespace(state.x).abs(errors.heading) < limit)
@@ -249,14 +249,14 @@ def _way_to(state: PlanarState, target: Array, distance: Array) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GoThroughPositions(PassingTask):
+class GoThroughPositions(WaypointTask):
     """Pass through positions of a random course in their order.
 
     Three of them are seen, one more than in RoboRAN: where a boat leaves a waypoint to depends on the next two.
     """
 
     kind: Literal["go_through_positions"]
-    course: Course
+    course: WaypointCourse
 
     seen: ClassVar[int] = 3
     observation_names: ClassVar[tuple[str, ...]] = path_terms(3, heading=False)
@@ -267,11 +267,11 @@ class GoThroughPositions(PassingTask):
 
 
 @dataclass(frozen=True, kw_only=True)
-class GoThroughPoses(PosePassingTask):
+class GoThroughPoses(PoseWaypointTask):
     """Pass through poses of a random course in their order; each looks from the one before to the one after."""
 
     kind: Literal["go_through_poses"]
-    course: Course
+    course: WaypointCourse
 
     def places(self, draws: Draws) -> np.ndarray:
         """Draw where the targets are, shape (worlds, k, 2) [m]."""
@@ -279,7 +279,7 @@ class GoThroughPoses(PosePassingTask):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RaceWaypoints(PassingTask):
+class RaceWaypoints(WaypointTask):
     """Pass through the corners of a race track in their order."""
 
     kind: Literal["race_waypoints"]
@@ -291,7 +291,7 @@ class RaceWaypoints(PassingTask):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RaceWayposes(PosePassingTask):
+class RaceWayposes(PoseWaypointTask):
     """Pass through the corners of a race track in their order, looking along it."""
 
     kind: Literal["race_wayposes"]
