@@ -129,7 +129,7 @@ class RecordedEstop:
         self.recorded = False
 
     @property
-    def heard(self) -> bool:
+    def received(self) -> bool:
         """Whether it was received, and stopped everything without a doubt, at the time of the last call."""
         return self._stops and self._late.watch.received and self._early.watch.received
 
