@@ -16,10 +16,12 @@ DEV_LOCK := requirements-dev.lock
 RUN_SIZE := 884
 DEV_SIZE := 7053
 
-# A sourced ROS shell puts its own packages in front of the ones in .venv; the two must not mix.
+# A sourced ROS shell puts its own packages before those of .venv; the two must not mix.
 unexport PYTHONPATH
+# Tests start hundreds of processes, which would all compile the same modules again.
+unexport PYTHONDONTWRITEBYTECODE
 
-# The stamps carry a checksum of what they stand for: a changed lock asks for a new install, a touched one does not.
+# A stamp has the checksum of its lock file: a changed lock needs a new installation, a touched one does not.
 key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
 RUN_STAMP := $(VENV)/.run-$(call key,$(RUN_LOCK))
 DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
@@ -45,21 +47,21 @@ PYTHONUNBUFFERED=1 $(BIN)/python -m pip install --disable-pip-version-check --no
 	esac; done; }
 endef
 
-# hatchling and editables are in both locks, so that this step needs no network and no isolated build.
+# hatchling and editables are in both locks, so that this step needs neither network nor build isolation.
 install_fulmar = $(BIN)/python -m pip install --disable-pip-version-check --quiet --no-deps --no-build-isolation -e .
 
 .PHONY: help
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 	@echo
-	@echo "  PYTHON=python3.12    the interpreter that .venv is made from (3.11 to 3.13)"
-	@echo "  PYTEST_ARGS='-k lqr' what to add to pytest in 'make test'"
+	@echo "  PYTHON=python3.12    interpreter of .venv (3.11 to 3.13)"
+	@echo "  PYTEST_ARGS='-k lqr' more arguments for pytest in 'make test'"
 
 .PHONY: setup
-setup: $(RUN_STAMP) ## Install what a robot or a simulation needs, into .venv (no torch; 0.9 GiB)
+setup: $(RUN_STAMP) ## Install what a robot or a simulation needs (no torch; 0.9 GiB)
 
 .PHONY: dev
-dev: $(DEV_STAMP) ## Install everything, also training and the tools for tests (6.9 GiB)
+dev: $(DEV_STAMP) ## Install everything, also for training and tests (6.9 GiB)
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
@@ -75,7 +77,7 @@ $(RUN_STAMP): | $(VENV)/bin/python
 	@touch $@
 	@echo "Ready: $(BIN)/fulmar"
 
-# The development lock holds the run-time lock, version for version, so it fulfils both stamps.
+# The development lock contains the run-time lock, version for version, so it sets both stamps.
 $(DEV_STAMP): | $(VENV)/bin/python
 	@$(call install_lock,$(DEV_LOCK),$(DEV_SIZE))
 	@$(install_fulmar)
@@ -84,11 +86,11 @@ $(DEV_STAMP): | $(VENV)/bin/python
 	@echo "Ready: $(BIN)/fulmar, with training and the tools for tests"
 
 .PHONY: demo
-demo: setup ## Run the floating platform with a policy, then with LQR, over real ROS 2
+demo: setup ## Run the floating platform with a policy, then with an LQR, over ROS 2
 	@$(BIN)/fulmar demo
 
 .PHONY: train-demo
-train-demo: dev ## Train a policy, export it and judge it in MuJoCo
+train-demo: dev ## Train a policy, export it and evaluate it in MuJoCo
 	$(BIN)/fulmar train floating_platform go_to_pose --seed 1 --out runs/train/go_to_pose
 	$(BIN)/fulmar export runs/train/go_to_pose --out runs/bundles/go_to_pose
 	$(BIN)/fulmar evaluate floating_platform go_to_pose --controller policy --policy runs/bundles/go_to_pose \
@@ -99,11 +101,11 @@ policies: dev ## Make the shipped policies that are missing or out of date (unde
 	$(BIN)/fulmar policies
 
 .PHONY: replay-bags
-replay-bags: dev ## Record the reference bags of the tests anew, after an intended change of behaviour
+replay-bags: dev ## Record the reference bags of the tests again, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
 
-# What keeps the time of the wall clock runs alone; all else in three processes, since tests of nodes mostly wait.
-# 5: nothing of a part was asked for.
+# Tests with wall-clock deadlines run alone, all others in three processes, since tests of nodes mostly wait.
+# Exit code 5 of pytest: no test of this part is selected.
 define run_tests
 code=5; \
 run() { $(BIN)/python -m pytest "$$@" $(PYTEST_ARGS); }; \
@@ -114,12 +116,12 @@ for part in "not real_time" real_time; do \
 	if [ $$last != 5 ] && { [ $$code = 5 ] || [ $$code = 0 ]; }; then code=$$last; fi; \
 done; \
 if [ $$code = 0 ]; then echo; echo "All tests passed."; \
-else echo; echo "Some tests failed, or none was found. Once more, only those that failed: make test PYTEST_ARGS=--last-failed" >&2; \
+else echo; echo "Some tests failed, or none was found. To repeat the failed ones: make test PYTEST_ARGS=--last-failed" >&2; \
 	exit $$code; fi
 endef
 
 .PHONY: test
-test: dev ## Run the tests, but for those that take more than ten seconds
+test: dev ## Run the tests, without those that take more than ten seconds
 	@$(call run_tests, and not slow)
 
 .PHONY: test-all
@@ -127,7 +129,7 @@ test-all: dev ## Run every test
 	@$(call run_tests,)
 
 .PHONY: profile-step
-profile-step: dev ## Profile a step of the live controller and its lock step (AGAINST=DIR: beside another checkout)
+profile-step: dev ## Profile a control step and its lock step (AGAINST=DIR: compare with another checkout)
 	@$(BIN)/python tests/benchmarks/profile_step.py $(if $(AGAINST),--against $(AGAINST))
 
 .PHONY: check
@@ -140,7 +142,7 @@ check: dev ## Check format, lint, types, import contracts and spelling
 	@echo "All checks passed."
 
 .PHONY: format
-format: dev ## Rewrite the sources in the one format, with the safe fixes of the linter
+format: dev ## Format the sources and apply the safe fixes of the linter
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 

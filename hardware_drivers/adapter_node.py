@@ -22,8 +22,7 @@ from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.air_bearing import SERVICE
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.foreign_topics import VALVE_MESSAGES, valve_values
-from fulmar_ros.node_robot import own_frames
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.settings import ThrustTopic, ValveTopic, VelocityTopic, load_hardware

@@ -12,7 +12,7 @@ from fulmar_core.backend import Backend
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_sender
-from fulmar_ros.node_robot import own_frames
+from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_node import DONE, PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import RequestExit, run_node

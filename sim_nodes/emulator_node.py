@@ -26,12 +26,10 @@ from fulmar_core.tasks import load_task
 from fulmar_core.topics import DEVICE_STATE, MOCAP, ODOMETRY, TRUTH
 from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
 from fulmar_ros.deadline import Deadlines
-from fulmar_ros.first_episode import first_episode
 from fulmar_ros.foreign_topics import VALVE_MESSAGES
-from fulmar_ros.node_robot import own_frames
-from fulmar_ros.paced_capture import capture_maker
-from fulmar_ros.parameters import read_parameters
-from fulmar_ros.plant_settings import PlantSettings
+from fulmar_ros.motion_capture import capture_maker
+from fulmar_ros.parameters import own_frames, read_parameters
+from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node, settle_memory
 from sim_nodes.emulators.device import EmulatedDevice

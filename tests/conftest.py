@@ -1,4 +1,4 @@
-"""What tests of whole ROS processes share: a DDS domain of their own."""
+"""Fixtures of all tests: a DDS domain per test, synthetic runs, the command line."""
 
 from __future__ import annotations
 
@@ -25,44 +25,44 @@ class RosDomain:
     """A DDS domain that no other running test shares, on this host only."""
 
     id: int
-    env: dict[str, str]  # environment of every process that shall see it
+    env: dict[str, str]  # environment of every process in it
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--seeds 20` repeats what depends on chance: pytest tests/ros/test_six_nozzles.py --seeds 20."""
+    """`--seeds 20` repeats random tests: pytest tests/ros/test_six_nozzles.py --seeds 20."""
     parser.addoption("--seeds", type=int, default=1, help="seeds of each test that takes `seed_of_series`")
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Give a test that takes `seed_of_series` each seed from 1 on."""
+    """Run a test with the argument `seed_of_series` with each seed from 1 on."""
     if "seed_of_series" in metafunc.fixturenames:
         metafunc.parametrize("seed_of_series", range(1, metafunc.config.getoption("seeds") + 1))
 
 
 def pytest_collection_finish() -> None:
-    """Exempt every imported module from the garbage collection between tests of ROS nodes."""
+    """Exclude imported modules from the garbage collection between tests of ROS nodes."""
     gc.collect()
     gc.freeze()
 
 
 @pytest.fixture(autouse=True, scope="session")
 def interruptible() -> None:
-    """Let children hear SIGINT also where the tests run in the background of a shell, which ignores it."""
+    """Let child processes receive SIGINT also if a shell runs the tests in its background, which ignores it."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True, scope="session")
 def unlogged_learners(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """A learner that is told of no log makes an empty folder for one, which goes with pytest's own folders here."""
+    """Put the empty log folders of learners among pytest's temporary folders."""
     os.environ["SB3_LOGDIR"] = str(tmp_path_factory.mktemp("learners"))
 
 
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosDomain]:
-    """Give this test a domain; the test's own process gets its variables too.
+    """A DDS domain for this test; the test's own process gets its variables too.
 
-    Lifecycle nodes that ended in this process are seen in their domain until they are collected: nodes of this process
-    freeze nothing. Where no other plant lives, a plant need not look for one before it starts.
+    Ended lifecycle nodes of this process stay visible in their domain until they are garbage-collected, so nodes of
+    this process freeze nothing. No plant searches for another one before it starts, since there is none.
     """
     monkeypatch.setattr("fulmar_ros.runtime.gc", SimpleNamespace(collect=lambda: None, freeze=lambda: None))
     monkeypatch.setattr("fulmar_ros.plant_node.BRIEFLY_S", 0.0)
@@ -82,13 +82,13 @@ def reached(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def calm(tmp_path_factory) -> Path:
-    """The same way with other gains, under the name of a policy."""
+    """The same run with other gains, recorded as a policy."""
     return write_run(tmp_path_factory.mktemp("runs") / "calm", Plan(controller="policy", weights=CALM))
 
 
 @pytest.fixture(scope="session")
 def silenced(tmp_path_factory) -> Path:
-    """A run whose controller fell silent and did not come back."""
+    """A run whose controller stops publishing for good."""
     return write_run(
         tmp_path_factory.mktemp("runs") / "silenced", Plan(duration_s=15.0, silence_s=(8.0, 15.1))
     )
@@ -96,7 +96,7 @@ def silenced(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def copy_of(tmp_path) -> Callable[[Path], Path]:
-    """Copies of bags, to be damaged."""
+    """Function that copies a bag, for tests that damage it."""
 
     def copy(bag: Path) -> Path:
         return Path(shutil.copytree(bag, tmp_path / bag.name))
@@ -106,7 +106,7 @@ def copy_of(tmp_path) -> Callable[[Path], Path]:
 
 @pytest.fixture
 def copy(tmp_path) -> Path:
-    """A copy of a reference bag, to be changed or damaged."""
+    """A copy of a reference bag, for tests that change it."""
     return Path(shutil.copytree(POLICY, tmp_path / "bag"))
 
 

@@ -1,4 +1,4 @@
-"""What every test of the tree's shape needs: where the tree is."""
+"""Path of the repository, for tests of its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ROS workspace builds with colcon, and what it installs works without the checkout."""
+"""The ROS workspace builds with colcon, and the installation works without the checkout."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 
 
 class Workspace:
-    """A copy of the tree's needed parts, away from the checkout."""
+    """A copy of the needed parts of the tree, outside of the checkout."""
 
     def __init__(self, folder: Path, repository: Path) -> None:
         self.root = folder / "ros2_ws"
@@ -64,7 +64,7 @@ class Workspace:
         return self._run([str(Path(sys.executable).with_name("colcon")), *arguments], self.root)
 
     def sourced(self, command: str) -> subprocess.CompletedProcess[str]:
-        """Run a shell command as a user would, after sourcing what was installed."""
+        """Run a shell command after sourcing the installation."""
         return self._run(["bash", "-c", f"source ./local_setup.bash && {command}"], self.install)
 
     def _run(self, command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
@@ -128,13 +128,13 @@ def test_every_source_file_and_policy_is_installed(built, repository, name):
     assert files_below(site / name) == files_below(repository / "ros2_ws" / "src" / name / name)
 
 
-def test_every_config_lands_in_share(built, repository):
+def test_every_config_is_installed_in_share(built, repository):
     share = built.install / "fulmar_core/share/fulmar_core"
     assert files_below(share / "configs") == files_below(repository / "configs")
     assert files_below(share / "configs")
 
 
-def test_the_launch_file_lands_in_share(built):
+def test_the_launch_file_is_installed_in_share(built):
     assert (built.install / "fulmar_bringup/share/fulmar_bringup/launch/system.launch.py").is_file()
 
 
@@ -146,7 +146,7 @@ def test_the_installed_core_reads_the_installed_configs(built):
         assert Path(line).is_relative_to(built.install)
 
 
-def test_the_programs_are_where_ros2_run_looks(built):
+def test_programs_are_where_ros2_run_searches(built):
     found = {
         path.relative_to(built.install / name / "lib").as_posix()
         for name in PACKAGES
@@ -156,7 +156,7 @@ def test_the_programs_are_where_ros2_run_looks(built):
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_every_program_takes_its_interpreter_from_the_shell(built, program):
+def test_every_program_uses_the_interpreter_of_the_shell(built, program):
     package = program.partition("/")[0]
     script = built.install / package / "lib" / program
     assert os.access(script, os.X_OK)
@@ -173,7 +173,7 @@ def test_every_program_finds_its_installed_main(built, program, module):
     assert can_be_called == "True"
 
 
-def test_the_installed_command_line_answers(built):
+def test_the_installed_command_line_runs(built):
     result = built.sourced("fulmar_cli/lib/fulmar_cli/fulmar --help")
     assert result.returncode == 0, result.stderr
     assert re.search(r"usage", result.stdout, re.IGNORECASE)

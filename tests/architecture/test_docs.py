@@ -1,4 +1,4 @@
-"""Pages of docs are true: commands exist with their options, links lead somewhere, what is to be pasted works."""
+"""README and docs: commands, options, links, files and examples exist and work."""
 
 from __future__ import annotations
 
@@ -16,16 +16,26 @@ from typer.testing import CliRunner
 
 from fulmar_cli.main import app
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGES = {path.stem: path for path in sorted(DOCS.glob("*.md"))}
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = {path.stem: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.md")))}
 COMMAND = re.compile(r"^ *(fulmar [a-z].*)$", re.MULTILINE)
+INLINE = re.compile(r"`fulmar ([a-z]+)")
+FILE = re.compile(
+    r"`((?:fulmar_|sim_nodes|policy_server|hardware_drivers|training|configs|tests)[\w/]*/[\w./]+)`"
+)
 PASTED = re.compile(r"^cat > (mine/\S+) <<'EOF'\n(.*?)^EOF$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#:]+)\)")
 
 
-@pytest.fixture(params=PAGES.values(), ids=PAGES)
-def page(request) -> str:
-    return request.param.read_text(encoding="utf-8")
+@pytest.fixture(params=PAGES)
+def name(request) -> str:
+    return request.param
+
+
+@pytest.fixture
+def page(name) -> str:
+    return text_of(name)
 
 
 def text_of(name: str) -> str:
@@ -33,7 +43,7 @@ def text_of(name: str) -> str:
 
 
 def shown(page: str) -> str:
-    """What a page shows as code: fenced or indented."""
+    """Code of a page: fenced or indented."""
     fenced = re.findall(r"^```\w*\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     return "\n".join((*fenced, *re.findall(r"^    .*$", page, re.MULTILINE)))
 
@@ -55,15 +65,25 @@ def test_every_command_exists_with_its_options(page, root):
         assert {word.split("=")[0] for word in words if word.startswith("--")} <= known, line
 
 
-def test_every_link_leads_to_a_file(page):
+def test_every_command_in_the_text_exists(page, root):
+    assert set(INLINE.findall(page)) <= set(root.commands)
+
+
+def test_every_linked_file_exists_and_is_small(name, page):
     for link in LINK.findall(page):
-        assert (DOCS / link).is_file(), link
+        assert (PAGES[name].parent / link).stat().st_size < 500_000, link
 
 
-def test_every_page_is_linked_from_the_readme_or_another_page(repository):
-    linked = set(LINK.findall((repository / "README.md").read_text(encoding="utf-8")))
-    linked |= {f"docs/{link}" for path in PAGES.values() for link in LINK.findall(path.read_text("utf-8"))}
-    assert {f"docs/{path.name}" for path in PAGES.values()} <= linked
+def test_every_named_file_exists(page):
+    for name in FILE.findall(page):
+        package = name.split("/")[0]
+        places = (ROOT, ROOT / "ros2_ws" / "src" / package)
+        assert any((place / name).exists() for place in places), name
+
+
+def test_every_page_is_linked():
+    linked = {path.parent / link for path in PAGES.values() for link in LINK.findall(path.read_text("utf-8"))}
+    assert set(DOCS.glob("*.md")) <= linked
 
 
 def test_every_make_target_of_the_first_hour_exists(repository):
@@ -74,7 +94,7 @@ def test_every_make_target_of_the_first_hour_exists(repository):
 
 @pytest.fixture
 def first_hour(tmp_path, monkeypatch, repository):
-    """Folder with the files that a reader of the first hour pastes or copies, which FULMAR_CONFIGS names."""
+    """Folder with the files of the first hour, as FULMAR_CONFIGS."""
     page = text_of("first_hour")
     files = dict(PASTED.findall(page))
     for source, target in re.findall(r"^cp (\S+) (mine/\S+)$", page, re.MULTILINE):
@@ -94,7 +114,7 @@ def test_the_robot_of_the_first_hour_reaches_its_goals_by_the_lqr(first_hour):
     assert json.loads(result.stdout)["success_rate"] == 1.0
 
 
-def test_the_driver_of_the_first_hour_knows_a_line_for_every_nozzle(first_hour):
+def test_the_driver_of_the_first_hour_has_a_line_for_every_nozzle(first_hour):
     from fulmar_core.robot import load_robot
     from hardware_drivers.settings import load_hardware
 
@@ -122,7 +142,7 @@ def test_the_gymnasium_example_runs_and_is_short():
     assert np.shape(names["observations"]) == (1024, len(np.asarray(names["observation"])))
 
 
-def test_the_supervised_start_names_a_program_and_parameters_that_exist():
+def test_the_systemd_unit_has_an_existing_program_and_parameters():
     from hardware_drivers.driver_node import DriverSettings
 
     page = text_of("hardware")

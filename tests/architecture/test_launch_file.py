@@ -70,7 +70,7 @@ def stand_in(monkeypatch, name, **attributes):
 
 @pytest.fixture
 def load(repository, monkeypatch):
-    """Function that loads the launch file anew."""
+    """Function that loads the launch file."""
     monkeypatch.setattr("fulmar_bringup.launch_check.refuse_living_plants", CHECKED.append)
     for name, attributes in STAND_INS.items():
         stand_in(monkeypatch, name, **attributes)
@@ -87,7 +87,7 @@ def load(repository, monkeypatch):
 
 @pytest.fixture
 def launch_with(load, monkeypatch):
-    """Function that launches given rows with given arguments: (what was asked, nodes built)."""
+    """Function that launches rows with arguments: (requested system, started nodes)."""
 
     def launch(*rows, **arguments):
         asked = {}
@@ -104,7 +104,7 @@ def launch_with(load, monkeypatch):
 
 
 def start(launch_file, arguments):
-    """Nodes that `ros2 launch` would start: the opaque function is called with what was given."""
+    """Nodes that `ros2 launch` would start with these arguments."""
     entities = launch_file.generate_launch_description().args[0]
     context = {
         e.args[0]: e.kwargs["default_value"] for e in entities if type(e).__name__ == "DeclareLaunchArgument"
@@ -114,12 +114,12 @@ def start(launch_file, arguments):
     return opaque.kwargs["function"](context | arguments)
 
 
-def test_arguments_that_are_not_given_mean_none(launch_with):
+def test_missing_arguments_are_none(launch_with):
     asked, _ = launch_with(Row())
     assert asked == dict.fromkeys(ARGUMENTS)
 
 
-def test_arguments_that_are_given_reach_the_node_table(launch_with):
+def test_arguments_reach_the_node_table(launch_with):
     given = {name: f"some_{name}" for name in ARGUMENTS}
     asked, _ = launch_with(Row(), **given)
     assert asked == given
@@ -130,14 +130,14 @@ def test_every_row_of_the_table_becomes_one_node(launch_with):
     _, nodes = launch_with(*rows)
     assert [type(node).__name__ for node in nodes] == ["Node", "Node"]
     for row, node in zip(rows, nodes, strict=True):
-        told = node.kwargs
-        assert (told["package"], told["executable"]) == (row.package, row.executable)
-        assert (told["name"], told["namespace"]) == (row.name, row.namespace)
-        assert told["parameters"] == [row.parameters]
-        assert told["output"] == "screen"
+        given = node.kwargs
+        assert (given["package"], given["executable"]) == (row.package, row.executable)
+        assert (given["name"], given["namespace"]) == (row.name, row.namespace)
+        assert given["parameters"] == [row.parameters]
+        assert given["output"] == "screen"
 
 
-def test_before_anything_starts_a_living_plant_of_the_same_name_is_looked_for(launch_with):
+def test_a_running_plant_of_the_same_name_is_searched_for_before_the_start(launch_with):
     CHECKED.clear()
     launch_with(Row())
     assert [(Row(),)] == CHECKED

@@ -1,4 +1,4 @@
-"""The locks: exact, hashed, free of addresses, and in agreement with pyproject.toml and each other."""
+"""Lock files: exact, hashed, without addresses, consistent with pyproject.toml and each other."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def locks(repository):
 
 
 def wanted(project, extras, groups):
-    """Requirements that pyproject.toml writes down for some extras and groups."""
+    """Requirements of some extras and groups in pyproject.toml."""
     texts = [*project["project"]["dependencies"]]
     for extra in extras:
         texts += project["project"]["optional-dependencies"][extra]
@@ -65,7 +65,7 @@ def wanted(project, extras, groups):
 
 
 @pytest.mark.parametrize("name", LOCKS)
-def test_a_lock_names_no_address_and_no_path(locks, name):
+def test_a_lock_has_no_address_and_no_path(locks, name):
     for forbidden in (
         r"://",
         r"\bwww\.",
@@ -89,8 +89,8 @@ def test_every_pin_is_exact_and_hashed(locks, name):
 
 
 @pytest.mark.parametrize(("name", "extras", "groups"), INSTALLED)
-def test_a_pin_names_every_extra_that_is_wanted_of_it(project, locks, name, extras, groups):
-    """Where one is left out, pip before 23.3 takes the newest version for it, and then has no hash."""
+def test_a_pin_has_every_required_extra(project, locks, name, extras, groups):
+    """Without it, pip before 23.3 selects the newest version of the extra, and then lacks its hash."""
     pinned = {canonicalize_name(requirement.name): requirement for requirement, _ in entries(locks[name])}
     all_wanted = wanted(project, extras, groups) + [
         one for requirement in pinned.values() for one in wanted_by(requirement)
@@ -102,7 +102,7 @@ def test_a_pin_names_every_extra_that_is_wanted_of_it(project, locks, name, extr
 
 
 def wanted_by(requirement):
-    """What an installed package needs here with the extras that are pinned; nothing of one that is not installed."""
+    """Requirements of an installed package with its pinned extras; empty if it is not installed."""
     try:
         texts = requires(requirement.name) or []
     except PackageNotFoundError:
@@ -126,11 +126,11 @@ def test_the_pins_satisfy_pyproject(project, locks, name, extras, groups, python
         )
 
 
-def test_the_locks_know_every_extra(project):
+def test_the_locks_have_every_extra(project):
     assert set(project["project"]["optional-dependencies"]) == {*RUN_EXTRAS, *DEV_EXTRAS}
 
 
-def test_the_run_time_lock_can_build_the_editable_install(project, locks):
+def test_the_run_time_lock_can_build_the_editable_installation(project, locks):
     pinned = versions(locks[RUN_LOCK], "3.11")
     for text in project["build-system"]["requires"]:
         requirement = Requirement(text)
@@ -145,7 +145,7 @@ def test_running_needs_no_learning_library(locks, python):
 
 
 @pytest.mark.parametrize("python", PYTHONS)
-def test_the_development_lock_holds_the_run_time_lock(locks, python):
+def test_the_development_lock_contains_the_run_time_lock(locks, python):
     # One .venv serves both: `make setup` must never move what `make dev` installed.
     run, dev = versions(locks[RUN_LOCK], python), versions(locks[DEV_LOCK], python)
     assert {name: dev.get(name) for name in run} == run

@@ -1,4 +1,4 @@
-"""The Makefile: it explains itself, installs once, and refuses an interpreter that is too old."""
+"""The Makefile: help, one installation per lock, rejection of an old interpreter."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TARGETS = {
     "clean",
 }
 
-# Stands for Python: notes what it is asked, and makes a .venv that holds a copy of itself.
+# Replaces Python: logs its arguments, and makes a .venv with a copy of itself.
 INTERPRETER = """#!/usr/bin/env bash
 echo "$*" >> calls.log
 case "$*" in
@@ -41,7 +41,7 @@ esac
 
 @pytest.fixture
 def make(repository, tmp_path):
-    """Function that runs make in an empty copy: only what setting up reads, and no real Python."""
+    """Function that runs make in a folder with the set-up files only, without a real Python."""
     for name in ("Makefile", "pyproject.toml", "requirements.lock", "requirements-dev.lock"):
         shutil.copy(repository / name, tmp_path)
     environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
@@ -65,7 +65,7 @@ def make(repository, tmp_path):
 
 
 def installs(tmp_path):
-    """How often pip was asked to install a lock."""
+    """Lock files that pip was called to install."""
     return re.findall(r"-r (\S+)", (tmp_path / "calls.log").read_text())
 
 
@@ -87,7 +87,7 @@ def test_setup_installs_the_run_time_lock_once(make, tmp_path):
     assert "--require-hashes" in (tmp_path / "calls.log").read_text()
 
 
-def test_setup_installs_again_when_the_lock_changed(make, tmp_path):
+def test_setup_installs_again_after_the_lock_changed(make, tmp_path):
     make("setup")
     with (tmp_path / "requirements.lock").open("a") as lock:
         lock.write("# another version\n")
@@ -95,13 +95,13 @@ def test_setup_installs_again_when_the_lock_changed(make, tmp_path):
     assert installs(tmp_path) == ["requirements.lock", "requirements.lock"]
 
 
-def test_a_development_setup_serves_as_run_time_setup(make, tmp_path):
+def test_a_development_setup_includes_the_run_time_setup(make, tmp_path):
     assert make("dev").returncode == 0
     assert make("setup").returncode == 0
     assert installs(tmp_path) == ["requirements-dev.lock"]
 
 
-def test_a_failed_install_is_not_taken_for_done(make, tmp_path):
+def test_a_failed_installation_is_repeated(make, tmp_path):
     make("setup")
     (tmp_path / "requirements.lock").write_text("# changed\n")
     (tmp_path / ".venv/bin/python").write_text("#!/usr/bin/env bash\nexit 1\n")
@@ -111,7 +111,7 @@ def test_a_failed_install_is_not_taken_for_done(make, tmp_path):
 
 @pytest.mark.parametrize(("target", "size"), [("setup", 884), ("dev", 7053)])
 @pytest.mark.parametrize("free", [100, 90_000])
-def test_size_and_free_disk_are_printed_before_an_install(make, tmp_path, target, size, free):
+def test_size_and_free_disk_are_printed_before_an_installation(make, tmp_path, target, size, free):
     disk = tmp_path / "bin" / "df"
     disk.parent.mkdir()
     disk.write_text(f"#!/usr/bin/env bash\necho Avail; echo ' {free}M'\n")
@@ -147,6 +147,6 @@ def test_an_old_interpreter_gets_one_clear_line(make, tmp_path):
     assert not (tmp_path / ".venv").exists()
 
 
-def test_the_makefile_names_no_place_of_a_machine(repository):
+def test_the_makefile_has_no_absolute_path(repository):
     text = (repository / "Makefile").read_text()
     assert re.search(r"(?<![\w.)}/])/(home|usr|opt|root|tmp|work|var)\b", text) is None

@@ -53,12 +53,12 @@ def terms(page):
     return dict(named)
 
 
-def test_every_term_of_every_task_has_its_row_and_no_row_is_left_over(terms):
+def test_the_table_has_exactly_the_terms_of_all_tasks(terms):
     assert set(terms) == {name for task in TASKS for name in load_task(task).observation_names}
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_values_stay_in_the_range_that_the_table_states(terms, task):
+def test_values_stay_in_the_stated_range(terms, task):
     robot, rounding = load_robot("leatherback"), 1e-5
     worlds = BatchSimulation(robot, load_task(task), load_scenario("randomised"), worlds=64, seed=1)
     seen = []
@@ -72,8 +72,8 @@ def test_values_stay_in_the_range_that_the_table_states(terms, task):
         assert (column <= high + rounding).all(), name
 
 
-def seen_from_one_side(task, side):
-    """Terms of a robot at the origin that looks along x; everything is ahead and to one side (1 left, -1 right)."""
+def terms_on_one_side(task, side):
+    """Terms of a robot at the origin with heading 0; everything is ahead and to one side (1 left, -1 right)."""
     state = PlanarState(*(np.array([value]) for value in (0.0, 0.0, 0.0, 0.2, 0.1 * side, 0.3 * side)))
     ahead = [[[3.0, 2.0 * side, 0.5 * side], [4.0, 3.0 * side, 0.6 * side], [5.0, 4.0 * side, 0.7 * side]]]
     discs = np.array([[[1.0, 3.0 * side, 0.2], [0.5, 4.0 * side, 0.2], [2.0, 5.0 * side, 0.2]]])
@@ -86,15 +86,15 @@ def seen_from_one_side(task, side):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_signs_are_those_that_the_table_states(terms, task):
-    left, right = (seen_from_one_side(load_task(task), side) for side in (1.0, -1.0))
+def test_signs_are_the_stated_ones(terms, task):
+    left, right = (terms_on_one_side(load_task(task), side) for side in (1.0, -1.0))
     for name, value in left.items():
         assert value > 0.0, name
         sideways = re.search("left|counter-clockwise", terms[name][2])
         assert right[name] == pytest.approx(-value if sideways else value), name
 
 
-def test_the_table_of_tasks_has_each_task_s_terms_and_scales(page):
+def test_the_table_of_tasks_has_terms_and_scales_of_each_task(page):
     written = {row[0].strip("`"): row[1:] for row in rows(page, "Scales of each task")}
     expected = {}
     for name in TASKS:
@@ -106,14 +106,14 @@ def test_the_table_of_tasks_has_each_task_s_terms_and_scales(page):
     assert written == expected
 
 
-def test_a_scale_that_is_a_key_is_one_that_every_task_with_the_term_has(terms):
+def test_a_key_as_scale_exists_in_every_task_with_the_term(terms):
     for task in map(load_task, TASKS):
         for name in task.observation_names:
             key = terms[name][6].strip("`")
             assert key not in UNITS or getattr(task, key) > 0.0, (task.name, name)
 
 
-def test_the_robots_with_terms_of_their_own_are_named(page):
+def test_robots_with_terms_of_their_own_are_listed(page):
     table = {row[0]: row for row in rows(page, "Terms of the robot")}
     task = load_task("go_to_position")
     with_memory = {

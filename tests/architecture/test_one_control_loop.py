@@ -1,4 +1,4 @@
-"""The step from measurement to command is written once: nodes, re-runs and evaluations ask a loop for it."""
+"""Nodes, re-runs and evaluations call the one control loop, and no controller or task themselves."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def receiver(call):
 
 
 def own_steps(tree):
-    """Calls that ask a controller or a task itself, or observe, past a loop."""
+    """Calls of a controller, a task or an observer outside of a loop."""
     named = {
         id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute) and node.attr == "names"
     }
@@ -47,7 +47,7 @@ def own_steps(tree):
     return found
 
 
-def test_no_other_file_asks_a_controller_or_observes_by_itself(repository):
+def test_no_other_file_calls_a_controller_or_an_observer(repository):
     found, seen = {}, set()
     for package in PACKAGES:
         for path in sorted((repository / package).rglob("*.py")):
@@ -71,5 +71,5 @@ def test_no_other_file_asks_a_controller_or_observes_by_itself(repository):
         ("names = Observer(robot, task).names", 0),
     ],
 )
-def test_a_step_of_its_own_is_found(code, count):
+def test_a_call_outside_of_a_loop_is_found(code, count):
     assert len(own_steps(ast.parse(code))) == count

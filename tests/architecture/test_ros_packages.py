@@ -1,6 +1,6 @@
-"""The paperwork of the ROS workspace: manifests, symlinks, versions, programs.
+"""ROS packages: manifests, symlinks, versions, programs.
 
-A manifest with any mistake turns its package silently into plain Python, and the build order is lost.
+colcon silently treats a package with a faulty manifest as plain Python, without build order.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def packages(repository):
 
 @pytest.fixture(scope="module")
 def imports(repository):
-    """Import graph of all packages, with what they import from outside."""
+    """Import graph of all packages and their external imports."""
     return grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
 
 
@@ -56,7 +56,7 @@ def programs(folder):
     return re.findall(r'"(\w+) = ([\w.]+):main"', (folder / "setup.py").read_text())
 
 
-def test_the_workspace_holds_exactly_these_packages(packages):
+def test_the_workspace_has_exactly_these_packages(packages):
     assert sorted(path.parent.name for path in packages.glob("*/package.xml")) == PACKAGES
 
 
@@ -92,7 +92,7 @@ def test_every_package_declares_what_it_imports(packages, imports, name):
 
 
 @pytest.mark.parametrize("name", PACKAGES)
-def test_setup_cfg_puts_programs_where_ros2_looks(packages, name):
+def test_setup_cfg_installs_programs_where_ros2_searches(packages, name):
     parser = configparser.ConfigParser(interpolation=None)
     parser.read(packages / name / "setup.cfg")
     assert parser["develop"]["script_dir"] == f"$base/lib/{name}"
@@ -102,7 +102,7 @@ def test_setup_cfg_puts_programs_where_ros2_looks(packages, name):
 
 
 @pytest.mark.parametrize("name", PACKAGES)
-def test_every_package_has_its_marker_for_the_index(packages, name):
+def test_every_package_has_its_index_marker(packages, name):
     assert (packages / name / "resource" / name).is_file()
 
 
@@ -123,7 +123,7 @@ def test_every_program_leads_to_a_main_function(packages, name):
         assert "main" in names, f"{module} has no main()"
 
 
-def test_the_programs_are_those_that_systems_start(packages):
+def test_programs_are_those_that_systems_start(packages):
     found = {(name, program) for name in PACKAGES for program, _ in programs(packages / name)}
     assert found == {
         ("fulmar_cli", "fulmar"),
@@ -140,7 +140,7 @@ def test_the_programs_are_those_that_systems_start(packages):
     }
 
 
-def test_every_symlink_is_relative_and_leads_somewhere(repository, packages):
+def test_every_symlink_is_relative_and_has_a_target(repository, packages):
     links = [path for path in packages.glob("*/*") if path.is_symlink()]
     assert {link.relative_to(packages).as_posix() for link in links} == {
         "fulmar_core/configs",

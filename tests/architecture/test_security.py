@@ -1,4 +1,4 @@
-"""What runs on a robot opens nothing that can run code, and is found by nobody who was not meant to find it."""
+"""Modules that run on a robot open no file that can run code; nodes are discovered on their own host only."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def sources(repository):
     return [path for folder in ON_THE_ROBOT for path in sorted((repository / folder).rglob("*.py"))]
 
 
-def test_no_module_on_the_robot_s_path_imports_anything_that_unpickles(repository):
+def test_no_module_of_the_robot_imports_what_can_unpickle(repository):
     found = []
     for path in sources(repository):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -53,7 +53,7 @@ def test_no_module_on_the_robot_s_path_imports_anything_that_unpickles(repositor
     assert found == []
 
 
-def test_no_module_on_the_robot_s_path_evaluates_text_or_reads_yaml_that_makes_objects(repository):
+def test_no_module_of_the_robot_evaluates_text_or_reads_unsafe_yaml(repository):
     found = []
     for path in sources(repository):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -70,7 +70,7 @@ def test_no_module_on_the_robot_s_path_evaluates_text_or_reads_yaml_that_makes_o
 
 
 class Bomb:
-    """What runs when it is unpickled leaves a file."""
+    """Leaves a file when it is unpickled."""
 
     def __init__(self, path):
         self.path = path
@@ -80,7 +80,7 @@ class Bomb:
 
 
 @pytest.mark.parametrize("place", ["golden as pickle", "array of objects", "network", "passport"])
-def test_a_pickle_planted_in_a_bundle_is_refused_and_never_run(place, tmp_path):
+def test_a_pickle_in_a_bundle_is_rejected_and_never_run(place, tmp_path):
     folder, trap = shutil.copytree(SHIPPED, tmp_path / "bundle"), tmp_path / "trap"
     poison = pickle.dumps(Bomb(trap))
     passport = read_passport(folder)
@@ -119,7 +119,7 @@ def test_a_pickle_planted_in_a_bundle_is_refused_and_never_run(place, tmp_path):
         "name: !!python/name:os.mkdir",
     ],
 )
-def test_yaml_that_asks_for_an_object_is_refused_with_its_line_and_makes_none(text, tmp_path):
+def test_yaml_with_an_object_is_rejected_with_its_line(text, tmp_path):
     trap = tmp_path / "trap"
     (tmp_path / "robot.yaml").write_text(text.format(trap=trap))
     with pytest.raises(ConfigError, match=r"robot\.yaml:1"):
@@ -127,14 +127,14 @@ def test_yaml_that_asks_for_an_object_is_refused_with_its_line_and_makes_none(te
     assert not trap.exists()
 
 
-def test_children_are_found_on_this_host_alone_unless_the_environment_asks_otherwise(monkeypatch):
+def test_child_processes_are_discovered_on_this_host_only_unless_the_environment_differs(monkeypatch):
     monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
     assert child_environment()["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
     assert child_environment()["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
 
 
-def test_a_node_that_is_started_by_hand_stays_on_this_host_too():
+def test_a_node_that_is_started_by_hand_is_discovered_on_this_host_only():
     code = (
         "import os; from fulmar_ros.middleware import set_up_middleware; set_up_middleware();"
         "print(os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'])"
@@ -149,14 +149,14 @@ def policy_file(repository):
     return ElementTree.parse(repository / "configs/security/policy.xml").getroot()
 
 
-def test_the_policy_file_for_enclaves_names_every_wire_and_no_other_topic(policy_file):
+def test_the_policy_file_for_enclaves_has_exactly_the_topics_of_the_table(policy_file):
     named = {element.text.strip() for element in policy_file.iter("topic")}
     own = {wire.name.lstrip("/") for wire in WIRES}
     assert own <= {name.strip("/") for name in named}
     assert {name.strip("/") for name in named} - own <= {"parameter_events", "rosout"}
 
 
-def test_nobody_but_the_plant_may_say_what_was_applied_and_nobody_but_operators_may_stop_or_swap(policy_file):
+def test_only_the_plant_publishes_applied_commands_and_only_operators_stop_or_swap(policy_file):
     publishers: dict[str, set[str]] = {}
     for enclave in policy_file.iter("enclave"):
         for topics in enclave.iter("topics"):
@@ -170,7 +170,7 @@ def test_nobody_but_the_plant_may_say_what_was_applied_and_nobody_but_operators_
     assert publishers["teleop/command"] == {"/fulmar/teleop"}
 
 
-def test_a_bundle_that_is_written_anew_loses_the_signature_of_the_old_one(tmp_path):
+def test_a_rewritten_bundle_loses_its_old_signature(tmp_path):
     from fulmar_core.policy_bundle import SIGNATURE, read_golden
 
     folder = shutil.copytree(SHIPPED, tmp_path / "bundle")

@@ -93,8 +93,8 @@ class Stopwatch:
 
 def serve(arguments: argparse.Namespace) -> None:
     """Start a plant, run the controller node in this process for some steps, and print the figures."""
-    from fulmar_bringup.node_table import RunPlan
     from fulmar_bringup.processes import command_line
+    from fulmar_bringup.run_plan import RunPlan
     from fulmar_bringup.system_rows import system_rows
     from fulmar_core.goal import goal_at
     from fulmar_core.robot import load_robot

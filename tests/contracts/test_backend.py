@@ -70,7 +70,7 @@ def test_it_speaks_for_its_robot(backend):
     assert backend.robot is ROBOTS[backend.robot.name]
 
 
-def test_a_reset_begins_where_it_was_told(backend):
+def test_a_reset_begins_at_the_given_state(backend):
     episode = episode_of(backend.robot)
     truth, start = backend.reset(episode, seed=1).truth, rigid_of(episode.start)
     for name in ("position_in_world", "quat_xyzw", "velocity_in_world", "angular_velocity_in_body"):
@@ -132,7 +132,7 @@ def test_a_kept_sample_does_not_change_with_later_steps(backend):
     np.testing.assert_array_equal(kept.odometry.position_in_world, before[1])
 
 
-def test_it_moves_when_it_is_told_to(backend):
+def test_it_moves_by_commands(backend):
     robot = backend.robot
     command = command_of(robot)
     if robot.actuators.kind == "thrusters":

@@ -194,9 +194,9 @@ def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
     lacking = [(r, t) for r in ROBOTS.values() for t in TASKS.values() if not has_one(name, r, t)]
     assert lacking
     for robot, task in lacking:
-        with pytest.raises(ConfigError, match="Use --controller") as told:
+        with pytest.raises(ConfigError, match="Use --controller") as raised:
             load_controller(name, robot, task, Choice(robot.timing.control_hz))
-        words = str(told.value)
+        words = str(raised.value)
         assert f"'{robot.name}'" in words
         assert "is for robots with thrusters" in words or "there is one for: go_to_" in words
 

@@ -85,7 +85,7 @@ def test_its_worlds_are_finite_and_their_bodies_can_exist(name):
 
 
 @EACH
-def test_an_episode_of_it_is_judged_by_every_figure_of_the_benchmark(name):
+def test_an_episode_of_it_has_every_figure_of_the_benchmark(name):
     task = replace(TASK, episode_s=4.0)
     run = roll_out_in_batch(OneByOne(), PLATFORM, task, SCENARIOS[name], episodes=3, seed=0)
     figures = episode_metrics(run, task)

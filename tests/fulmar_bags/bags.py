@@ -8,8 +8,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
+from fulmar_bags.mcap_records import bag_files
 from fulmar_bags.message_types import type_store
-from fulmar_bags.records import bag_files
 
 TOPIC, TYPE = "/robot/word", "std_msgs/msg/String"
 INFO = {"robot": "floating_platform", "goal": [0.0, 1.0, 90.0]}

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_bags.comparison import differing
 from fulmar_bags.contents import Topic, open_bag
-from fulmar_bags.control_steps import course_of
+from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.decode import messages
-from fulmar_bags.difference import differing
 from fulmar_bags.message_types import type_store
-from fulmar_bags.run_reader import read_any_run, read_run
+from fulmar_bags.run_record import read_any_run, read_run
 from fulmar_bags.writer import BagWriter
 from fulmar_core.topics import DIAGNOSTICS, ODOMETRY, STATUS
 from tests.fulmar_cli.bag_commands import LQR, answer, ask
@@ -56,7 +56,7 @@ def test_a_bag_without_a_name_is_of_a_robot_that_is_called_as_its_type():
 def test_topics_and_frames_are_found_by_the_name(alpha: Path):
     bag, plain = open_bag(alpha), open_bag(LQR)
     assert (bag.robot, bag.name, bag.odometry().name) == (ROBOT, "alpha", "/alpha/odom")
-    course, usual = course_of(bag), course_of(plain)
+    course, usual = control_steps_of(bag), control_steps_of(plain)
     assert course.odometry.frame[0] == "odom"
     assert len(course.goals) == len(usual.goals) > 0
     record = read_run(alpha)

@@ -57,8 +57,8 @@ def test_each_goal_has_its_bag_and_every_message_is_in_one(recording):
     first, second = recording.words()
     assert sorted(first) == sorted(["wall", "a", "first", "b", "first", "second"])
     assert sorted(second) == sorted(["wall", "second", "c"])
-    assert (recording.bag.messages, recording.bag.messages_on_disk) == (7, 7)
-    assert (recording.bag.files, recording.bag.waiting) == (2, 0)
+    assert (recording.bag.counts.messages, recording.bag.counts.on_disk) == (7, 7)
+    assert (recording.bag.counts.files, recording.bag.waiting) == (2, 0)
 
 
 def test_a_disk_that_takes_no_new_bag_loses_nothing(recording):
@@ -69,7 +69,7 @@ def test_a_disk_that_takes_no_new_bag_loses_nothing(recording):
     recording.refuses = False
     recording.take("a", "b")
     assert recording.words() == [["first", "second", "a"], ["second", "b"]]
-    assert recording.bag.messages == recording.bag.messages_on_disk == 4
+    assert recording.bag.counts.messages == recording.bag.counts.on_disk == 4
 
 
 def test_what_is_attached_late_is_in_every_bag_that_follows(recording):

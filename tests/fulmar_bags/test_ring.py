@@ -11,7 +11,7 @@ import pytest
 import yaml
 from rosbags.rosbag2 import Reader
 
-from fulmar_bags.records import bag_files
+from fulmar_bags.mcap_records import bag_files
 from fulmar_bags.ring import BagRing
 from fulmar_bags.writer import BagWriter
 from fulmar_bags.writer_thread import BagThread
@@ -62,7 +62,7 @@ def test_without_a_fault_nothing_reaches_the_disk(ring, folder):
     hear(ring, range(100))
     ring.close()
     assert not folder.exists()
-    assert ring.messages == 0
+    assert ring.counts.messages == 0
     assert ring.kept_s == 3.0
 
 
@@ -165,7 +165,7 @@ def test_a_fault_on_a_full_disk_is_written_as_soon_as_there_is_room(ring, folder
     hear(ring, [10], text="fault")
     hear(ring, range(11, 13))
     assert list(folder.iterdir()) == []
-    assert (ring.messages, ring.messages_on_disk) == (6, 0)
+    assert (ring.counts.messages, ring.counts.on_disk) == (6, 0)
     full_disk()
     hear(ring, range(13, 20))
     hear(ring, [20], text="fault")

@@ -12,8 +12,8 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from fulmar_bags.contents import open_bag
-from fulmar_bags.part import BagPart
-from fulmar_bags.records import bag_files
+from fulmar_bags.mcap_file import BagPart
+from fulmar_bags.mcap_records import bag_files
 from fulmar_bags.recovery import recover
 from fulmar_bags.writer import BagWriter
 from tests.fulmar_bags.bags import INFO, START_NS, TOPIC, TYPE, word, words_by_mcap, words_by_rosbags

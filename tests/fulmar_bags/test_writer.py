@@ -201,7 +201,7 @@ def test_a_full_disk_keeps_what_it_took_and_takes_the_rest_later(tmp_path, small
         bag.write(TOPIC, noise(number), log_ns=START_NS)
     with pytest.raises(OSError, match="too large"):
         bag.flush()
-    assert bag.messages_on_disk == 1
+    assert bag.counts.on_disk == 1
     assert_readable(tmp_path / "bag", 1)
     small_disk()
     bag.close()
@@ -239,7 +239,7 @@ def test_recovery_rewrites_a_torn_bag_and_keeps_the_torn_file(tmp_path):
     bag = open_bag(folder, attachments={"a": b"b"})
     write_words(bag, 0, 100)
     bag.flush()
-    whole = bag.size
+    whole = bag.counts.size
     write_words(bag, 100, 100)
     bag.flush()
     torn = file_of(folder).read_bytes()[: whole + 100]

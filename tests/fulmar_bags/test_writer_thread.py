@@ -34,7 +34,7 @@ class Disk:
         return self._bag.waiting + (self._unwritten() if self.full else 0)
 
     def _unwritten(self) -> int:
-        return self._bag.messages - self._bag.messages_on_disk
+        return self._bag.counts.messages - self._bag.counts.on_disk
 
     def tick(self, now: float) -> None:
         if not self.moves.is_set():

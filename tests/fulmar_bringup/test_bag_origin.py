@@ -10,7 +10,8 @@ import pytest
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import RunPlan, recorder_spec
+from fulmar_bringup.node_table import recorder_spec
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, System
 from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
 from fulmar_core.config import load_config

@@ -17,9 +17,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from fulmar_bringup.commissioning.commission import WIRINGS, is_right, rewired
-from fulmar_bringup.commissioning.hardware_file import line_of, with_line, write_line
+from fulmar_bringup.commissioning.hardware_file import command_of, line_of, wires_of, with_line, write_line
 from fulmar_bringup.commissioning.session import Session
-from fulmar_bringup.commissioning.wires import command_of, wires_of
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot

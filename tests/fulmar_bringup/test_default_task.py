@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.default_task import check_heading, default_task
+from fulmar_bringup.goal_plan import check_heading, default_task
 from fulmar_cli.commands.arguments import read_goal
 from fulmar_core.errors import ConfigError
 

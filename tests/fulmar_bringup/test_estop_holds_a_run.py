@@ -9,10 +9,9 @@ from typing import Any
 
 import pytest
 
-from fulmar_bags.run_reader import read_run
-from fulmar_bags.run_record import HealthSample
+from fulmar_bags.run_record import HealthSample, read_run
 from fulmar_bringup import run_executor
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import RunFailed
@@ -29,7 +28,7 @@ class Overseer:
     def __init__(self, *plants: Report) -> None:
         self._rest = list(plants)
         self.plant = self._rest.pop(0)
-        self.controller = Report(heard=time.monotonic())
+        self.controller = Report(received_s=time.monotonic())
 
     def wait_until(self, condition: Any, alive: Any) -> None:
         while not condition():

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fulmar_bringup.goal_plan import default_task, is_endless, shown_path, start_of
+from fulmar_bringup.goal_plan import is_endless, shown_path, start_of, task_of_goals
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.node_table import controller_spec, run_goals_spec
 from fulmar_bringup.planning import plan_run
@@ -19,7 +19,7 @@ from fulmar_core.goal_files import load_goals
 def plan(tmp_path):
     def make(goals, **changes):
         request = {
-            "robot": "floating_platform", "task": default_task(goals), "controller": "classical",
+            "robot": "floating_platform", "task": task_of_goals(goals), "controller": "classical",
             "backend": "mujoco", "policy": None, "goal": None, "start": None, "duration_s": None,
             "lockstep": True, "rate": 1.0, "control_hz": None, "scenario": "nominal", "seed": 0,
             "record": tmp_path / "bag", "command": "fulmar run",
@@ -56,7 +56,7 @@ ROUND = (
     ],
 )
 def test_every_kind_of_goals_has_a_task(goals, task):
-    assert default_task(goals) == task
+    assert task_of_goals(goals) == task
 
 
 def test_a_path_is_begun_at_its_beginning_and_lasts_as_long_as_it_takes(plan):

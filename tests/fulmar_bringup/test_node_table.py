@@ -9,7 +9,8 @@ from importlib.util import find_spec
 import pytest
 
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import NodeSpec, RunPlan, controller_spec, plant_spec, recorder_spec
+from fulmar_bringup.node_table import controller_spec, plant_spec, recorder_spec
+from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import Guards, default_control_hz, default_guards, load_system
 from fulmar_bringup.system_rows import check_rows, system_rows
 from fulmar_core.errors import ConfigError, UnknownNameError

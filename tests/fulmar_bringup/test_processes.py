@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from fulmar_bringup import processes
-from fulmar_bringup.node_table import NodeSpec
 from fulmar_bringup.processes import Ended, ProcessGroup, child_environment, command_line
+from fulmar_bringup.run_plan import NodeSpec
 
 
 def spec(**parameters) -> NodeSpec:

@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.run_executor import _wait_for_end
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_core.errors import RunFailed
 from fulmar_core.safety.watchdog import NO_COMMAND
@@ -24,7 +24,7 @@ class Overseer:
     def __init__(self, mode: str, *reports: tuple[str, str]) -> None:
         self._reports = reports
         self.plant = Report()
-        self.controller = Report(values={"mode": mode}, heard=time.monotonic())
+        self.controller = Report(values={"mode": mode}, received_s=time.monotonic())
 
     def wait_until(self, condition, alive) -> None:
         for level, message in self._reports:

@@ -8,10 +8,8 @@ from typing import Any
 
 import pytest
 
-from fulmar_bringup import reset_robots
-from fulmar_bringup import stop_robots as module
-from fulmar_bringup.reset_robots import robots_to_reset
-from fulmar_bringup.stop_robots import stop_robots
+from fulmar_bringup import estop_robots as module
+from fulmar_bringup.estop_robots import robots_to_reset, stop_robots
 
 
 class Seen:
@@ -60,13 +58,13 @@ class Seen:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, seconds in {"STAY_S": 0.3, "MISS_S": 0.6, "ANSWER_S": 0.4}.items():
         monkeypatch.setattr(module, name, seconds)
-    monkeypatch.setattr(reset_robots, "MISS_S", 0.6)
+    monkeypatch.setattr(module, "MISS_S", 0.6)
 
 
 def test_a_robot_is_stopped_when_it_is_seen_and_its_button_is_pressed_when_that_is_seen():
     seen = Seen({"boat": 0.0}, {"boat": 0.2})
     (boat,) = stop_robots(seen, None, find_s=1.0)
-    assert (boat.heard, boat.answer) == (True, (True, "pressed"))
+    assert (boat.reached, boat.answer) == (True, (True, "pressed"))
     assert seen.said["boat"][0] < 0.1
     assert 0.2 <= seen.asked["boat"] < 0.4
 
@@ -74,7 +72,7 @@ def test_a_robot_is_stopped_when_it_is_seen_and_its_button_is_pressed_when_that_
 def test_a_robot_without_a_button_is_held_until_none_can_be_expected():
     seen = Seen({"boat": 0.0}, {})
     (boat,) = stop_robots(seen, None, find_s=1.0)
-    assert (boat.heard, boat.answer) == (True, None)
+    assert (boat.reached, boat.answer) == (True, None)
     assert seen.said["boat"][-1] > 0.5
 
 
@@ -91,7 +89,7 @@ def test_only_the_robot_that_is_named_is_stopped():
 
 def test_a_button_that_does_not_answer_keeps_nobody_waiting_for_ever():
     (boat,) = stop_robots(Seen({"boat": 0.0}, {"boat": 0.0}, answers=False), None, find_s=1.0)
-    assert (boat.heard, boat.answer) == (True, None)
+    assert (boat.reached, boat.answer) == (True, None)
 
 
 def test_where_nobody_is_seen_nobody_is_stopped():

@@ -15,7 +15,7 @@ class Report:
     level: str = "ok"
     message: str = ""
     values: dict[str, str] = field(default_factory=dict)
-    heard: float = 0.0
+    received_s: float = 0.0
 
 
 class System:
@@ -32,7 +32,7 @@ class System:
         """Names of the events when the controller reports some values after a time."""
         self.controller.values |= values
         self._time_s += seconds
-        self.controller.heard = self._time_s
+        self.controller.received_s = self._time_s
         self.events.clear()
         self._look.look(self.plant, self.controller, self._time_s)
         return [name for name, _ in self.events]
@@ -82,7 +82,7 @@ def test_a_fault_begins_and_ends_with_its_node(system):
     system.plant.level, system.plant.message = "error", "no command for 400 ms"
     assert system.after(1.0) == []  # the controller does not act yet
     assert system.after(1.0, mode="active") == []  # what the plant reports is older than that
-    system.plant.heard = 3.0
+    system.plant.received_s = 3.0
     assert system.after(1.0) == ["fault"]
     assert system.events[0][1]["node"] == "plant"
     assert system.after(1.0) == []

@@ -33,7 +33,7 @@ def test_messages_that_a_damaged_file_has_lost_count_as_dropped(tmp_path):
             noise = kind(draw.randbytes(1000).hex())  # chunks much longer than the index behind them
             bag.write("/words", bytes(type_store().serialize_cdr(noise, "std_msgs/msg/String")), log_ns=1)
         bag.flush()
-        sizes.append(bag.size)
+        sizes.append(bag.counts.size)
     bag.close()
     file = file_of(tmp_path / "bag")
     whole = bytearray(file.read_bytes())

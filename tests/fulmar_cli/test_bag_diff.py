@@ -9,9 +9,9 @@ import pytest
 from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.enums import StoragePlugin
 
+from fulmar_bags.comparison import differing
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import messages, stamp_of
-from fulmar_bags.difference import differing
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagWriter
 from fulmar_core.topics import ODOMETRY

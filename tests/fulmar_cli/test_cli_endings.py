@@ -57,7 +57,7 @@ def test_a_reader_that_has_had_enough_gets_no_traceback(words):
 def test_looking_around_loads_neither_ros_nor_torch_nor_a_simulator():
     program = (
         "import sys; sys.argv = ['fulmar', 'list', '--json']\n"
-        "from fulmar_bringup import cli\n"
+        "from fulmar_cli import main as cli\n"
         "try: cli.main()\n"
         "except SystemExit: pass\n"
         "heavy = {'rclpy', 'torch', 'mujoco', 'onnxruntime', 'matplotlib', 'scipy'} & set(sys.modules)\n"

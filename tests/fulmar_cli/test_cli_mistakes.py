@@ -40,7 +40,7 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         (
             ["run", "turtlebot2", "--task", "race_waypoints", "--controller", "classical", "--goal", "1,2,0"],
-            "the targets of task 'race_waypoints' cannot be said in one --goal",
+            "the targets of task 'race_waypoints' do not fit into one --goal",
         ),
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         (
@@ -50,7 +50,7 @@ def broken_configs(tmp_path, monkeypatch):
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
         ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
-        ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device neither waits nor hurries"),
+        ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device runs in real time"),
         (["commission", "turtlebot3"], "Did you mean 'turtlebot2'?"),
         (["commission", "turtlebot2"], "no valves to click: each pulse moves it. Give --yes"),
         (["commission", "zero_g_lab", "--write"], "--write and --out need --yes"),
@@ -253,7 +253,7 @@ def test_a_bundle_for_a_rate_that_the_robot_cannot_keep_is_not_accepted(fulmar, 
 def test_a_part_that_is_not_installed_is_named_with_its_extra(module, extra, words, tmp_path):
     program = (
         f"import sys; sys.modules[{module!r}] = None; sys.argv = {['fulmar', *words]!r}\n"
-        "from fulmar_bringup import cli\n"
+        "from fulmar_cli import main as cli\n"
         "cli.main()\n"
     )
     done = subprocess.run(

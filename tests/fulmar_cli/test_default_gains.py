@@ -7,7 +7,7 @@ import json
 import pytest
 
 from fulmar_bringup.bag_origin import attachments
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import gains_of
 from fulmar_core.controllers.lqr import LqrWeights

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from fulmar_bags.contents import open_bag
-from fulmar_bags.control_steps import course_of
-from fulmar_bags.run_reader import read_run
-from fulmar_bringup import external_ready
+from fulmar_bags.control_steps import control_steps_of
+from fulmar_bags.run_record import read_run
+from fulmar_bringup import readiness
 from fulmar_bringup.bag_origin import attachments
-from fulmar_bringup.external_ready import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import plan_run
+from fulmar_bringup.readiness import command_input, wait_for_publisher, wait_for_reader
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import ConfigError, RunFailed
@@ -126,7 +126,7 @@ class Overseer:
 
 def wait(monkeypatch, *looks: list[Offer], recorded: str = "1") -> None:
     times = iter(range(1000))
-    monkeypatch.setattr(external_ready, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
+    monkeypatch.setattr(readiness, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
     monkeypatch.setenv("ROS_DOMAIN_ID", "7")
     wait_for_publisher(PLAN, Overseer(*looks, recorded=recorded), lambda: None)
 
@@ -161,7 +161,7 @@ def test_without_a_fitting_publisher_a_run_fails_with_one_line(offer, recorded, 
 @pytest.mark.parametrize(("mode", "message"), [("inactive", ""), ("waiting", "waiting: 1 of 2 listen")])
 def test_a_plant_in_lock_step_that_nothing_answers_fails_its_run_in_one_line(mode, message, monkeypatch):
     times = iter(range(1000))
-    monkeypatch.setattr(external_ready, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
+    monkeypatch.setattr(readiness, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
     overseer = Overseer([STAMPED])
     overseer.plant = Report("ok", message, {"mode": mode})
     wait_for_reader(PLAN, overseer, lambda: None)  # by the clock the plant waits for nothing
@@ -216,8 +216,8 @@ def test_a_rerun_refuses_an_external_controller_and_compares_another(external, r
         line = complaint(fulmar("bag", "rerun", external, *words))
         assert "an external controller drove" in line
         assert "--controller classical --from odometry" in line
-    course = course_of(open_bag(external))
-    stamped = course_of(open_bag(reached))
+    course = control_steps_of(open_bag(external))
+    stamped = control_steps_of(open_bag(reached))
     np.testing.assert_array_equal(course.stamp_ns, stamped.stamp_ns[: len(course)])
     np.testing.assert_array_equal(course.commands, stamped.commands[: len(course)])
     code, out, _ = fulmar(

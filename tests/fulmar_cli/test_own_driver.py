@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from fulmar_bringup.commissioning.wires import wires_of
+from fulmar_bringup.commissioning.hardware_file import wires_of
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_core.errors import ConfigError
 from hardware_drivers.settings import load_hardware
@@ -70,7 +70,7 @@ def test_nodes_get_the_file_with_its_whole_path(folder):
 @pytest.mark.parametrize("command", [[*ON_HARDWARE, "--emulate"], ["commission", "own.yaml", "--emulate"]])
 def test_no_emulator_speaks_for_it(folder, fulmar, command):
     (folder / "own_board.py").write_text(BOARD)
-    assert "no emulator speaks for the device of your own driver 'own_board:Board'" in complaint(
+    assert "no emulator exists for the device of your own driver 'own_board:Board'" in complaint(
         fulmar(*command)
     )
 

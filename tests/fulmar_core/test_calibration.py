@@ -14,13 +14,12 @@ from fulmar_core.calibration import (
     calibrated,
     load_calibration,
     save_calibration,
-    use_calibration,
 )
 from fulmar_core.counter_rng import WORLD, Draws
 from fulmar_core.disturbances.scenario import draw_world, load_scenario, longest_delay
 from fulmar_core.errors import ConfigError
 from fulmar_core.motion import may_be_off_centre
-from fulmar_core.robot import load_robot
+from fulmar_core.robot import load_robot, use_calibration
 
 
 def near(value, width=0.01):

@@ -17,7 +17,7 @@ from fulmar_core.mission import Mission
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
-from fulmar_core.safety.fallback import ready
+from fulmar_core.safety.fallback import warm_up
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_recorded_task, load_task
 from sim_nodes.mock_backend import MockBackend
@@ -217,7 +217,7 @@ def test_a_mistake_on_the_way_is_the_task_s_not_the_controller_s(own):
     with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
         loop.step(episode.start, 100_000_000)
     with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
-        ready(Still(), ROBOT, task)
+        warm_up(Still(), ROBOT, task)
 
 
 def test_a_class_that_only_a_bag_names_is_never_imported(own, tmp_path):
@@ -330,7 +330,7 @@ def test_a_name_that_no_thing_can_have_is_refused_with_the_line_of_the_user(own,
 
 
 def test_no_law_no_excitation_and_no_shipped_bundle_knows_it(own):
-    from fulmar_bringup.planning import checked_policy
+    from fulmar_bringup.plan_checks import checked_policy
     from policy_server.controllers import controller_entry
     from policy_server.shipped import shipped_policy
 

@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from fulmar_core.controllers.wrench_choice import (
+    FULL_SHARE,
     HASTE_COST,
     TORQUE_WEIGHT,
-    FULL_SHARE,
     VALVE_COST,
     WrenchChoice,
 )

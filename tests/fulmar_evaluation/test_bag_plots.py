@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import odometries
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_core.topics import ODOMETRY
 from fulmar_evaluation.report.actuator_plot import open_spans
 from fulmar_evaluation.report.bag_plots import _drawings

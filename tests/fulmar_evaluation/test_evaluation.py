@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_evaluation import evaluation
 from fulmar_evaluation.evaluation import Trial, runs_of
 

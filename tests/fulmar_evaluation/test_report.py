@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_bags.writer import BagWriter
 from fulmar_core.errors import ConfigError
 from fulmar_evaluation.report import write_report

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from fulmar_bags.comparison import compare, first_difference, read_tolerances
 from fulmar_bags.contents import open_bag
-from fulmar_bags.control_steps import course_of
+from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.main import app
 from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
@@ -38,7 +38,7 @@ EXACT = dict.fromkeys(FIELDS, 0.0)
 
 
 def answered(bag: Path, controller: str, source: str = "observations", course=None):
-    course = course or course_of(open_bag(bag))
+    course = course or control_steps_of(open_bag(bag))
     folder = shipped_policy(course.robot.name, course.task.name) if controller == "policy" else ""
     hz = course.settings.control_rate(course.robot)
     loaded = load_controller(controller, course.robot, course.task, Choice(hz, str(folder)))
@@ -149,7 +149,7 @@ def test_tolerances_are_told_by_field_and_refused_where_they_make_no_sense():
 
 
 def test_observations_of_another_controller_are_refused_with_the_way_out():
-    course = course_of(open_bag(POLICY))
+    course = control_steps_of(open_bag(POLICY))
     fewer = replace(
         course, observation_names=course.observation_names[:-1], observations=course.observations[:, :-1]
     )
@@ -158,7 +158,7 @@ def test_observations_of_another_controller_are_refused_with_the_way_out():
 
 
 def test_a_controller_forgets_at_a_pause_as_in_the_node():
-    course = course_of(open_bag(POLICY))
+    course = control_steps_of(open_bag(POLICY))
     seen = []
 
     class Forgetful:
@@ -205,6 +205,6 @@ def test_the_node_is_fed_the_odometry_that_was_chosen(monkeypatch):
     bag = replace(bag, topics={**bag.topics, "/other/odom": other})
     monkeypatch.setattr(live_node.ProcessGroup, "start", lambda group, spec: None)
     monkeypatch.setattr(live_node, "_exchange", lambda raw, *_: (raw["odometry"], None))
-    course = course_of(open_bag(POLICY))
+    course = control_steps_of(open_bag(POLICY))
     fed, _ = live_node.rerun_through_node(bag, course, "policy", "", "/other/odom")
     assert fed == other.data

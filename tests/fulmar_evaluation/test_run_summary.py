@@ -8,8 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from fulmar_bags.run_reader import read_run
-from fulmar_bags.run_record import Motion, Places
+from fulmar_bags.run_record import Motion, Places, read_run
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import BagError

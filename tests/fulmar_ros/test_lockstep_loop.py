@@ -9,8 +9,8 @@ import pytest
 
 from fulmar_core.errors import LockstepError
 from fulmar_core.robot import load_robot
-from fulmar_ros.lockstep_loop import LockstepLoop
-from fulmar_ros.simulated_time import SimulatedTime
+from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_loops import LockstepLoop
 
 ROBOT = load_robot("turtlebot2")
 

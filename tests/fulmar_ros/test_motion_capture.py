@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.robot import load_robot
-from fulmar_ros.motion_capture import MotionCapture
-from fulmar_ros.paced_capture import PacedCapture, capture_maker, moved_on
+from fulmar_ros.motion_capture import MotionCapture, PacedCapture, capture_maker, moved_on
 from tests.states import planar_state
 
 MS = 1_000_000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_ros.phase_lock import EARLY_NS, LISTEN, ArrivalPhase
+from fulmar_ros.deadline import LEAD_NS, LISTEN, ArrivalPhase
 
 TICK = 20_000_000
 
@@ -23,10 +23,10 @@ def test_the_anchor_comes_once_after_enough_arrivals():
 
 def test_late_first_arrivals_do_not_shift_the_phase():
     late = [70_000_000, 9_000_000] + [300_000] * (LISTEN - 3) + [0]
-    expected = 5_000 + (LISTEN - 1) * TICK - EARLY_NS
+    expected = 5_000 + (LISTEN - 1) * TICK - LEAD_NS
     assert anchors(late)[-1] == expected
 
 
 def test_stamps_that_run_faster_than_the_clock_have_a_phase_too():
-    expected = 5_000 + (LISTEN - 1) * TICK // 2 - EARLY_NS // 2
+    expected = 5_000 + (LISTEN - 1) * TICK // 2 - LEAD_NS // 2
     assert anchors([0] * LISTEN, rate=2.0)[-1] == expected

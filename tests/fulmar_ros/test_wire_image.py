@@ -13,9 +13,15 @@ from fulmar_bags.message_reader import measurement_of
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import frames_of
 from fulmar_core.state import RigidBodyState
-from fulmar_ros.convert import OdometryWriter, TwistWriter, VectorWriter
+from fulmar_ros.convert import (
+    OdometryReader,
+    OdometryWriter,
+    TwistReader,
+    TwistWriter,
+    VectorReader,
+    VectorWriter,
+)
 from fulmar_ros.wire_image import LATEST_NS, WireImage
-from fulmar_ros.wire_readers import OdometryReader, TwistReader, VectorReader
 
 ROBOT = load_robot("floating_platform")
 NAMES = ROBOT.actuators.names

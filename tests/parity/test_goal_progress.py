@@ -150,7 +150,7 @@ def in_simulators(task, series, monkeypatch):
 
 
 class NoEstop:
-    heard = False
+    received = False
 
     def reason(self, now_ns):
         return ""

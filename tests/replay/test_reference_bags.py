@@ -38,7 +38,7 @@ def test_the_reference_bags_are_small_and_there_is_one_for_each_robot():
         assert file.stat().st_size < LARGEST, file
 
 
-def test_a_changed_observation_is_told_with_its_field_and_step(monkeypatch):
+def test_a_changed_observation_is_reported_with_its_field_and_step(monkeypatch):
     kept = GoToPose.observe
 
     def changed(self, state, goal):
@@ -50,7 +50,7 @@ def test_a_changed_observation_is_told_with_its_field_and_step(monkeypatch):
     assert (first.field, first.name, first.first_step) == ("observation", "goal_x_in_body", 0)
 
 
-def test_a_changed_action_is_told_with_its_field_and_step(monkeypatch):
+def test_a_changed_action_is_reported_with_its_field_and_step(monkeypatch):
     kept = Policy.act
     count = iter(range(10_000))
 
@@ -65,14 +65,14 @@ def test_a_changed_action_is_told_with_its_field_and_step(monkeypatch):
     assert (first.field, first.first_step) == ("action", 17)
 
 
-def test_a_changed_limit_of_commands_is_told(monkeypatch):
+def test_a_changed_limit_of_commands_is_reported(monkeypatch):
     actuators = load_robot("floating_platform").actuators
     monkeypatch.setattr(type(actuators), "limited", lambda self, command: np.zeros_like(command))
     first = first_difference(check_reference(PLATFORM))
     assert first.field == "command"
 
 
-def test_a_changed_safety_decision_is_told_with_its_step(monkeypatch):
+def test_a_changed_safety_decision_is_reported_with_its_step(monkeypatch):
     kept = InputGate.problem
 
     def stricter(self, measurement):
@@ -85,7 +85,7 @@ def test_a_changed_safety_decision_is_told_with_its_step(monkeypatch):
     assert first.first_stamp_s > 5.0
 
 
-def test_a_narrower_geofence_is_told(monkeypatch):
+def test_a_narrower_geofence_is_reported(monkeypatch):
     import fulmar_bags.control_steps as course
 
     def narrow(name):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from std_msgs.msg import Bool
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_core.safety.arbiter import BEARING_OFF
 from fulmar_core.topics import SIMULATION_START_NS
 from tests.conftest import RosDomain

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bags.records import bag_files
+from fulmar_bags.mcap_records import bag_files
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 

@@ -93,6 +93,7 @@ def test_lines_of_the_other_level_are_recognised(ros_domain, tmp_path):
 def test_without_a_confirmation_each_valve_clicks_once_and_nothing_is_identified(
     neighbour: Neighbour, ros_domain, tmp_path
 ):
+    neighbour.withdraw_command()  # a second publisher of commands would stop the driver
     opened: list[tuple[float, ...]] = []
     qos = subscriber_qos(DEVICE_STATE, reliable=True, depth=50)
     neighbour.node.create_subscription(
@@ -111,6 +112,7 @@ def test_without_a_confirmation_each_valve_clicks_once_and_nothing_is_identified
 @pytest.mark.parametrize("ending", ["SIGTERM", "SIGINT", "SIGSTOP", "e-stop"])
 def test_whatever_ends_it_closes_the_valves(neighbour: Neighbour, ros_domain, tmp_path, ending):
     """Our own end, or the e-stop: at once. While it hangs, the driver's watchdog of 0.2 s. No process stays."""
+    neighbour.withdraw_command()  # a second publisher of commands would stop the driver
     device: list[np.ndarray] = []
     qos = subscriber_qos(DEVICE_STATE, reliable=True, depth=50)
     neighbour.node.create_subscription(

@@ -35,7 +35,7 @@ from fulmar_core.topics import (
     SWAP,
     TRUTH,
 )
-from fulmar_ros import control_beat
+from fulmar_ros import deadline
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.qos import subscriber_qos
@@ -344,7 +344,7 @@ def test_a_controller_that_raises_when_it_begins_anew_is_given_up(
 def test_what_a_controller_that_hung_comes_up_with_does_not_follow_the_safe_command(
     neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(control_beat, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(deadline, "PATIENCE_S", 0.2)
     hangs, release, over = threading.Event(), threading.Event(), threading.Event()
 
     def act(self: Lqr, inputs: Inputs) -> np.ndarray:

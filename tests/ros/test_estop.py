@@ -20,9 +20,8 @@ from std_msgs.msg import Bool, Int8
 from std_srvs.srv import Trigger
 
 from fulmar_bringup import robot_operator
-from fulmar_bringup.reset_robots import release_without_node
-from fulmar_bringup.running_robots import running_robots, unfit_publishers
-from fulmar_bringup.stop_robots import Stopped, stop_robots
+from fulmar_bringup.estop_robots import Stopped, release_without_node, stop_robots
+from fulmar_bringup.robot_operator import running_robots, unfit_publishers
 from fulmar_cli.commands.estop import estop
 from fulmar_core.errors import RunFailed
 from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER, TELEOP
@@ -242,9 +241,9 @@ def test_the_command_stops_a_robot_and_resets_it(
 def test_a_robot_that_has_no_e_stop_node_is_stopped_too(
     neighbour: Neighbour, plant: PlantNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fulmar_bringup.stop_robots.MISS_S", 0.5)
+    monkeypatch.setattr("fulmar_bringup.estop_robots.MISS_S", 0.5)
     until(lambda: drive(neighbour))
-    assert stop_robots(neighbour.node, ROBOT, find_s=5.0) == [Stopped(NAMESPACE, heard=True, answer=None)]
+    assert stop_robots(neighbour.node, ROBOT, find_s=5.0) == [Stopped(NAMESPACE, reached=True, answer=None)]
     until(lambda: not drive(neighbour))
     time.sleep(0.6)
     assert not drive(neighbour)
@@ -296,7 +295,7 @@ def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain
 def test_a_publisher_of_another_type_or_quality_of_service_is_a_warning_that_names_it(
     neighbour: Neighbour, plant: PlantNode, ros_domain: RosDomain, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fulmar_ros.wire_watch.LOOK_S", 0.2)
+    monkeypatch.setattr("fulmar_ros.graph.LOOK_S", 0.2)
     context = rclpy.Context()  # of one process: a topic has one type there
     rclpy.init(context=context, domain_id=ros_domain.id)
     panel = rclpy.create_node("panel", namespace="/desk", context=context)

@@ -15,7 +15,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor
 from fulmar_core.backend import Sample
 from fulmar_core.controllers.controller import Controller, Inputs

@@ -30,7 +30,7 @@ def test_an_excited_run_succeeds_without_a_goal_and_its_bag_tells_thrust_and_ine
 def test_a_calibrated_run_says_so_in_its_bag_and_needs_a_file_for_its_own_robot(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
-    from fulmar_bags.run_reader import read_run
+    from fulmar_bags.run_record import read_run
 
     (tmp_path / "c.yaml").write_text("robot: floating_platform\nmass: {value: 6.0, low: 5.9, high: 6.1}\n")
     asked = (

@@ -14,7 +14,7 @@ import psutil
 import pytest
 import yaml
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from tests.conftest import RosDomain
 from tests.ros.cli import (
     child_running,

@@ -246,7 +246,7 @@ def test_estimator_e_stop_and_teleoperation_survive_anything(
             else:
                 teleop._on_joy(message)
         teleop._send()
-        estop._tell()
+        estop._publish()
     for odometry in published:
         twist = odometry.twist.twist
         assert np.isfinite([twist.linear.x, twist.linear.y, twist.angular.z]).all()

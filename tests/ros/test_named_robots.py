@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import messages
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_core.errors import DONE, FAILED
 from fulmar_core.topics import CLOCK, GOAL_POSE, IMU, ODOMETRY, TRUTH
 from fulmar_ros.plant_node import PlantNode
@@ -90,8 +90,8 @@ def test_two_named_robots_of_one_type_reach_their_own_goals_in_one_domain(
         for name in GOALS:
             shutil.rmtree(tmp_path / name)
         outs, errors, lost = run_both(ros_domain.env, tmp_path)
-    assert "no controller of 'gamma' is heard" in lost
-    assert lost.strip().endswith("Robots that are heard: alpha, beta.")
+    assert "no controller of 'gamma' runs" in lost
+    assert lost.strip().endswith("Running robots: alpha, beta.")
     assert "/alpha/plant publishes /clock already: this plant leaves it out" in errors["beta"]
     assert "/clock" not in errors["alpha"]
     for name, goal in GOALS.items():

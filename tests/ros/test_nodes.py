@@ -14,7 +14,6 @@ from rclpy.node import Node
 
 from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import (
-    RunPlan,
     controller_spec,
     emulator_spec,
     goals_spec,
@@ -23,6 +22,7 @@ from fulmar_bringup.node_table import (
     recorder_spec,
     run_goals_spec,
 )
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import ConfigError
@@ -47,7 +47,6 @@ from tests.ros.neighbour import NAMESPACE, Neighbour, until
     ("module", "parameter", "words"),
     [
         ("sim_nodes.sim_node", "robot:='floating_plaform'", "Did you mean 'floating_platform'?"),
-        ("sim_nodes.sim_node", "backend:='mujocco'", "Did you mean 'mujoco'?"),
         ("policy_server.controller_node", "policy:='nowhere'", "policy 'nowhere': the folder does not exist"),
         ("policy_server.controller_node", "control_hz:=10.0", "was trained at 5 Hz, but would run at 10 Hz"),
         ("hardware_drivers.driver_node", "hardware:='zero_g_lap'", "Did you mean 'zero_g_lab'?"),
@@ -59,7 +58,6 @@ from tests.ros.neighbour import NAMESPACE, Neighbour, until
         ),
         ("sim_nodes.emulator_node", "device:='kobuky'", "Did you mean 'kobuki'?"),
         ("policy_server.controller_node", "rate:=-1.0", "must be a finite number, at least 0"),
-        ("policy_server.controller_node", "controller:='lqq'", "Did you mean 'lqr'?"),
     ],
 )
 def test_a_wrong_parameter_ends_a_node_with_one_line_and_exit_code_two(

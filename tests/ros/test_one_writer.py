@@ -16,7 +16,7 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState
 
 from fulmar_bringup.launch_check import refuse_living_plants
-from fulmar_bringup.node_table import NodeSpec
+from fulmar_bringup.run_plan import NodeSpec
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import COMMAND
 from fulmar_ros.plant_node import PlantNode

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_cli.main import app
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode

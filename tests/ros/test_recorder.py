@@ -26,8 +26,7 @@ from std_msgs.msg import String
 
 from fulmar_core.errors import LockstepError
 from fulmar_core.topics import GOAL_POSE, METADATA
-from fulmar_ros.qos import publisher_qos
-from fulmar_ros.subscriber_wait import publish_patiently
+from fulmar_ros.qos import publish_patiently, publisher_qos
 from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 
 pytestmark = pytest.mark.real_time
@@ -125,7 +124,7 @@ def test_in_lock_step_a_paused_recorder_is_waited_for_and_lacks_nothing(record, 
 
 
 def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(record, node, monkeypatch):
-    monkeypatch.setattr("fulmar_ros.subscriber_wait.PATIENCE_S", 0.3)
+    monkeypatch.setattr("fulmar_ros.qos.PATIENCE_S", 0.3)
     recorder = record()
     recorder.wait_until_recording()
     publisher = odometry(node, lockstep=True)

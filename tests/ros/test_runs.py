@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, run_in_real_time
 

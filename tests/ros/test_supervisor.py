@@ -14,7 +14,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from std_msgs.msg import Bool, String
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import goal_at

@@ -125,9 +125,8 @@ def test_without_a_plant_of_the_name_it_lists_the_robots_that_are_heard(
 
     def told() -> bool:
         said.append(capfd.readouterr().err)
-        return (
-            "no plant subscribes /alpha/teleop/command. Robots that are heard: floating_platform."
-            in "".join(said)
+        return "no plant subscribes /alpha/teleop/command. Running robots: floating_platform." in "".join(
+            said
         )
 
     node = TeleopNode(lambda _code: None, cli_args=arguments)

@@ -14,7 +14,7 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from rclpy.duration import Duration
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_bringup.robot_operator import Operator
 from fulmar_core.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.goal import goal_at
@@ -99,7 +99,7 @@ def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_oth
     person = Operator(neighbour.node)
     assert person.say_swap(ROBOT, str(second), find_s=5.0, answer_s=10.0).startswith("done")
     up.wait_for("swapped")
-    assert all(stopped.heard for stopped in person.stop_all(ROBOT))
+    assert all(stopped.reached for stopped in person.stop_all(ROBOT))
     up.wait_for("estop")
     assert all(done for done, _ in person.reset_all(ROBOT).values())
     up.wait_for("reset")

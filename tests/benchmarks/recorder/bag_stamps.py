@@ -10,7 +10,7 @@ from rosbags.highlevel import AnyReader
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
-from fulmar_bags.records import bag_files
+from fulmar_bags.mcap_records import bag_files
 
 
 def stamps_by_topic(bag: Path) -> dict[str, list[int]]:

@@ -21,9 +21,9 @@ import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup, command_line
-from fulmar_bringup.starting import while_starting
+from fulmar_bringup.readiness import while_starting
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.disturbances.scenario import load_scenario

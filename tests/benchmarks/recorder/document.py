@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.provenance import fulmar_version, git_revision
 from tests.benchmarks.recorder.cost import cost_of_recording
 from tests.benchmarks.recorder.kills import killed

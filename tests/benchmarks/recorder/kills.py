@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.recording import Recording
 from fulmar_core.topics import COMMAND, ODOMETRY
 from tests.benchmarks.recorder.bag_stamps import opens, stamps_by_topic

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.planning import plan_run
 from fulmar_core.errors import RunFailed

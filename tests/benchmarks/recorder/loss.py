@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.topics import COMMAND, ODOMETRY
 from tests.benchmarks.recorder.bag_stamps import stamps_by_topic
 from tests.benchmarks.recorder.recorders import recorders

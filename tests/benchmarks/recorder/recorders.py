@@ -12,8 +12,8 @@ from pathlib import Path
 
 import psutil
 
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import child_environment, command_line
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import RunFailed
 

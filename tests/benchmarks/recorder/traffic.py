@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.errors import RunFailed
 from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot, load_robot

@@ -1,4 +1,4 @@
-"""Everything that a bag holds, as far as it can be read: any rosbag2 folder with MCAP or sqlite3, or one such file."""
+"""One bag in memory, as far as it can be read: any rosbag2 folder with MCAP or sqlite3, or one such file."""
 
 from __future__ import annotations
 
@@ -11,12 +11,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
-from fulmar_bags.folder import files_of, missing_files, storage_of, told_beside
-from fulmar_bags.layout import unreadable
-from fulmar_bags.records import PACKED, ZSTD_MAGIC, file_bytes, read_records, unpack
+from fulmar_bags.mcap_records import (
+    PACKED,
+    ZSTD_MAGIC,
+    custom_text,
+    file_bytes,
+    files_of,
+    missing_files,
+    read_records,
+    storage_of,
+    unpack,
+)
+from fulmar_bags.message_types import unreadable
 from fulmar_bags.ring import FAULTS
 from fulmar_bags.writer import RUN_KEY, RUN_RECORD
 from fulmar_bags.writer_thread import RECORDING
@@ -71,7 +79,7 @@ class Bag:
     files: tuple[Path, ...]
     topics: dict[str, Topic]  # by absolute name, sorted
     info: dict[str, Any] | None  # what kind of run this is; None: Fulmar did not record it
-    recording: dict[str, Any]  # what became of the messages, as far as the recorder told it
+    recording: dict[str, Any]  # the recorder's account of the messages
     faults: tuple[Fault, ...]  # that a ring was written for
     attachments: dict[str, bytes]
     warnings: tuple[str, ...]  # what could not be read
@@ -88,12 +96,12 @@ class Bag:
 
     @property
     def name(self) -> str:
-        """What the robot is called, which bags of earlier versions do not say: its type; empty as `robot`."""
+        """Name of the robot; its type in bags of earlier versions, which have no name; empty as `robot`."""
         return str((self.info or {}).get("name") or self.robot)
 
     @property
     def prefix(self) -> str:
-        """How the names of the robot's own topics begin; empty where the bag does not say."""
+        """Prefix of the robot's own topics; empty where the bag does not say."""
         return f"{namespace_of(self.name)}/" if self.name else ""
 
     @property
@@ -103,8 +111,19 @@ class Bag:
         name = self.name or (spaces.pop() if len(spaces) == 1 else "")
         return Frames(f"{name}/") if name else PLAIN
 
+    def number(self, name: str, default: float) -> float:
+        """A number of the run record; `default` where it says nothing, or 0.
+
+        Raises:
+            BagError: It is no number.
+        """
+        try:
+            return float((self.info or {}).get(name) or default)
+        except (TypeError, ValueError) as error:
+            raise BagError(f"the run record of the bag has an invalid {name}: {error}.") from error
+
     def relative(self, topic: str) -> str:
-        """Name of a topic without what all topics of the robot begin with."""
+        """Name of a topic without the robot's prefix."""
         return topic.removeprefix(self.prefix)
 
     def of(self, wire: Wire) -> Topic:
@@ -117,16 +136,13 @@ class Bag:
         return found[0] if found else Topic(name, wire.type)
 
     def topic_name(self, wire: Wire) -> str:
-        """Absolute name of a wire's topic; the wire's own name where it cannot be told."""
+        """Absolute name of a wire's topic; the wire's own name where that is unknown."""
         if wire.name.startswith("/"):
             return wire.name
         if self.prefix:
             return f"{self.prefix}{wire.name}"
-        names = {
-            topic.name
-            for topic in self.topics.values()
-            if is_of_wire(topic.name, wire) and topic.type == wire.type
-        }
+        own = (topic for topic in self.topics.values() if topic.type == wire.type)
+        names = {topic.name for topic in own if is_of_wire(topic.name, wire)}
         return names.pop() if len(names) == 1 else wire.name
 
     def odometry(self, chosen: str | None = None) -> Topic:
@@ -139,12 +155,8 @@ class Bag:
             BagError: There is none, or several to choose from.
             ConfigError: There is no such topic.
         """
-        kind = "nav_msgs/msg/Odometry"
-        known = {
-            name: topic
-            for name, topic in self.topics.items()
-            if topic.type == kind and len(topic) > len(topic.unreadable)
-        }
+        kind = ODOMETRY.type
+        known = {n: t for n, t in self.topics.items() if t.type == kind and len(t) > len(t.unreadable)}
         if chosen is not None:
             if chosen not in known:
                 raise UnknownNameError(f"odometry topic in {self.path}:", chosen, known)
@@ -199,7 +211,7 @@ def open_bag(path: Path) -> Bag:
     if len(problems) == len(files):
         raise BagError(problems[0])
     gathered.check_types()
-    beside = json_object(told_beside(path, RUN_RECORD))
+    beside = json_object(custom_text(path, RUN_RECORD))
     info = gathered.info or beside
     if info and beside and json.dumps(info, sort_keys=True) != json.dumps(beside, sort_keys=True):
         # A metadata record of MCAP has no checksum.
@@ -211,15 +223,15 @@ def open_bag(path: Path) -> Bag:
         files=files,
         topics=dict(sorted(gathered.topics.items())),
         info=info,
-        recording=json_object(told_beside(path, RECORDING)) or {},
-        faults=_faults(gathered.faults or told_beside(path, FAULTS)),
+        recording=json_object(custom_text(path, RECORDING)) or {},
+        faults=_faults(gathered.faults or custom_text(path, FAULTS)),
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )
 
 
 class _Gathered:
-    """What the files of one bag hold together."""
+    """Content of the files of one bag, together."""
 
     def __init__(self) -> None:
         self.topics: dict[str, Topic] = {}
@@ -229,13 +241,10 @@ class _Gathered:
         self.warnings: list[str] = []
 
     def read(self, file: Path) -> None:
-        if storage_of(file) == "sqlite3":
-            self._read_sqlite3(file)
-        else:
-            self._read_mcap(file)
+        (self._read_sqlite3 if storage_of(file) == "sqlite3" else self._read_mcap)(file)
 
     def check_types(self) -> None:
-        """Find the messages that are not what their topic says."""
+        """Find the messages that do not fit the type of their topic."""
         for topic in self.topics.values():
             topic.unreadable = unreadable(topic.type, topic.data)
             if topic.unreadable:
@@ -243,7 +252,7 @@ class _Gathered:
                 self.warnings.append(f"{count} of {topic.name} are no {topic.type}.")
 
     def _topic(self, name: str, kind: str) -> Topic:
-        """The topic of a name; the same name with another type is told apart."""
+        """The topic of a name; one with another type gets a name with its type."""
         topic = self.topics.setdefault(name, Topic(name, kind))
         if topic.type == kind:
             return topic
@@ -264,7 +273,7 @@ class _Gathered:
             if isinstance(record, Message):
                 topic = channels.get(record.channel_id)
                 if topic is None:
-                    lost["messages of channels that nobody announced"] += 1
+                    lost["messages of channels that are not announced"] += 1
                     continue
                 self._add(topic, record.data, record.log_time, record.sequence)
             elif isinstance(record, Schema):
@@ -332,8 +341,5 @@ def _faults(text: str) -> tuple[Fault, ...]:
 
 def span_ns(topics: Iterable[Topic]) -> tuple[int, int]:
     """First and last time of recording [ns]; zeros where there is no message."""
-    edges = [(min(topic.log_ns), max(topic.log_ns)) for topic in topics if len(topic)]
-    if not edges:
-        return 0, 0
-    lows, highs = zip(*edges, strict=True)
-    return int(np.min(lows)), int(np.max(highs))
+    some = [topic.log_ns for topic in topics if len(topic)]
+    return min(map(min, some), default=0), max(map(max, some), default=0)

@@ -1,52 +1,39 @@
-"""What a controller went through in a bag: what it was shown step by step, what it was told, what it answered."""
+"""Control steps in a bag: what a controller observed, received and answered, step by step."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from fulmar_bags.contents import Bag, Topic
-from fulmar_bags.decode import (
-    Odometries,
-    Vectors,
-    joint_vectors,
-    messages,
-    odometries,
-    stamp_of,
-    twist_vectors,
-)
-from fulmar_bags.guarded import begins_with_its_run, changes_of, limits_of, number_of, presses_of
-from fulmar_bags.message_reader import goal_of, obstacles_of, thing_of
-from fulmar_bags.plain_twist import answers_within, plain_commands
-from fulmar_bags.received import ABSENT, Told
+from fulmar_bags.contents import Bag, Topic, json_object
+from fulmar_bags.decode import NS, Odometries, Vectors, by_stamp, odometries
+from fulmar_bags.recorded_estop import estop_messages
+from fulmar_bags.wire_reader import ABSENT, Received, WireReader
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.goal import Goal, PoseTuple, goal_at
+from fulmar_core.goal import PoseTuple, goal_at
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import Frames
+from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
     AIR_BEARING,
+    METADATA,
     OBSERVATION,
-    OBSTACLES,
+    SWAP,
     VELOCITY_COMMAND,
-    Wire,
     command_wire,
-    goal_wires,
 )
-
-NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
-class Course:
+class ControlSteps:
     """The control steps of one bag, in their order, with everything that belongs to each."""
 
     robot: Robot
@@ -59,16 +46,16 @@ class Course:
     observation_names: tuple[str, ...]  # empty: none were recorded
     actions: np.ndarray  # (n, m) NaN where unknown
     commands: np.ndarray  # (n, m) NaN where unknown
-    acted: np.ndarray  # (n,) whether the controller was asked; nothing but True where that is not known
+    acted: np.ndarray  # (n,) whether the controller was asked; True where that is not known
     odometry: Odometries
     sample: np.ndarray  # (n,) index into the odometry, ABSENT where it is not in the bag
-    goals: tuple[Told, ...]
-    obstacles: tuple[Told, ...]
-    things: dict[str, tuple[Told, ...]]  # poses of the things of the task, by name
-    presses: tuple[Told, ...]  # of the e-stop, see `presses_of`
-    bearing: tuple[Told, ...]  # the air bearing: true is on; empty where nothing is recorded of one
+    goals: tuple[Received, ...]
+    obstacles: tuple[Received, ...]
+    things: dict[str, tuple[Received, ...]]  # poses of the things of the task, by name
+    presses: tuple[Received, ...]  # of the e-stop, see `estop_messages`
+    bearing: tuple[Received, ...]  # the air bearing: true is on; empty where nothing is recorded of one
     applied: Vectors  # what the actuators did from each stamp on; empty where that is not recorded
-    changes: tuple[Told, ...]  # folder and SHA-256 of policies that took over
+    changes: tuple[Received, ...]  # folder and SHA-256 of policies that took over
     warnings: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -80,13 +67,13 @@ class Course:
         """Whether the bag holds anything that a controller answered."""
         return bool(np.isfinite(self.actions).any() or np.isfinite(self.commands).any())
 
-    def before(self, told: tuple[Told, ...]) -> dict[int, list[Told]]:
-        """What was told, by the step that it came before; the number of steps for what came after all of them.
+    def before(self, received: tuple[Received, ...]) -> dict[int, list[Received]]:
+        """Messages by the step that they came before; the number of steps for those that came after all of them.
 
-        What a goal node sends is stamped with the odometry that it belongs to. Anything else counts from when it came.
+        A goal node stamps its messages with the odometry that they belong to. Others count from when they came.
         """
-        found: dict[int, list[Told]] = defaultdict(list)
-        for each in told:
+        found: dict[int, list[Received]] = defaultdict(list)
+        for each in received:
             if self.settings.goals_streamed and each.stamp_ns:
                 step = int(np.searchsorted(self.stamp_ns, each.stamp_ns))
             else:
@@ -95,7 +82,7 @@ class Course:
         return found
 
 
-def course_of(
+def control_steps_of(
     bag: Bag,
     *,
     robot: str | None = None,
@@ -103,8 +90,8 @@ def course_of(
     goal: PoseTuple | None = None,
     control_hz: float | None = None,
     odometry: str | None = None,
-) -> Course:
-    """What a controller went through.
+) -> ControlSteps:
+    """Read the control steps of a bag.
 
     Args:
         bag: The bag.
@@ -118,43 +105,24 @@ def course_of(
         BagError: The bag holds nothing that a controller could be shown, or does not say what is needed.
         ConfigError: Unknown name.
     """
-    info = bag.info or {}
     the_robot = load_robot(_name(bag, "robot", robot))
     the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None), bag.path)
     the_task.check(the_robot)
-    warnings: list[str] = list(bag.warnings)
-    limits = limits_of(info)
-    if limits["max_run_time_s"] and not begins_with_its_run(info):
-        limits["max_run_time_s"] = 0.0
-        warnings.append("the bag begins within its run: whether max_run_time was over is not judged.")
-    hz, rate = control_hz or number_of(info, "control_hz", 0.0), number_of(info, "rate", 1.0)
-    try:
-        settings = ControllerSettings(
-            robot=the_robot.name,
-            task=the_task.name,
-            control_hz=hz,
-            lockstep=bool(info.get("lockstep")),
-            rate=rate,
-            goals_streamed=bool(info.get("goals")),
-            **limits,
-        )
-    except ValueError as error:
-        raise BagError(f"what the bag says of its run makes no sense: {error}") from error
-    wire = command_wire(the_robot)
-    names = the_robot.actuators.names
-    read = twist_vectors if wire is VELOCITY_COMMAND else (lambda topic: joint_vectors(topic, "effort"))
-    commands = _checked(read(bag.of(wire)), names, wire.name, warnings, by_name=wire is not VELOCITY_COMMAND)
-    actions = _checked(joint_vectors(bag.of(ACTION), "effort"), names, ACTION.name, warnings)
-    observations = joint_vectors(bag.of(OBSERVATION), "position")
-    if observations.left_out:
-        warnings.append(f"{observations.left_out} messages of {OBSERVATION.name} cannot be read.")
+    reader = WireReader(bag)
+    settings = _settings(bag, the_robot, the_task, control_hz, reader.warnings)
+    wire, names = command_wire(the_robot), the_robot.actuators.names
+    commands = reader.vectors(wire)
+    if wire is not VELOCITY_COMMAND:
+        commands = _checked(commands, names, wire.name, reader.warnings)
+    actions = _checked(reader.vectors(ACTION), names, ACTION.name, reader.warnings)
+    observations = reader.vectors(OBSERVATION, "position")
     seen = _in_plain_frames(_odometry_of(bag, odometry, needed=not len(observations)), bag.frames)
     # Who stamps commands by another clock, or not at all, answers by the time of recording.
     unmatched = bool(len(commands)) and not np.isin(commands.stamp_ns, seen.stamp_ns).any()
     by_time = unmatched and bool(len(seen)) and not len(observations)
     steps = [] if by_time else _steps(observations, commands)
     if not steps:
-        seen = _timed(seen, warnings)
+        seen = _timed(seen, reader.warnings)
         steps = _even_steps(seen, settings.control_rate(the_robot))
     if not steps:
         raise BagError(f"{bag.path}: holds neither observations nor odometry; there is nothing to run again.")
@@ -162,12 +130,12 @@ def course_of(
     log_ns = np.maximum.accumulate(np.array([log for _, log, _, _ in steps], dtype=np.int64))
     shown = np.array([index for _, _, index, _ in steps])
     answers = np.array([index for _, _, _, index in steps])
-    plain = plain_commands(bag) if wire is VELOCITY_COMMAND and not len(commands) else None
+    plain = reader.unstamped_commands() if wire is VELOCITY_COMMAND and not len(commands) else None
     if plain is not None:
         commands = plain
     if plain is not None or by_time:
         answers = answers_within(log_ns, commands.log_ns)
-    return Course(
+    return ControlSteps(
         robot=the_robot,
         task=the_task,
         settings=settings,
@@ -181,19 +149,63 @@ def course_of(
         acted=shown != ABSENT if len(observations) else np.ones(len(steps), dtype=bool),
         odometry=seen,
         sample=_first_of(seen.stamp_ns, stamp_ns),
-        goals=_goals(bag, the_task, goal, int(log_ns[0]), warnings),
-        obstacles=_told(bag, OBSTACLES, obstacles_of, warnings),
-        things={thing.name: _told(bag, thing.wire, thing_of, warnings) for thing in the_task.things},
-        presses=presses_of(bag),
-        bearing=tuple(
-            Told(log, 0, bool(m.data), index) for index, (log, m) in enumerate(messages(bag.of(AIR_BEARING)))
-        ),
-        applied=_checked(
-            joint_vectors(bag.of(ACTUATORS_STATE), "effort"), names, ACTUATORS_STATE.name, warnings
-        ),
-        changes=changes_of(bag),
-        warnings=tuple(warnings),
+        goals=tuple(reader.goals(the_task)) if goal is None else (_given(goal, int(log_ns[0])),),
+        obstacles=reader.obstacles(),
+        things=reader.things(the_task),
+        presses=estop_messages(reader),
+        bearing=reader.received(AIR_BEARING),
+        applied=_checked(reader.vectors(ACTUATORS_STATE), names, ACTUATORS_STATE.name, reader.warnings),
+        changes=_changes(reader),
+        warnings=tuple(reader.warnings),
     )
+
+
+def _settings(
+    bag: Bag, robot: Robot, task: Task, control_hz: float | None, warnings: list[str]
+) -> ControllerSettings:
+    """Settings of the controller node of a run: its guards and rate, as the bag names them."""
+    info = bag.info or {}
+    guards, recording = info.get("guards") or {}, info.get("recording")
+    hz, rate = control_hz or bag.number("control_hz", 0.0), bag.number("rate", 1.0)
+    try:
+        x_min, x_max, y_min, y_max = (float(side) for side in guards.get("area") or NO_AREA)
+        max_run_time_s = float(guards.get("max_run_time_s") or 0.0)
+        in_parts = isinstance(recording, Mapping) and recording.get("mode") in ("ring", "goals")
+        if max_run_time_s and in_parts:
+            max_run_time_s = 0.0
+            warnings.append("the bag begins within its run: max_run_time is not checked.")
+        return ControllerSettings(
+            robot=robot.name,
+            task=task.name,
+            control_hz=hz,
+            lockstep=bool(info.get("lockstep")),
+            rate=rate,
+            goals_streamed=bool(info.get("goals")),
+            fallback=str(guards.get("fallback") or ""),
+            estop=bool(guards.get("estop")),
+            max_run_time_s=max_run_time_s,
+            area=(x_min, x_max, y_min, y_max),
+        )
+    except (AttributeError, TypeError, ValueError) as error:
+        raise BagError(
+            f"the run record of the bag has invalid settings: {str(error).rstrip('.')}."
+        ) from error
+
+
+def _changes(reader: WireReader) -> tuple[Received, ...]:
+    """Folder and SHA-256 of each policy that took over on request, when it did; requests that failed are left out."""
+    requests = reader.received(SWAP)
+    reports = [(each.log_ns, json_object(each.value) or {}) for each in reader.received(METADATA)]
+    ends = [each.log_ns for each in requests[1:]] + [1 << 63]
+    found = []
+    for request, end in zip(requests, ends, strict=False):
+        new = [
+            (log, text) for log, text in reports if request.log_ns <= log < end and not text.get("fallback")
+        ]
+        if new:
+            log, text = new[0]
+            found.append(Received(log, 0, (request.value, str(text.get("sha256") or ""))))
+    return tuple(found)
 
 
 def _name(bag: Bag, key: str, given: str | None) -> str:
@@ -222,22 +234,14 @@ def _in_plain_frames(seen: Odometries, frames: Frames) -> Odometries:
     )
 
 
-def _checked(
-    found: Vectors, names: tuple[str, ...], topic: str, warnings: list[str], *, by_name: bool = True
-) -> Vectors:
-    """Vectors that are about the robot's actuators; none where they are about others."""
-    if found.left_out:
-        warnings.append(f"{found.left_out} messages of {topic} cannot be read.")
-    if len(found) and by_name and found.names != names:
+def _checked(found: Vectors, names: tuple[str, ...], topic: str, warnings: list[str]) -> Vectors:
+    """Vectors of the robot's actuators; none where they are of others."""
+    if len(found) and found.names == names:
+        return found
+    if len(found):
         warnings.append(f"{topic} is about {', '.join(found.names)}, not about {', '.join(names)}: left out.")
-        return Vectors(
-            names,
-            found.stamp_ns[:0],
-            found.log_ns[:0],
-            np.zeros((0, len(names))),
-            found.left_out + len(found),
-        )
-    return found if len(found) else Vectors(names, found.stamp_ns, found.log_ns, np.zeros((0, len(names))), 0)
+    empty = np.zeros(0, dtype=np.int64)
+    return Vectors(names, empty, empty, np.zeros((0, len(names))), found.left_out + len(found))
 
 
 def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int, int]]:
@@ -246,19 +250,17 @@ def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int
     A step with an observation is one where the controller was asked; a command without one was the safe one, or was
     repeated. Messages belong together by their stamp; where a stamp comes several times, by their order.
     """
-    waiting: dict[int, list[int]] = defaultdict(list)
-    for index in range(len(commands) - 1, -1, -1):
-        waiting[int(commands.stamp_ns[index])].append(index)
+    waiting = by_stamp(commands.stamp_ns)
     steps: list[tuple[int, int, int, int]] = []
     for index, (stamp, log) in enumerate(zip(observations.stamp_ns, observations.log_ns, strict=True)):
-        mine = waiting[int(stamp)]
+        mine = waiting.get(int(stamp))
         answer = mine.pop() if mine else ABSENT
         came = min(int(log), int(commands.log_ns[answer])) if answer != ABSENT else int(log)
         steps.append((int(stamp), came, index, answer))
     known = {stamp for stamp, _, _, _ in steps}
     for stamp, rest in waiting.items():
         for index in sorted(rest):
-            if stamp in known and index:  # told again, because it got lost or was the last word
+            if stamp in known and index:  # a repetition: the command got lost or was the last one
                 continue
             known.add(stamp)
             steps.append((stamp, int(commands.log_ns[index]), ABSENT, index))
@@ -266,7 +268,7 @@ def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int
 
 
 def _timed(seen: Odometries, warnings: list[str]) -> Odometries:
-    """Odometry whose stamps tell the time; where they never change, by when it was recorded."""
+    """Odometry with its times of recording in the place of stamps that never change."""
     if len(seen) < 2 or np.ptp(seen.stamp_ns) > 0:
         return seen
     warnings.append("the stamps of the odometry do not advance: the times of recording stand in for them.")
@@ -298,12 +300,10 @@ def _rows(values: np.ndarray, indices: np.ndarray) -> np.ndarray:
 
 def _matching(stamp_ns: np.ndarray, wanted: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Index of what has the stamp of each wanted step; where a stamp comes several times, in their order."""
-    waiting: dict[int, list[int]] = defaultdict(list)
-    for index in range(len(others) - 1, -1, -1):
-        waiting[int(others[index])].append(index)
+    waiting = by_stamp(others)
     found = np.full(len(stamp_ns), ABSENT)
     for step in np.flatnonzero(wanted):
-        mine = waiting[int(stamp_ns[step])]
+        mine = waiting.get(int(stamp_ns[step]))
         if mine:
             found[step] = mine.pop()
     return found
@@ -317,33 +317,23 @@ def _first_of(stamps: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.array([first.get(stamp, ABSENT) for stamp in wanted.tolist()])
 
 
-def _goals(
-    bag: Bag, task: Task, asked: PoseTuple | None, begin_ns: int, warnings: list[str]
-) -> tuple[Told, ...]:
-    found = [told for wire in goal_wires(task.goal_topic) for told in _told(bag, wire, goal_of, warnings)]
-    found.sort(key=lambda each: each.log_ns)
-    if asked is not None:
-        found = [Told(begin_ns, 0, _goal(asked))]
-    return tuple(found)
+def _given(pose: PoseTuple, log_ns: int) -> Received:
+    """A goal in the place of those in the bag."""
+    return Received(log_ns, 0, goal_at((pose[0], pose[1], float(np.deg2rad(pose[2])))))
 
 
-def _goal(pose: PoseTuple) -> Goal:
-    return goal_at((pose[0], pose[1], float(np.deg2rad(pose[2]))))
+def answers_within(steps_ns: np.ndarray, commands_ns: np.ndarray) -> np.ndarray:
+    """Index of the first command after each step and before the next one, ABSENT where there is none, shape (n,).
 
-
-def _told(
-    bag: Bag, wire: Wire, read: Callable[[Any, Frames], tuple[Any, str]], warnings: list[str]
-) -> tuple[Told, ...]:
-    """What the messages of a wire say, without those that `read` finds a problem with."""
-    found = []
-    for index, (log, message) in enumerate(messages(bag.of(wire))):
-        what, problem = read(message, bag.frames)
-        if problem:
-            warnings.append(f"a message of {wire.name} was left out: {problem}.")
-            continue
-        stamped = message.markers[:1] if wire is OBSTACLES else [message]
-        found.append(Told(log, stamp_of(stamped[0]) if stamped else 0, what, index))
-    return tuple(found)
+    Args:
+        steps_ns: When each step began, rising, shape (n,) [ns].
+        commands_ns: When each command was recorded, rising [ns].
+    """
+    first = np.searchsorted(commands_ns, steps_ns)
+    ends = np.append(steps_ns[1:], np.iinfo(np.int64).max)
+    there = first < len(commands_ns)
+    there[there] = commands_ns[first[there]] < ends[there]
+    return np.where(there, first, ABSENT)
 
 
 def policy_folder(bag: Bag) -> Path | None:

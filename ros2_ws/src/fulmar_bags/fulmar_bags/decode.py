@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.contents import Topic
-from fulmar_bags.layout import ENCAPSULATION, LITTLE_ENDIAN, Walk
-from fulmar_bags.message_types import type_store
+from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, Walk, type_store
 
 NS = 1_000_000_000
+TWIST = "geometry_msgs/msg/Twist"
 STAMP = slice(ENCAPSULATION, ENCAPSULATION + 8)  # of a message that begins with a header
 
 
@@ -112,14 +112,21 @@ def joint_vectors(topic: Topic, field: str) -> Vectors:
     )
 
 
-def twist_vectors(topic: Topic, names: Sequence[str] = ("speed", "yaw_rate")) -> Vectors:
-    """TwistStamped messages as (speed ahead [m/s], turn rate [rad/s])."""
+def twist_vectors(topic: Topic) -> Vectors:
+    """Twist or TwistStamped messages as (speed ahead [m/s], turn rate [rad/s]).
+
+    Those without a stamp, as most drivers of others take them, count from when they were recorded.
+    """
     found = messages(topic)
+    log_ns = np.array([log for log, _ in found], dtype=np.int64)
+    plain = topic.type == TWIST
     return Vectors(
-        tuple(names),
-        np.array([stamp_of(m) for _, m in found], dtype=np.int64),
-        np.array([log_ns for log_ns, _ in found], dtype=np.int64),
-        np.array([(m.twist.linear.x, m.twist.angular.z) for _, m in found], dtype=float).reshape(-1, 2),
+        ("speed", "yaw_rate"),
+        log_ns if plain else np.array([stamp_of(m) for _, m in found], dtype=np.int64),
+        log_ns,
+        np.array(
+            [(t.linear.x, t.angular.z) for _, m in found for t in (m if plain else m.twist,)], dtype=float
+        ).reshape(-1, 2),
         len(topic) - len(found),
     )
 
@@ -228,3 +235,11 @@ class _Walk(Walk):
         pose = [begin + 8 * i for i in range(7)]
         twist = [begin + 8 * (7 + 36 + i) for i in range(6)]
         return frames, pose + twist
+
+
+def by_stamp(stamps_ns: Sequence[int] | np.ndarray) -> dict[int, list[int]]:
+    """Indices of messages by their stamp, the first one last: `pop` takes messages of one stamp in their order."""
+    found: dict[int, list[int]] = {}
+    for index in range(len(stamps_ns) - 1, -1, -1):
+        found.setdefault(int(stamps_ns[index]), []).append(index)
+    return found

@@ -1,4 +1,4 @@
-"""What a bag holds, in figures: rates, gaps, late and dropped messages, and where it comes from."""
+"""Statistics of a bag: rates, gaps, late and dropped messages, and where it comes from."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from fulmar_bags.contents import Bag, Topic, json_object, span_ns
 from fulmar_bags.decode import messages, stamps_ns
-from fulmar_bags.guarded import number_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
 from fulmar_core.provenance import MADE_BY, PATCH
@@ -24,7 +23,7 @@ ASKED = {"robot.yaml": "robot", "task.yaml": "task", "scenario.yaml": "scenario"
 
 
 def describe(bag: Bag) -> dict[str, Any]:
-    """Everything that `fulmar bag info` tells, ready for JSON."""
+    """The output of `fulmar bag info`, ready for JSON."""
     start_ns, end_ns = span_ns(bag.topics.values())
     topics = [_of_topic(topic, bag) for topic in bag.topics.values() if len(topic)]
     return {
@@ -65,12 +64,12 @@ def provenance(bag: Bag) -> dict[str, Any]:
 
 
 def controller_of(bag: Bag) -> dict[str, Any]:
-    """What the controller said of itself last; empty where it said nothing."""
+    """Newest metadata of the controller; empty where there is none."""
     return (controllers_of(bag) or [{}])[-1]
 
 
 def controllers_of(bag: Bag) -> list[dict[str, Any]]:
-    """What each controller said of itself that had its turn, in their order."""
+    """Metadata of each controller that acted, in their order."""
     texts = (json_object(message.data) for _, message in messages(bag.of(METADATA)))
     found: list[dict[str, Any]] = []
     for text in texts:
@@ -103,7 +102,7 @@ def _of_topic(topic: Topic, bag: Bag) -> dict[str, Any]:
         unstamped = int(np.sum(stamps == 0))
         # 0 means "not set": as a time it would lie decades before the other stamps.
         stamps, log_ns = stamps[stamps != 0], log_ns[stamps != 0]
-    # In lock step messages come as fast as the machine goes: only stamps tell a rate.
+    # In lock step messages come as fast as the computer goes: only stamps have a rate.
     by_stamp = stamps is not None and len(np.unique(stamps)) > 1
     times = np.sort(stamps) if by_stamp and stamps is not None else np.array(read.log_ns, dtype=np.int64)
     steps = np.diff(times)
@@ -136,7 +135,7 @@ def _lateness(
     time goes faster, a delay has no meaning.
     """
     info = bag.info or {}
-    if stamps is None or period_ns is None or info.get("lockstep") or number_of(info, "rate", 1.0) != 1.0:
+    if stamps is None or period_ns is None or info.get("lockstep") or bag.number("rate", 1.0) != 1.0:
         return None, None
     delay_ns = (log_ns - stamps).astype(float)
     delay_ns -= delay_ns.min()
@@ -146,10 +145,10 @@ def _lateness(
 
 
 def _dropped(topic: Topic, bag: Bag) -> int | None:
-    """Messages that are known to be missing; None where nothing tells.
+    """Number of messages that are known to be missing; None where it is unknown.
 
-    A recorder tells what found no room in its memory, and counts what it writes, which shows what a damaged file has
-    lost. What answers an odometry must have it in the bag: where it is not there, the recorder has not got it.
+    The recorder notes messages that found no room in its memory, and numbers those that it writes, so that those lost
+    with a damaged file are known. An odometry that a command answers and that is not in the bag is missing, too.
     """
     known = (bag.recording.get("dropped") or {}).get(topic.name)
     numbers = np.array(topic.sequence, dtype=np.int64)

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fulmar_bags.control_steps import Course
+from fulmar_bags.control_steps import ControlSteps
 from fulmar_bags.figures import GAP, NS
 from fulmar_core.errors import BagError, ConfigError
 
@@ -25,7 +25,9 @@ DATA_PATH = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 INDICES = ("frame_index", "episode_index", "index", "task_index")
 
 
-def write_lerobot(courses: Sequence[Course], titles: Sequence[str], folder: Path) -> tuple[Path, list[str]]:
+def write_lerobot(
+    courses: Sequence[ControlSteps], titles: Sequence[str], folder: Path
+) -> tuple[Path, list[str]]:
     """Write a dataset.
 
     Args:
@@ -74,7 +76,7 @@ def write_lerobot(courses: Sequence[Course], titles: Sequence[str], folder: Path
     return folder, split
 
 
-def _frames(course: Course) -> list[tuple[np.ndarray, np.ndarray]]:
+def _frames(course: ControlSteps) -> list[tuple[np.ndarray, np.ndarray]]:
     """Observations (n, k) and actions (n, m) of the steps that have both, apart where time does not go on evenly."""
     answers = course.actions if np.isfinite(course.actions).any() else course.commands
     both = np.isfinite(course.observations).all(axis=1) & np.isfinite(answers).all(axis=1)
@@ -85,8 +87,8 @@ def _frames(course: Course) -> list[tuple[np.ndarray, np.ndarray]]:
     return list(zip(np.split(course.observations[both], ends), np.split(answers[both], ends), strict=True))
 
 
-def _check_alike(courses: Sequence[Course]) -> None:
-    def kind(course: Course) -> tuple[Any, ...]:
+def _check_alike(courses: Sequence[ControlSteps]) -> None:
+    def kind(course: ControlSteps) -> tuple[Any, ...]:
         return course.robot.name, course.observation_names, course.settings.control_rate(course.robot)
 
     for number, course in enumerate(courses):
@@ -135,7 +137,12 @@ def _stats(values: np.ndarray) -> dict[str, list[float] | list[int] | list[bool]
 
 
 def _info(
-    course: Course, fps: float, episodes: int, frames: int, tasks: int, shapes: tuple[np.ndarray, np.ndarray]
+    course: ControlSteps,
+    fps: float,
+    episodes: int,
+    frames: int,
+    tasks: int,
+    shapes: tuple[np.ndarray, np.ndarray],
 ) -> dict[str, Any]:
     def vector(names: Sequence[str], width: int) -> dict[str, Any]:
         return {"dtype": "float32", "shape": [width], "names": list(names)}

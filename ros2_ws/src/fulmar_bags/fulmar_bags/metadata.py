@@ -41,13 +41,7 @@ class BagSpan:
 def write_metadata(
     directory: Path, files: Mapping[str, BagSpan], topics: Sequence[TopicCount], custom: Mapping[str, str]
 ) -> None:
-    """Write or replace `metadata.yaml`; a reader sees the old one or the new one, never half of one.
-
-    Args:
-        directory: The bag.
-        files: Names of the MCAP files in it, in their order, and what each holds of all topics together.
-        topics: Counts by topic.
-        custom: Text by name, for `custom_data`.
+    """Write or replace `metadata.yaml` at once: spans of the MCAP files by name, topics, and texts of `custom_data`.
 
     Raises:
         OSError: The disk refuses; what was there stays.
@@ -87,7 +81,7 @@ def write_metadata(
 
 
 def read_information(directory: Path) -> dict[str, Any]:
-    """What the `metadata.yaml` of a folder tells, empty where there is none that can be read."""
+    """Content of the `metadata.yaml` of a folder, empty where there is none that can be read."""
     try:
         found = yaml_text.load((directory / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
     except (OSError, UnicodeDecodeError, yaml_text.YamlError, KeyError, TypeError, ValueError):

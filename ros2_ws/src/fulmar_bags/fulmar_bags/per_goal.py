@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Set
+from dataclasses import replace
 
-from fulmar_bags.writer import BagWriter
+from fulmar_bags.writer import BagCounts, BagWriter
 
 RETRY_S = 0.5  # between two tries to begin a bag
 
@@ -27,7 +28,7 @@ class BagPerGoal:
         Args:
             open_bag: Makes the bag of a number, from 1, with its topics.
             goals: Topics of goals.
-            latched: Topics whose newest messages hold on however old they are, and how many of each.
+            latched: Latched topics, and how many messages of each a bag begins with.
 
         Raises:
             BagError: The first bag cannot be written.
@@ -45,24 +46,11 @@ class BagPerGoal:
         self._unclosed: list[BagWriter] = []
 
     @property
-    def messages(self) -> int:
-        """As of `BagWriter`, over all bags, without the latched messages that a bag repeats at its beginning."""
-        return sum(bag.messages for bag in self._bags) - self._repeated
-
-    @property
-    def messages_on_disk(self) -> int:
-        """As of `BagWriter`, over all bags."""
-        return max(0, sum(bag.messages_on_disk for bag in self._bags) - self._repeated)
-
-    @property
-    def files(self) -> int:
-        """MCAP files of all bags."""
-        return sum(bag.files for bag in self._bags)
-
-    @property
-    def size(self) -> int:
-        """Bytes on disk."""
-        return sum(bag.size for bag in self._bags)
+    def counts(self) -> BagCounts:
+        """Of all bags, without the latched messages that a bag repeats at its beginning."""
+        total = sum((bag.counts for bag in self._bags), BagCounts())
+        on_disk = max(0, total.on_disk - self._repeated)
+        return replace(total, messages=total.messages - self._repeated, on_disk=on_disk)
 
     @property
     def waiting(self) -> int:

@@ -1,4 +1,4 @@
-"""Makes a bag whole again that a power cut or a damaged disk left torn."""
+"""Recovers a bag that a power cut or a damaged disk left incomplete."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.well_known import Profile
 
 from fulmar_bags.mcap_file import BagFile, mcap_writer
+from fulmar_bags.mcap_records import bag_files, plain_name, read_records
 from fulmar_bags.metadata import BagSpan, TopicCount, read_custom, write_metadata
-from fulmar_bags.records import bag_files, plain_name, read_records
 from fulmar_core import yaml_text
 from fulmar_core.atomic_write import sync_folder
 from fulmar_core.errors import BagError
@@ -25,9 +25,6 @@ def recover(directory: Path) -> tuple[str, ...]:
 
     A file that lost its name with the power gets it back. Each new file replaces the old one in one step. Where
     something could not be read, the old file stays beside it as `<name>.damaged`; one that holds nothing at all goes.
-
-    Args:
-        directory: The bag.
 
     Returns:
         One line for each part that could not be read; empty if the bag was whole.
@@ -50,8 +47,8 @@ def recover(directory: Path) -> tuple[str, ...]:
             raise BagError(f"{directory}: cannot write the recovered bag: {error.strerror}.") from error
     if not copies:
         raise BagError(f"{directory}: nothing can be read. {damage[0]}")
-    told = {name: text for copy in copies.values() for name, text in copy.custom.items()}
-    custom = {**read_custom(directory), **told}
+    recorded = {name: text for copy in copies.values() for name, text in copy.custom.items()}
+    custom = {**read_custom(directory), **recorded}
     try:
         spans = {name: copy.span() for name, copy in copies.items()}
         write_metadata(directory, spans, _all_topics(list(copies.values())), custom)
@@ -92,7 +89,7 @@ def _all_topics(copies: list[_Copy]) -> list[TopicCount]:
 
 
 class _Copy:
-    """A fresh MCAP file with the records of another one, of which it tells what could not be read."""
+    """A fresh MCAP file with the records of another one that can be read."""
 
     def __init__(self, path: Path, old: Path, damage: list[str]) -> None:
         self.custom: dict[str, str] = {}

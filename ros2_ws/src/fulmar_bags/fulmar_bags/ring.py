@@ -1,4 +1,4 @@
-"""Keeps the newest messages in memory, and begins to write when told of a fault. Knows no rclpy.
+"""Ring buffer of messages that writes a bag when a fault occurs; and which messages are faults. Knows no rclpy.
 
 Each fault gives a file of the bag: what came before it, and what came for a while after. Latched messages that are
 older than the memory, such as the goal, come first in it, at the time where it begins, as a late subscriber would get
@@ -10,14 +10,19 @@ from __future__ import annotations
 import json
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
-from fulmar_bags.writer import BagWriter
+from fulmar_bags.message_types import type_store
+from fulmar_bags.writer import BagCounts, BagWriter
+from fulmar_core.topics import DIAGNOSTICS, ESTOP, STATUS, Wire
 
 FAULTS = "fulmar_faults"  # entry of `custom_data`: JSON list of when and why
 MAX_BYTES = 64 << 20  # of memory
 RETRY_S = 0.5  # between two tries to begin a file
 NS = 1_000_000_000
+ERROR, STALE = 2, 3  # levels of diagnostic_msgs/DiagnosticStatus
+RECORDER = "recorder"  # name of its diagnostics, which are no fault of the robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +33,7 @@ class _Message:
 
 
 class BagRing:
-    """Takes messages as a `BagWriter` does; most of them never reach a disk."""
+    """Receives messages as a `BagWriter` does; most of them never reach a disk."""
 
     def __init__(
         self,
@@ -46,8 +51,8 @@ class BagRing:
             open_bag: Makes the bag, with its topics; called at the first fault, and again where it fails.
             before_s: How much is kept [s].
             after_s: How long writing goes on after the last sign of a fault [s].
-            latched: Topics whose newest messages hold on however old they are, and how many of each.
-            fault_in: What fault a message tells of, by topic and data; empty if none.
+            latched: Latched topics, and how many messages of each are kept however old they are.
+            fault_in: Fault that a message reports, by topic and data; empty if none.
             max_bytes: More is not kept; then less than `before_s` is.
         """
         self._open_bag, self._fault_in = open_bag, fault_in
@@ -74,24 +79,10 @@ class BagRing:
         return (self._kept[-1].log_ns - self._kept[0].log_ns) / NS if self._kept else 0.0
 
     @property
-    def messages(self) -> int:
-        """Messages that belong into the bag so far."""
-        return (self._bag.messages if self._bag else 0) + (len(self._kept) if self._due else 0)
-
-    @property
-    def messages_on_disk(self) -> int:
-        """Messages that a reader of the bag finds now."""
-        return self._bag.messages_on_disk if self._bag else 0
-
-    @property
-    def files(self) -> int:
-        """MCAP files of the bag so far."""
-        return self._bag.files if self._bag else 0
-
-    @property
-    def size(self) -> int:
-        """Bytes on disk."""
-        return self._bag.size if self._bag else 0
+    def counts(self) -> BagCounts:
+        """Of the bag, and of messages that belong to a fault whose file has not begun."""
+        counts = self._bag.counts if self._bag else BagCounts()
+        return replace(counts, messages=counts.messages + (len(self._kept) if self._due else 0))
 
     @property
     def waiting(self) -> int:
@@ -99,10 +90,7 @@ class BagRing:
         return (self._bag.waiting if self._bag else 0) + self._bytes_due
 
     def write(self, topic: str, data: bytes, *, log_ns: int) -> None:
-        """Take a message; arguments as of `BagWriter.write`.
-
-        What belongs to a fault stays in memory until `tick` has begun its file; the caller watches `waiting`.
-        """
+        """As `BagWriter.write`; messages of a fault stay in memory until `tick` has begun its file."""
         message = _Message(topic, data, log_ns)
         reason = self._fault_in(topic, data)
         if reason:
@@ -201,3 +189,38 @@ class BagRing:
     def _hold(self, message: _Message) -> None:
         if message.topic in self._held:
             self._held[message.topic].append(message)
+
+
+def fault_finder(robot: str, topics: Mapping[Wire, str]) -> Callable[[str, bytes], str]:
+    """A function that finds faults of a robot: errors of its plant (a watchdog trip, too) or controller, an e-stop.
+
+    Args:
+        robot: Name of the robot; `/diagnostics` has those of others, too.
+        topics: Absolute name of each wire.
+
+    Returns:
+        Gives the fault in words by topic and CDR data, or an empty text.
+    """
+    watched = {topics[wire]: wire for wire in (STATUS, DIAGNOSTICS, ESTOP)}
+
+    def fault_in(topic: str, data: bytes) -> str:
+        wire = watched.get(topic)
+        if wire is None:
+            return ""
+        try:
+            message: Any = type_store().deserialize_cdr(data, wire.type)
+        except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; they are kept, and no fault
+            return ""
+        if wire is ESTOP:
+            return "e-stop" if message.data else ""
+        return _of_diagnostics(robot, message)
+
+    return fault_in
+
+
+def _of_diagnostics(robot: str, message: Any) -> str:
+    for status in message.status:
+        name, _, part = status.name.partition(": ")
+        if name == robot and part != RECORDER and status.level in (ERROR, STALE):
+            return f"{part}: {status.message}"
+    return ""

@@ -1,4 +1,4 @@
-"""One recorded run as arrays: what was true, measured, commanded, applied and reported."""
+"""One recorded run as arrays: what was true, measured, commanded, applied and reported, as far as it can be read."""
 
 from __future__ import annotations
 
@@ -8,7 +8,26 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bags.contents import Bag, json_object, open_bag
+from fulmar_bags.decode import NS, Odometries, Vectors, odometries
+from fulmar_bags.figures import controller_of
+from fulmar_bags.wire_reader import Received, WireReader
+from fulmar_bags.writer import RUN_RECORD
+from fulmar_core.errors import BagError, ConfigError
+from fulmar_core.paths import config_names
+from fulmar_core.rotation import rotate
 from fulmar_core.state import RigidBodyState
+from fulmar_core.tasks import Task, load_recorded_task
+from fulmar_core.topics import (
+    ACTUATORS_STATE,
+    COMMAND,
+    DIAGNOSTICS,
+    METADATA,
+    ODOMETRY,
+    STATUS,
+    TRUTH,
+    VELOCITY_COMMAND,
+)
 
 
 @dataclass(frozen=True)
@@ -87,7 +106,7 @@ class HealthSample:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Everything a bag tells about one run."""
+    """Content of a bag of one run."""
 
     path: Path
     info: dict[str, Any]  # what was asked for
@@ -104,7 +123,7 @@ class RunRecord:
 
     @property
     def actuation(self) -> Actuation:
-        """What was applied; where the bag does not tell, what was commanded."""
+        """What was applied; what was commanded where the bag does not have that."""
         return self.applied if len(self.applied) else self.commanded
 
     @property
@@ -123,3 +142,123 @@ class RunRecord:
         """Newest status of `plant` or `controller`, None if there is none."""
         mine = (sample for sample in reversed(self.health) if sample.name.endswith(f": {part}"))
         return next(mine, None)
+
+
+def read_run(path: Path) -> RunRecord:
+    """Read one run from a bag folder, or a file in it; damaged and missing parts are named in its `warnings`.
+
+    Raises:
+        BagError: There is no bag, it is empty, or Fulmar did not record it.
+    """
+    bag = open_bag(Path(path))
+    if bag.info is None:
+        found = ", ".join(list(bag.topics)[:3]) or "none"
+        raise BagError(
+            f"{bag.files[0]}: no recording of Fulmar: lacks '{RUN_RECORD}', topics: {found}. Give a bag of a run."
+        )
+    return _record(bag, bag.info)
+
+
+def read_any_run(path: Path, *, task: str | None = None, robot: str | None = None) -> RunRecord:
+    """Read a run that Fulmar need not have recorded; its `info` lacks `task` or `robot` where nothing names them.
+
+    Args:
+        path: Bag folder, or a file in it.
+        task: Task of the run; by default that of the bag or its controller.
+        robot: Robot of the run; by default that of the bag or its controller, or the namespace of the odometry.
+
+    Raises:
+        BagError: There is no bag, or nothing of it can be read.
+    """
+    bag = open_bag(Path(path))
+    asked = {"task": task, "robot": robot}
+    return _record(bag, {**_named(bag), **{key: name for key, name in asked.items() if name}})
+
+
+def _named(bag: Bag) -> dict[str, Any]:
+    """Run record of a bag, completed by what its controller and its topics name."""
+    own = {key: value for key, value in (bag.info or {}).items() if value not in (None, "")}
+    controller = controller_of(bag)
+    named = {key: controller[key] for key in ("robot", "task", "controller") if controller.get(key)}
+    if "robot" not in named | own:
+        spaces = {topic.name.split("/")[1] for topic in bag.topics.values() if topic.type == ODOMETRY.type}
+        known = sorted(spaces & set(config_names("robots")))
+        named |= {"robot": known[0]} if len(known) == 1 else {}
+    return named | own
+
+
+def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
+    reader, task = WireReader(bag), _task_of(info.get("task"), bag.path)
+    if not any(len(topic) for topic in bag.topics.values()):
+        reader.warnings.append(f"{bag.files[0].name}: holds no message.")
+    texts = [json_object(message.data) for _, message in reader.messages(METADATA)]
+    obstacles = reader.obstacles()
+    command = VELOCITY_COMMAND if len(bag.of(VELOCITY_COMMAND)) else COMMAND
+    things = reader.things(task)
+    return RunRecord(
+        path=bag.path,
+        info=info,
+        truth=_motion(reader.odometry(TRUTH)),
+        odom=_motion(_measured(reader)),
+        applied=_actuation(reader.vectors(ACTUATORS_STATE)),
+        commanded=_actuation(reader.vectors(command)),
+        goals=tuple(GivenGoal(g.stamp_ns / NS, g.log_ns / NS, g.value.targets) for g in reader.goals(task)),
+        obstacles=obstacles[-1].value if obstacles else np.zeros((0, 3)),
+        things={name: _places(poses) for name, poses in things.items() if poses},
+        controller=next((text for text in reversed(texts) if text), {}),
+        health=_health(reader, bag.name),
+        warnings=tuple(reader.warnings),
+    )
+
+
+def _task_of(name: object, path: Path) -> Task | None:
+    """The task of the run; None where it is not known here."""
+    try:
+        return load_recorded_task(str(name), path)
+    except ConfigError:
+        return None
+
+
+def _measured(reader: WireReader) -> Odometries:
+    """Odometry under the name of the wire; under any other where a bag has one odometry alone."""
+    found = reader.odometry(ODOMETRY)
+    if len(found) or len(reader.bag.of(TRUTH)):
+        return found
+    try:
+        return odometries(reader.bag.odometry())
+    except BagError:
+        return found
+
+
+def _places(poses: tuple[Received, ...]) -> Places:
+    return Places(np.array([each.stamp_ns / NS for each in poses]), np.array([each.value for each in poses]))
+
+
+def _motion(found: Odometries) -> Motion:
+    quat = found.pose[:, 3:]
+    return Motion(
+        stamp_s=found.stamp_ns / NS,
+        log_s=found.log_ns / NS,
+        position=found.pose[:, :3],
+        quat_xyzw=quat,
+        velocity_in_world=rotate(quat, found.twist[:, :3]),
+        yaw_rate=found.twist[:, 5],
+    )
+
+
+def _actuation(found: Vectors) -> Actuation:
+    return Actuation(found.stamp_ns / NS, found.log_ns / NS, found.names, found.values)
+
+
+def _health(reader: WireReader, name: str) -> tuple[HealthSample, ...]:
+    """Diagnostics of a robot's nodes; of all robots, which share one topic, where no name is known."""
+    own = f"{name}: " if name else ""
+    samples = [
+        HealthSample(
+            log_ns / NS, s.name, int(s.level), s.message, {pair.key: pair.value for pair in s.values}
+        )
+        for log_ns, message in reader.messages(STATUS) + reader.messages(DIAGNOSTICS)
+        for s in message.status
+        if s.name.startswith(own)
+    ]
+    return tuple(sorted(samples, key=lambda sample: sample.log_s))

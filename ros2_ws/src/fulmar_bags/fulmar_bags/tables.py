@@ -1,30 +1,79 @@
-"""A bag as files that other programs read: CSV and NumPy."""
+"""A bag as rows of plain numbers and texts, and as CSV and NumPy files of them."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fulmar_bags.contents import Bag, Topic
-from fulmar_bags.flat import Row, columns, rows
+from fulmar_bags.decode import has_header, messages, stamp_of
 from fulmar_core.errors import BagError
+
+MOST_ENTRIES = 64  # of one array in columns of their own; what is longer stays together
+Row = dict[str, Any]  # numbers, texts, and arrays of what is longer
+
+
+def rows(topic: Topic) -> tuple[list[int], list[int], list[Row]]:
+    """Every message that can be read.
+
+    Returns:
+        Times of recording [ns], stamps [ns] (equal to the former where there are none), and fields by path.
+    """
+    stamped = has_header(topic.type)
+    found = messages(topic)
+    logs = [log for log, _ in found]
+    stamps = [stamp_of(message) if stamped else log for log, message in found]
+    return logs, stamps, [dict(_fields(message, "")) for _, message in found]
+
+
+def _fields(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, str | bool | int | float | np.number):
+        yield path, value.item() if isinstance(value, np.number) else value
+        return
+    if isinstance(value, np.ndarray | list | tuple):
+        if len(value) > MOST_ENTRIES:
+            yield from _long(value, path)
+            return
+        for index, entry in enumerate(value):
+            yield from _fields(entry, f"{path}[{index}]")
+        return
+    for name in getattr(value, "__dataclass_fields__", ()):
+        if not name.startswith("__"):
+            yield from _fields(getattr(value, name), f"{path}.{name}" if path else name)
+
+
+def _long(entries: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """A long array as it is; of a long list of messages, one array for each of their fields."""
+    if isinstance(entries, np.ndarray):
+        yield path, entries
+        return
+    together: dict[str, list[Any]] = {}
+    for entry in entries:
+        for name, value in _fields(entry, f"{path}[*]"):
+            together.setdefault(name, []).append(np.atleast_1d(value))
+    for name, values in together.items():
+        yield name, np.concatenate(values)
+
+
+def columns(found: list[Row]) -> list[str]:
+    """Paths of all rows together, in the order in which they first come."""
+    return list(dict.fromkeys(path for row in found for path in row))
+
 
 TIMES = ("log_ns", "stamp_ns")
 
 
 def write_csv(bag: Bag, folder: Path) -> tuple[list[Path], list[str]]:
-    """Write one table for each topic that has messages.
+    """Write one table for each topic that has messages, into a folder that is made.
 
-    Args:
-        bag: The bag.
-        folder: Is made.
+    Columns are the time of recording and the stamp [ns], then every field by its path.
 
     Returns:
-        The files, and what they lack, in words. First two columns: when it was recorded and its stamp [ns]; then every
-        field by its path.
+        The files, and what they lack, in words.
 
     Raises:
         BagError: The bag has no messages.
@@ -57,12 +106,8 @@ def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
     Numbers that a message lacks are NaN; texts are arrays of texts; long arrays, if they are always of one length, are
     rows of one array. Nothing in it needs pickle.
 
-    Args:
-        bag: The bag.
-        path: Of the file; its folder is made.
-
     Returns:
-        The file, and what it lacks, in words.
+        The file, whose folder is made, and what it lacks, in words.
 
     Raises:
         BagError: The bag has no messages.
@@ -77,10 +122,8 @@ def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
         arrays[f"{name}/stamp_ns"] = np.array(stamps, dtype=np.int64)
         for column in columns(found):
             values: list[Any] = [row.get(column) for row in found]
-            if (
-                any(isinstance(value, np.ndarray) for value in values)
-                and len({np.shape(value) for value in values}) > 1
-            ):
+            arrays_among = any(isinstance(value, np.ndarray) for value in values)
+            if arrays_among and len({np.shape(value) for value in values}) > 1:
                 left_out.append(f"{topic.name}: {column}: its length changes.")
                 continue
             arrays[f"{name}/{column}"] = _array(values)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
+from fulmar_bags.mcap_file import BagPart, Topic
 from fulmar_bags.message_types import message_type, offered_qos
 from fulmar_bags.metadata import BagSpan, TopicCount, write_metadata
-from fulmar_bags.part import BagPart, Topic
 from fulmar_core.atomic_write import sync_folder
 from fulmar_core.errors import BagError
 from fulmar_core.topics import Delivery
@@ -23,11 +24,22 @@ RUN_KEY = "run"
 FLUSH_EVERY_S = 0.5
 
 
-class BagWriter:
-    """One bag being written.
+@dataclass(frozen=True, slots=True)
+class BagCounts:
+    """Messages and bytes of a bag so far."""
 
-    The caller drives time: `tick` flushes twice a second, so at most a second is lost with the process.
-    """
+    messages: int = 0  # given
+    on_disk: int = 0  # messages that a reader of the bag finds now
+    files: int = 0  # MCAP files
+    size: int = 0  # of them on disk [bytes]
+
+    def __add__(self, other: BagCounts) -> BagCounts:
+        """Counts of two bags together."""
+        return BagCounts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+
+class BagWriter:
+    """One bag being written; the caller's `tick` flushes twice a second, so a crash loses at most a second."""
 
     def __init__(
         self,
@@ -74,24 +86,10 @@ class BagWriter:
             raise BagError(f"{directory}: cannot write a bag here: {error.strerror}.") from error
 
     @property
-    def messages(self) -> int:
-        """Messages given so far."""
-        return self._written
-
-    @property
-    def messages_on_disk(self) -> int:
-        """Messages that a reader of the bag finds now."""
-        return self._flushed
-
-    @property
-    def files(self) -> int:
-        """MCAP files of the bag so far."""
-        return len(self._finished) + 1
-
-    @property
-    def size(self) -> int:
-        """Bytes of all MCAP files on disk."""
-        return sum(part.size for part in (*self._finished, self._part))
+    def counts(self) -> BagCounts:
+        """Messages and bytes so far."""
+        parts = (*self._finished, self._part)
+        return BagCounts(self._written, self._flushed, len(parts), sum(part.size for part in parts))
 
     @property
     def waiting(self) -> int:
@@ -99,12 +97,7 @@ class BagWriter:
         return self._part.waiting
 
     def add_topic(self, name: str, type_name: str, delivery: Delivery) -> None:
-        """Announce a topic.
-
-        Args:
-            name: Absolute topic name.
-            type_name: Such as `nav_msgs/msg/Odometry`.
-            delivery: How its publishers offer it.
+        """Announce a topic by its absolute name, its type such as `nav_msgs/msg/Odometry`, and its delivery.
 
         Raises:
             BagError: Unknown type.
@@ -134,19 +127,16 @@ class BagWriter:
         )
 
     def attach(self, name: str, data: bytes) -> None:
-        """Carry a file along that was not there at the beginning, in this MCAP file and all that follow."""
+        """Attach a file to this MCAP file and all that follow."""
         self._attachments[name] = data
         self._part.attach(name, data)
 
     def note(self, name: str, text: str) -> None:
-        """Say something about the recording in `custom_data`, with the next flush; the last text of a name stays."""
+        """Write a text into `custom_data` with the next flush; the last text of a name stays."""
         self._notes[name] = text
 
     def tick(self, now: float) -> None:
-        """Flush if the last flush is half a second ago, and begin a new file where one is due; call this often.
-
-        Args:
-            now: Any steady clock [s].
+        """Flush if the last flush is half a second ago, and begin a new file where one is due; `now` is steady [s].
 
         Raises:
             OSError: As `flush`.
@@ -186,7 +176,7 @@ class BagWriter:
         self.flush()
 
     def close(self) -> None:
-        """Write the rest, the index and the final counts, and let go.
+        """Write the rest, the index and the final counts, and close the bag.
 
         Raises:
             OSError: The disk refuses. What it took before stays readable.
@@ -214,10 +204,6 @@ class BagWriter:
 
 
 def check_free(directory: Path) -> None:
-    """Refuse a folder that holds something already.
-
-    Raises:
-        BagError: If it does.
-    """
+    """Raise BagError where a folder is not empty, since bags are never overwritten."""
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         raise BagError(f"{directory} exists already, and bags are never overwritten. Name a new folder.")

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from fulmar_bags.writer import BagCounts
 from fulmar_core.errors import BagError
 
 MAX_QUEUED = 100_000  # messages that may wait for the thread
@@ -29,16 +30,10 @@ RECORDING = "fulmar_recording"  # entry of `custom_data`: JSON of `Account`
 
 
 class Bag(Protocol):
-    """What the thread writes to: a `BagWriter`, a `BagRing` or a `BagPerGoal`."""
+    """Target of the thread: a `BagWriter`, a `BagRing` or a `BagPerGoal`."""
 
     @property
-    def messages(self) -> int: ...  # noqa: D102 - as BagWriter's, all of them
-    @property
-    def messages_on_disk(self) -> int: ...  # noqa: D102
-    @property
-    def size(self) -> int: ...  # noqa: D102
-    @property
-    def files(self) -> int: ...  # noqa: D102
+    def counts(self) -> BagCounts: ...  # noqa: D102 - as of `BagWriter`, all of them
     @property
     def waiting(self) -> int: ...  # noqa: D102
     def write(self, topic: str, data: bytes, *, log_ns: int) -> None: ...  # noqa: D102
@@ -84,18 +79,18 @@ class BagThread:
 
         Args:
             bag: Used by this thread alone from now on.
-            on_error: Told once of each kind of trouble, in one line.
+            on_error: Receives each kind of trouble once, in one line.
             max_queued: Messages that may wait for the thread.
             max_waiting: Bytes that may wait for the thread, and as many for the disk.
         """
-        self._bag, self._tell = bag, on_error
+        self._bag, self._on_error = bag, on_error
         self._max_queued, self._max_waiting = max_queued, max_waiting
         self._queue: queue.SimpleQueue[tuple[str, bytes, int]] = queue.SimpleQueue()
         self._files: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
         self._received = self._put_bytes = self._taken_bytes = 0  # each is changed by one thread alone
         self._crowded_out: Counter[str] = Counter()  # by `put`
         self._refused: Counter[str] = Counter()  # by the thread
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._problem, self._slowest_s = "", 0.0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bag", daemon=True)
@@ -114,7 +109,9 @@ class BagThread:
             or self._put_bytes - self._taken_bytes >= self._max_waiting
         ):
             self._crowded_out[topic] += 1
-            self._tell_once("full", "the disk is too slow and memory is full: further messages are dropped.")
+            self._report_once(
+                "full", "the disk is too slow and memory is full: further messages are dropped."
+            )
             return
         self._put_bytes += len(data)
         self._queue.put((topic, data, log_ns))
@@ -125,22 +122,22 @@ class BagThread:
 
     def account(self, *, complete: bool = False) -> Account:
         """What became of the messages so far; from any thread."""
-        recorded = self._bag.messages_on_disk
+        counts = self._bag.counts
         return Account(
             received=self._received,
-            recorded=recorded,
+            recorded=counts.on_disk,
             waiting=self._put_bytes - self._taken_bytes + self._bag.waiting,
-            size=self._bag.size,
-            files=self._bag.files,
+            size=counts.size,
+            files=counts.files,
             dropped=dict(Counter(dict(self._crowded_out)) + Counter(dict(self._refused))),
-            unwritten=self._bag.messages - recorded,
+            unwritten=counts.messages - counts.on_disk,
             slowest_write_s=self._slowest_s,
             problem=self._problem,
             complete=complete,
         )
 
     def stop(self) -> Account:
-        """Write what waits, close the bag, and say how it went."""
+        """Write what waits, close the bag, and return the final account."""
         self._stop.set()
         self._thread.join()
         return self.account(complete=True)
@@ -169,8 +166,8 @@ class BagThread:
 
     def _note(self, *, complete: bool) -> None:
         account = self.account(complete=complete)
-        told = {"complete": complete, "received": account.received, "dropped": account.dropped}
-        self._bag.note(RECORDING, json.dumps(told))
+        text = {"complete": complete, "received": account.received, "dropped": account.dropped}
+        self._bag.note(RECORDING, json.dumps(text))
 
     def _try(self, action: Callable[[], None]) -> None:
         began = time.monotonic()
@@ -178,19 +175,19 @@ class BagThread:
             action()
         except BagError as error:  # one that cannot begin its next bag
             self._problem = str(error)
-            self._tell_once(self._problem, self._problem)
+            self._report_once(self._problem, self._problem)
         except OSError as error:
             self._problem = f"{_words(error)}: what comes waits in memory"
-            self._tell_once(str(error.errno), self._refusal(error))
+            self._report_once(str(error.errno), self._refusal(error))
         if self._problem and not self._bag.waiting:  # the disk has taken everything
             self._problem = ""
-            self._told.clear()
+            self._reported.clear()
         self._slowest_s = max(self._slowest_s, time.monotonic() - began)
 
-    def _tell_once(self, kind: str, text: str) -> None:
-        if kind not in self._told:
-            self._told.add(kind)
-            self._tell(text)
+    def _report_once(self, kind: str, text: str) -> None:
+        if kind not in self._reported:
+            self._reported.add(kind)
+            self._on_error(text)
 
     def _refusal(self, error: OSError) -> str:
         account = self.account()

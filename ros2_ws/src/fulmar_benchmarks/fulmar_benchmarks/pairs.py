@@ -12,7 +12,7 @@ import fulmar_core
 import policy_server
 import sim_nodes
 from fulmar_benchmarks.unit import Unit
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.errors import BundleError, ConfigError
 from fulmar_core.paths import config_files
 from fulmar_core.policy_bundle import read_passport

@@ -1,4 +1,4 @@
-"""What a bag says about its run: the plan, and the files that made it."""
+"""Run record and attachments of a bag: the plan, and the files that made the run."""
 
 from __future__ import annotations
 
@@ -21,44 +21,28 @@ from policy_server.controllers import controller_entry
 from policy_server.shipped import shipped_policy
 
 if TYPE_CHECKING:
-    from fulmar_bringup.node_table import RunPlan
+    from fulmar_bringup.run_plan import RunPlan
 
 CALIBRATION = "calibration.yaml"  # name of the attachment
 
 
 def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
-    """The plan as the JSON object that the recorder is given.
-
-    Args:
-        plan: What is run.
-        more: What else is known, by name.
-    """
-    return json.dumps(
-        {
-            **{key: value for key, value in asdict(plan).items() if key != "supervised"},
-            "name": plan.robot_name,
-            **(more or {}),
-            "calibration": str(calibration_path() or ""),
-            "fulmar_version": fulmar_version(),
-            "git_revision": git_revision(),
-        }
-    )
+    """The plan, and more entries by name, as the JSON object that the recorder is given."""
+    made_by = {"fulmar_version": fulmar_version(), "git_revision": git_revision()}
+    own = {"name": plan.robot_name, **(more or {}), "calibration": str(calibration_path() or "")}
+    return json.dumps({k: v for k, v in asdict(plan).items() if k != "supervised"} | own | made_by)
 
 
 def attachments(plan: RunPlan) -> str:
-    """Files to carry along, as the JSON object that the recorder is given: paths by name, and what it writes itself."""
-    calibration = calibration_path()
+    """Files to attach, as the JSON object that the recorder is given: paths by name, or the content of YAML files."""
+    calibration, estimator = calibration_path(), plan.guards.estimator
     files = {
         "robot.yaml": config_path("robots", plan.robot),
         **_of_task(plan.task),
         "scenario.yaml": config_path("scenarios", plan.scenario),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
-        **(
-            {"estimator.yaml": config_path("estimators", plan.guards.estimator)}
-            if plan.guards.estimator
-            else {}
-        ),
+        **({"estimator.yaml": config_path("estimators", estimator)} if estimator else {}),
         **({CALIBRATION: calibration} if calibration else {}),
         **_of_controller(plan),
     }
@@ -67,7 +51,7 @@ def attachments(plan: RunPlan) -> str:
 
 
 def effective_system(plan: RunPlan) -> System:
-    """The settings of a run as a file of `configs/systems` would say them, whatever they came from."""
+    """The settings of a run as a file of `configs/systems`."""
     return System(
         f"{plan.robot_name}, {plan.task}, {plan.controller} on {plan.backend}, as it was run",
         *(plan.robot, plan.task, plan.controller, plan.backend),
@@ -87,7 +71,7 @@ def _of_task(name: str) -> dict[str, Path]:
 
 
 def _of_controller(plan: RunPlan) -> dict[str, Path | dict[str, Any]]:
-    """The passport of a policy, which has the hash of its weights; the gains of a law."""
+    """The passport of a policy, which has the hash of its weights, or the gains of a law."""
     entry = controller_entry(plan.controller)
     if entry.is_law:
         robot, law = load_robot(plan.robot), plan.controller

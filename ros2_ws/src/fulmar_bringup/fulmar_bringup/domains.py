@@ -1,4 +1,4 @@
-"""ROS domains that nobody else on this machine uses, for work that must not be mixed with anybody's."""
+"""ROS domains that no other process of this computer uses, and temporary environment variables."""
 
 from __future__ import annotations
 
@@ -7,13 +7,28 @@ import fcntl
 import os
 import random
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TextIO
 
-from fulmar_bringup.environment import environment
 from fulmar_bringup.shared_memory_cleanup import give_back_abandoned_memory
 from fulmar_core.errors import ConfigError
+
+
+@contextlib.contextmanager
+def environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Set variables of this process and the children that it starts, until the context ends."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
 
 LARGEST = 232  # of DDS
 DOMAINS = range(1, 102)  # up to 101 the ports of a domain lie below those that Linux hands out to others
@@ -21,18 +36,12 @@ DOMAINS = range(1, 102)  # up to 101 the ports of a domain lie below those that 
 
 @contextlib.contextmanager
 def reserved_domains(count: int) -> Iterator[list[int]]:
-    """Reserve domains until the context ends.
+    """Reserve `count` domains until the context ends, and give their ids.
 
-    A lock file for each keeps processes of this user apart; it goes with the process, however that ends.
-
-    Args:
-        count: How many, >= 1.
-
-    Yields:
-        Domain ids.
+    A lock file for each keeps processes of this user apart; the lock ends with the process.
 
     Raises:
-        ConfigError: If so many are not free.
+        ConfigError: So many are not free.
     """
     folder = _lock_folder()
     reserved: list[int] = []
@@ -52,15 +61,10 @@ def reserved_domains(count: int) -> Iterator[list[int]]:
 
 @contextlib.contextmanager
 def claimed_domain(name: str) -> Iterator[int]:
-    """Claim a robot's name in the domain of the environment until the context ends; two runs of one name would mix.
+    """Claim a robot's name in the domain of the environment until the context ends, and give the domain id.
 
-    Not the lock of `reserved_domains`: a run may take place in a domain that its parent process reserved for it.
-
-    Args:
-        name: What the robot is called.
-
-    Yields:
-        The domain id.
+    Two runs of one name would mix. Not the lock of `reserved_domains`: a run may take place in a domain that its
+    parent process reserved for it.
 
     Raises:
         ConfigError: Another run of this user has the name in it, or ROS_DOMAIN_ID is no domain.
@@ -82,13 +86,10 @@ def claimed_domain(name: str) -> Iterator[int]:
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[dict[str, str]]:
-    """A domain that nobody else uses, for this process and its children, until the context ends.
-
-    Yields:
-        The environment of the children, which is ours meanwhile.
+    """A reserved domain for this process and its children until the context ends; gives their environment.
 
     Raises:
-        ConfigError: If none is free.
+        ConfigError: None is free.
     """
     with reserved_domains(1) as (number,):
         own = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}

@@ -1,4 +1,4 @@
-"""Which emulator stands in for a hardware file's device, and how driver and emulator find each other."""
+"""The emulator of a hardware file's device, and the wire between driver and emulator."""
 
 from __future__ import annotations
 
@@ -35,24 +35,16 @@ class Emulation:
 
 
 def check_emulated(driver: Driver) -> None:
-    """Refuse a driver whose device no emulator speaks for.
-
-    Raises:
-        ConfigError: It is a class of the user's own.
-    """
+    """Raise ConfigError for a driver of the user's own, whose device has no emulator."""
     if isinstance(driver, OwnDriver):
         raise ConfigError(
-            f"no emulator speaks for the device of your own driver '{driver.kind}'. Leave --emulate out, and let "
+            f"no emulator exists for the device of your own driver '{driver.kind}'. Leave --emulate out, and let "
             "`port:` of the hardware file name an emulator of your own, such as a pseudo-terminal."
         )
 
 
 def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
-    """What stands in for a hardware file's device.
-
-    Args:
-        hardware: The file.
-        folder: Where wires that are files are made.
+    """The emulated device of a hardware file; wires that are files are made in `folder`.
 
     Raises:
         ConfigError: There is none for it.

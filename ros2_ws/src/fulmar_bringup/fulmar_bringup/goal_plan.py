@@ -1,4 +1,4 @@
-"""What follows for a run from a goal file: its task, where it begins, how long it lasts, and the path to show."""
+"""Task, start, duration and shown path of a run, as its goal or goal file asks for."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fulmar_bringup.system import default_hardware
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.errors import ConfigError
@@ -15,15 +16,82 @@ from fulmar_core.goal import PoseTuple
 from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities, load_goals
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
-from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.tasks import Task, load_task
+from policy_server.controllers import CONTROLLERS
+from policy_server.shipped import shipped_policy
+
+POSE, POSITION = "go_to_pose", "go_to_position"
+OPTIONS = {POSE: "--goal x,y,deg", POSITION: "--goal x,y"}
+
+
+def default_task(
+    robot: str,
+    controller: str,
+    backend: str = "mujoco",
+    *,
+    goal: tuple[float, ...] | None = None,
+    policy: Path | None = None,
+) -> str:
+    """Name of the task that a goal asks for: two numbers are a position, three a pose; without a goal it is a pose.
+
+    The goal is x [m], y [m] and, for a pose, heading [deg]; a bundle that was given is checked later.
+
+    Raises:
+        ConfigError: The controller does not do that task with this robot, but another one; with what to say instead.
+    """
+    if backend == "hardware":
+        default_hardware(robot)
+    asked = POSITION if goal is not None and len(goal) == 2 else POSE
+    reason = why_not(robot, asked, controller, policy)
+    if not reason:
+        return asked
+    other = POSE if asked == POSITION else POSITION
+    instead = []
+    if not why_not(robot, other, controller, policy):
+        instead.append(f"--task {other} or {OPTIONS[other]}")
+    if controller != "classical" and not why_not(robot, asked, "classical", None):
+        instead.append("--controller classical")
+    if not instead:
+        return asked  # the plan is refused with the reason, which no other task changes
+    what = "without --task and --goal" if goal is None else f"with --goal {','.join(f'{x:g}' for x in goal)}"
+    raise ConfigError(f"a run {what} is {asked}: {reason} Say {', or '.join(instead)}.")
+
+
+def why_not(robot: str, task: str, controller: str, policy: Path | None) -> str:
+    """Why a controller does not do a task with a robot; empty if it does, or if there is no such controller."""
+    if controller not in CONTROLLERS:
+        return ""
+    entry = CONTROLLERS[controller]
+    try:
+        entry.check(load_robot(robot), load_task(task))
+    except ConfigError as error:
+        return str(error)
+    if entry.runs_bundle and policy is None and shipped_policy(robot, task) is None:
+        return f"no policy is shipped for '{robot}' and '{task}'."
+    return ""
+
+
+def check_heading(task: str, goal: tuple[float, ...]) -> str:
+    """Warning about a heading that a named task does not use; empty if there is none.
+
+    Raises:
+        ConfigError: The task needs a heading, and the goal has none.
+    """
+    wants = load_task(task).goal_topic
+    if len(goal) == 2 and wants == "goal_pose":
+        raise ConfigError(f"task '{task}' needs a heading: --goal x,y,deg. Or use --task {POSITION}.")
+    if len(goal) == 3 and wants == "goal_point":
+        return f"task '{task}' has no heading: the {goal[2]:g} deg of --goal have no effect"
+    return ""
+
 
 DEFAULT_TASKS = {Positions: "go_to_position", Poses: "go_to_pose"}  # all others are about velocities
 SHOWN = 400  # points of a path that a record carries along
 SPARE_S = 5.0  # after everything is done, to see that it stays so
 
 
-def default_task(goals: str) -> str:
+def task_of_goals(goals: str) -> str:
     """Name of the task whose controller takes the goals of a file.
 
     Raises:
@@ -55,14 +123,14 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
     if not fits or task.sees_obstacles or task.things:  # whose surroundings the seed draws
         raise ConfigError(
             f"the goals '{goals}' are no goals of task '{task.name}'. "
-            f"Leave --task out: they are for '{default_task(goals)}'."
+            f"Leave --task out: they are for '{task_of_goals(goals)}'."
         )
     check_pace(file, goals, robot)
     return file
 
 
 def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
-    """Refuse velocities that the robot cannot have, whoever drives it.
+    """Refuse velocities that the robot cannot reach.
 
     Raises:
         ConfigError: They are beyond its top speed or turn rate, or sideways or on the spot where it cannot go so.
@@ -114,7 +182,7 @@ def first_targets(file: GoalFile) -> np.ndarray:
 
 
 def start_of(file: GoalFile) -> PoseTuple | None:
-    """Where to begin; None for places: anywhere about the first of them."""
+    """Start of a run; None for places: the start that the seed draws around the first of them."""
     if isinstance(file, FollowedPath):
         (x, y), (next_x, next_y) = file.planner().points[:2].tolist()
         return x, y, math.degrees(math.atan2(next_y - y, next_x - x))

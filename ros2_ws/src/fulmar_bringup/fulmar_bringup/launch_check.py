@@ -1,4 +1,4 @@
-"""What `system.launch.py` checks before it starts a node."""
+"""Check of `system.launch.py` before it starts a node."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 
-from fulmar_bringup.node_table import NodeSpec
+from fulmar_bringup.run_plan import NodeSpec
 from fulmar_ros.living_plant import PLANT, refuse_living_plant
 from fulmar_ros.middleware import set_up_middleware
 
@@ -17,8 +17,8 @@ from fulmar_ros.middleware import set_up_middleware
 def refuse_living_plants(specs: Iterable[NodeSpec]) -> None:
     """Refuse to start nodes where a plant of one of their namespaces lives already; takes a second.
 
-    The plant would refuse by itself, but by then a second controller has stopped the robot that lives. With security
-    enabled it is left to the plant: the launcher has no enclave to look from.
+    The plant would refuse by itself, but by then a second controller has stopped the running robot. With security
+    enabled the check is left to the plant: the launcher has no enclave.
 
     Raises:
         ConfigError: Another plant lives there; with its name, process and host.

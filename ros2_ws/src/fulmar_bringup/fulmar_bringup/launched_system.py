@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fulmar_bringup.bag_origin import attachments, run_info
-from fulmar_bringup.external import adapter_path, check_external
 from fulmar_bringup.goal_plan import checked_goals, goal_path
-from fulmar_bringup.node_table import NodeSpec, RunPlan
+from fulmar_bringup.plan_checks import adapter_path, check_external
+from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import default_hardware, varied_system
 from fulmar_bringup.system_rows import own_nodes, system_rows
 from fulmar_core.errors import ConfigError
@@ -50,7 +50,7 @@ def list_nodes(
         hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.
-        emulate: `true`: with backend hardware, an emulator speaks for the device.
+        emulate: `true`: with backend hardware, an emulator stands in for the device.
 
     Returns:
         As of `system_rows`. The row of an external controller is not there, or is that of its adapter.

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import is_path_of_places
-from fulmar_bringup.system import NONE, Guards
+from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.motion_filter import load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import Frames, frames_of, namespace_of
+from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
@@ -40,75 +42,10 @@ from fulmar_core.topics import (
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
 
-Parameter = bool | int | float | str | list[float] | list[int] | list[str]
 
-
-@dataclass(frozen=True)
-class NodeSpec:
-    """One process with one node."""
-
-    name: str  # of the node
-    package: str  # ament package
-    executable: str  # script that the package installs
-    module: str  # the same as a Python module
-    namespace: str
-    parameters: dict[str, Parameter] = field(default_factory=dict)
-    quiet: bool = False  # says only what is wrong
-    remappings: dict[str, str] = field(default_factory=dict)  # topics under other names
-    network: str = ""  # namespace of Linux that it runs in; empty: ours
-    inputs: tuple[str, ...] = ()  # topics without which it is of no use
-    outputs: tuple[str, ...] = ()  # topics that it publishes
-    observed: tuple[str, ...] = ()  # topics that it receives if they are there
-
-
-@dataclass(frozen=True)
-class RunPlan:
-    """Everything that one run is started with."""
-
-    robot: str
-    task: str
-    controller: str
-    backend: str
-    control_hz: float  # [Hz]
-    name: str = ""  # what the robot is called; empty: as its type
-    policy: str = ""  # folder of a bundle; empty: the shipped one
-    scenario: str = "nominal"
-    seed: int = 0
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x [m], y [m], heading [deg]
-    duration_s: float = 0.0  # 0: until stopped [s]
-    lockstep: bool = False
-    rate: float = 1.0  # simulated seconds a wall-clock second
-    goals: str = ""  # goal file that a node of its own tells; empty: somebody else gives the goal
-    guards: Guards = NONE
-    supervised: bool = False  # somebody else activates the plant when all are ready
-    hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
-    emulated: bool = False  # an emulator stands in for the device
-    arm: bool = False  # an autopilot may be armed, whatever the hardware file says
-    recording: Recording = Recording()
-    copies: int = 1  # of each command on the wire
-    controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
-    mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
-    remappings: tuple[tuple[str, str], ...] = ()  # topics and their other names, for every node
-    adapter: str = (
-        ""  # hardware file of an adapter, whose commands an external controller speaks; empty: none
-    )
-    adapter_topic: str = ""  # topic that it takes them from; empty: the file's
-    nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
-
-    @property
-    def robot_name(self) -> str:
-        """What the robot is called."""
-        return self.name or self.robot
-
-    @property
-    def namespace(self) -> str:
-        """Namespace of every node and topic of the robot."""
-        return namespace_of(self.robot_name)
-
-    @property
-    def frames(self) -> Frames:
-        """Names of the robot's frames."""
-        return frames_of(self.robot_name, self.robot)
+def _row(plan: RunPlan, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any) -> NodeSpec:
+    """A row of a plan's robot, with its topics renamed; `more` as of `NodeSpec`."""
+    return node_row(plan.namespace, name, module, parameters, remappings=dict(plan.remappings), **more)
 
 
 def controller_spec(plan: RunPlan) -> NodeSpec:
@@ -137,26 +74,24 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         parameters["area"] = list(guards.area)
     if guards.estop:
         parameters["estop"] = True
-    if plan.backend == "hardware" and load_hardware(plan.hardware).has_bearing:
-        parameters["air_bearing"] = True
-    on_hardware = plan.backend == "hardware" and not guards.estimator
-    if on_hardware and not load_hardware(plan.hardware).seen_from_outside:
-        parameters["odometry_may_repeat"] = True  # encoders of a base at rest do; motion capture never does
-    if plan.backend == "mock" or not (
-        plan.backend == "hardware" or load_scenario(plan.scenario).sensor_noise
-    ):
-        parameters["odometry_may_repeat"] = True  # so does a simulation without noise
+    if plan.backend == "hardware":
+        hardware = load_hardware(plan.hardware)
+        if hardware.has_bearing:
+            parameters["air_bearing"] = True
+        # Encoders of a base at rest repeat; motion capture never does.
+        repeats = not guards.estimator and not hardware.seen_from_outside
+    else:  # a simulation without noise repeats, too
+        repeats = plan.backend == "mock" or not load_scenario(plan.scenario).sensor_noise
+    if repeats:
+        parameters["odometry_may_repeat"] = True
     if plan.copies > 1:
         parameters["copies"] = plan.copies
-    return NodeSpec(
+    return _row(
+        plan,
         "controller",
-        "policy_server",
-        "controller_node",
         "policy_server.controller_node",
-        plan.namespace,
         parameters,
         network=plan.controller_network,
-        remappings=dict(plan.remappings),
         inputs=(
             ODOMETRY.name,
             *(wire.name for wire in goal_wires(task.goal_topic)),
@@ -172,14 +107,11 @@ def adapter_spec(plan: RunPlan) -> NodeSpec:
     parameters: dict[str, Parameter] = {"hardware": plan.adapter}
     if plan.adapter_topic:
         parameters["topic"] = plan.adapter_topic
-    return NodeSpec(
+    return _row(
+        plan,
         "adapter",
-        "hardware_drivers",
-        "adapter_node",
         "hardware_drivers.adapter_node",
-        plan.namespace,
         parameters,
-        remappings=dict(plan.remappings),
         outputs=(command_wire(load_robot(plan.robot)).name,),
     )
 
@@ -228,14 +160,11 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             parameters["arm"] = True
         if port:
             parameters["port"] = port
-        return NodeSpec(
+        return _row(
+            plan,
             "plant",
-            "hardware_drivers",
-            "driver_node",
             "hardware_drivers.driver_node",
-            plan.namespace,
             parameters,
-            remappings=dict(plan.remappings),
             inputs=(command_wire(load_robot(plan.robot)).name,),
             outputs=tuple(dict.fromkeys((ACTUATORS_STATE.name, IMU.name, paced_wire(plan).name))),
         )
@@ -243,14 +172,11 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     things = tuple(thing.wire.name for thing in load_task(plan.task).things)
     poses = (MOCAP.name,) if plan.guards.estimator or plan.mocap_hz else ()
     odometry = () if plan.guards.estimator else (ODOMETRY.name,)
-    return NodeSpec(
+    return _row(
+        plan,
         "plant",
-        "sim_nodes",
-        "sim_node",
         "sim_nodes.sim_node",
-        plan.namespace,
         parameters,
-        remappings=dict(plan.remappings),
         inputs=(command_wire(load_robot(plan.robot)).name,),
         outputs=(CLOCK.name, TRUTH.name, ACTUATORS_STATE.name, IMU.name, *odometry, *poses, *things),
     )
@@ -277,14 +203,11 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
         **emulation.more,
     }
     parameters |= _motion_capture(plan)
-    return NodeSpec(
+    return _row(
+        plan,
         "emulator",
-        "sim_nodes",
-        "emulator_node",
         "sim_nodes.emulator_node",
-        plan.namespace,
         parameters,
-        remappings=dict(plan.remappings),
         outputs=(DEVICE_STATE.name, MOCAP.name),
     )
 
@@ -302,16 +225,13 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
     things = load_task(plan.task).things
     usual = asdict(Recording())
     unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
-    return NodeSpec(
+    return _row(
+        plan,
         "recorder",
-        "fulmar_ros",
-        "recorder_node",
         "fulmar_ros.recorder_node",
-        plan.namespace,
         {key: text for key, text in texts.items() if text}
         | unusual
         | ({"things": [thing.name for thing in things]} if things else {}),
-        remappings=dict(plan.remappings),
         observed=tuple(wire.name for wire in (*WIRES, *(thing.wire for thing in things)) if wire.recorded),
     )
 
@@ -325,13 +245,13 @@ def goals_spec(
     control_hz: float = 10.0,
     give_up_s: float = 0.0,
 ) -> NodeSpec:
-    """The node that tells goals from a file; no system has it by itself.
+    """The node that publishes goals from a file; no system has it by itself.
 
     Args:
         robot: Type of the robot that is to do it.
         goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`.
         name: What the robot is called; its type by default.
-        as_path: Tell all positions or poses at once.
+        as_path: Publish all positions or poses at once.
         control_hz: Velocities come so often along a path [Hz].
         give_up_s: Ends with exit code 1 where robot or controller are not there after so long; 0: waits [s].
     """
@@ -343,20 +263,12 @@ def goals_spec(
     }
     if give_up_s:
         parameters["give_up_s"] = give_up_s
-    return NodeSpec(
-        "goals",
-        "fulmar_ros",
-        "goal_node",
-        "fulmar_ros.goal_node",
-        namespace_of(name or robot),
-        parameters,
-        inputs=(ODOMETRY.name,),
-        outputs=tuple(GOAL_WIRES),
-    )
+    wires = {"inputs": (ODOMETRY.name,), "outputs": tuple(GOAL_WIRES)}
+    return node_row(namespace_of(name or robot), "goals", "fulmar_ros.goal_node", parameters, **wires)
 
 
 def run_goals_spec(plan: RunPlan) -> NodeSpec:
-    """The node that tells the goals of a run, for as long as the run lasts."""
+    """The node that publishes the goals of a run, for as long as the run lasts."""
     spec = goals_spec(
         plan.robot,
         plan.goals,
@@ -378,48 +290,19 @@ def teleop_spec(robot: str, *, name: str = "", keyboard: bool = True, share: flo
         share: Of full command.
     """
     parameters: dict[str, Parameter] = {"robot": robot, "keyboard": keyboard, "share": share}
-    return NodeSpec(
-        "teleop",
-        "fulmar_ros",
-        "teleop_node",
-        "fulmar_ros.teleop_node",
-        namespace_of(name or robot),
-        parameters,
-        outputs=(TELEOP.name,),
-        observed=(JOY.name,),
-    )
+    wires = {"outputs": (TELEOP.name,), "observed": (JOY.name,)}
+    return node_row(namespace_of(name or robot), "teleop", "fulmar_ros.teleop_node", parameters, **wires)
 
 
 def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
     """The nodes that a plan's guards ask for."""
-    space, parameters = plan.namespace, {"robot": plan.robot}
     nodes = []
     if plan.guards.estop:
         nodes.append(
-            NodeSpec(
-                "estop",
-                "fulmar_ros",
-                "estop_node",
-                "fulmar_ros.estop_node",
-                space,
-                dict(parameters),
-                remappings=dict(plan.remappings),
-                outputs=(ESTOP.name,),
-            )
+            _row(plan, "estop", "fulmar_ros.estop_node", {"robot": plan.robot}, outputs=(ESTOP.name,))
         )
     if plan.guards.estimator:
-        chosen: dict[str, Parameter] = {**parameters, "estimator": plan.guards.estimator}
-        nodes.append(
-            NodeSpec(
-                "estimator",
-                "fulmar_ros",
-                "estimator_node",
-                "fulmar_ros.estimator_node",
-                space,
-                chosen,
-                remappings=dict(plan.remappings),
-                inputs=(MOCAP.name, IMU.name),
-                outputs=(ODOMETRY.name,),
-            )
-        )
+        chosen = {"robot": plan.robot, "estimator": plan.guards.estimator}
+        wires = {"inputs": (MOCAP.name, IMU.name), "outputs": (ODOMETRY.name,)}
+        nodes.append(_row(plan, "estimator", "fulmar_ros.estimator_node", chosen, **wires))
     return tuple(nodes)

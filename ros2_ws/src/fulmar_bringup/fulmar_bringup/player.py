@@ -1,4 +1,4 @@
-"""Puts a bag back onto ROS: the very bytes that were recorded, in the order and at the pace of the run."""
+"""Plays a bag into ROS: the recorded bytes, in the order and at the pace of the run."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from fulmar_bags.contents import Bag, Topic
@@ -22,9 +20,8 @@ from fulmar_bags.decode import stamps_ns
 from fulmar_core.errors import BagError, ConfigError, UnknownNameError
 from fulmar_core.topics import CLOCK, ODOMETRY, WIRES
 from fulmar_ros.convert import stamp_of
-from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import ros_node
 
 NS = 1_000_000_000
 CLOCK_HZ = 100.0  # of what we publish: rclpy suffers from a faster one
@@ -34,7 +31,7 @@ GOODBYE_S = 0.3  # for the last messages to arrive
 
 @dataclass(frozen=True)
 class Schedule:
-    """What to publish when."""
+    """Messages and when to publish them."""
 
     times_ns: list[int]  # on the timeline of the run, rising
     topics: list[str]  # of each message
@@ -48,7 +45,7 @@ class Schedule:
 
 
 def schedule(bag: Bag, *, topics: Sequence[str] | None = None, start_s: float = 0.0) -> Schedule:
-    """Lay the messages of a bag out in time.
+    """Times of the messages of a bag.
 
     The timeline is that of the stamps in the odometry where there are any, so that a lock-step run, which was recorded
     as fast as the machine went, plays at its own pace; else the time of recording.
@@ -79,7 +76,7 @@ def schedule(bag: Bag, *, topics: Sequence[str] | None = None, start_s: float = 
     kept = [
         (max(time_ns, begin), name, index)
         for time_ns, _, name, index in every
-        # What holds until something else comes is told also where it came before the start.
+        # Latched messages from before the start are published at the start.
         if time_ns >= begin or bag.relative(name) in latched
     ]
     by_name = {topic.name: topic for topic in chosen}
@@ -111,16 +108,16 @@ def _timeline(bag: Bag) -> Any:
     stamps = stamps_ns(topic) if len(topic) > 1 else None
     if stamps is None or (np.diff(stamps) < 0).any():
         return int
-    new = np.concatenate(([True], np.diff(stamps) > 0))  # the same measurement told again tells no time
+    new = np.concatenate(([True], np.diff(stamps) > 0))  # a repeated measurement marks no time
     stamps = stamps[new]
     if len(stamps) < 2:
         return int
     logs = [log for log, kept in zip(topic.log_ns, new, strict=True) if kept]
 
     def run_time(log_ns: int) -> int:
-        """Whole numbers throughout: nanoseconds since the epoch are too many for a float.
+        """In whole numbers, since a float cannot hold nanoseconds since the epoch.
 
-        The run is as long as its odometry: what came before, while nodes started, is told at its beginning.
+        The run is as long as its odometry; messages from before, while nodes started, are published at its beginning.
         """
         after = bisect.bisect_left(logs, log_ns)
         if after == 0:
@@ -136,7 +133,7 @@ def _timeline(bag: Bag) -> Any:
 
 @dataclass(frozen=True)
 class Played:
-    """What was done."""
+    """Result of playing."""
 
     messages: int
     rounds: int
@@ -154,11 +151,11 @@ def play(
     wait_s: float = 0.5,
     stop: threading.Event | None = None,
 ) -> Played:
-    """Publish a schedule.
+    """Publish a schedule of a bag.
 
     Args:
         plan: From `schedule`.
-        bag: Says the types.
+        bag: Has the types.
         rate: Seconds of the run in a wall-clock second, > 0.
         loop: Begin again at the end, until stopped. Time then jumps back, which begins a new epoch in a controller.
         clock: Publish `/clock`, the time of the run.
@@ -169,25 +166,19 @@ def play(
         BagError: No type of any topic is installed.
     """
     stop = stop or threading.Event()
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("bag_player")
-    try:
-        with spinning(node, lambda _error: stop.set()):
-            publishers, left_out = _publishers(node, plan, bag)
-            player = _Player(plan, publishers, node if clock else None, rate, stop)
-            stop.wait(wait_s)
-            rounds = 0
-            while not stop.is_set():
-                player.play_once()
-                rounds += 1
-                if not loop:
-                    break
-            time.sleep(GOODBYE_S)
-            late = player.late_ms
-            return Played(player.count, rounds, left_out, float(np.percentile(late, 99)) if late else 0.0)
-    finally:
-        rclpy.try_shutdown()
+    with ros_node("bag_player", lambda _error: stop.set()) as node:
+        publishers, left_out = _publishers(node, plan, bag)
+        player = _Player(plan, publishers, node if clock else None, rate, stop)
+        stop.wait(wait_s)
+        rounds = 0
+        while not stop.is_set():
+            player.play_once()
+            rounds += 1
+            if not loop:
+                break
+        time.sleep(GOODBYE_S)
+        late = player.late_ms
+        return Played(player.count, rounds, left_out, float(np.percentile(late, 99)) if late else 0.0)
 
 
 def _publishers(node: Node, plan: Schedule, bag: Bag) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -243,7 +234,7 @@ class _Player:
                 self.count += 1
 
     def _wait_for(self, time_ns: int, began_ns: int) -> bool:
-        """Wait until a time of the run; false if it was stopped meanwhile."""
+        """Wait until a time of the run; False if stopped meanwhile."""
         due = began_ns + round((time_ns - self._plan.begin_ns) / self._rate)
         ahead_s = (due - time.monotonic_ns()) / 1e9
         if ahead_s > 0.0 and self._stop.wait(ahead_s):

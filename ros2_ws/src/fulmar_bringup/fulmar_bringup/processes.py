@@ -1,7 +1,6 @@
-"""Child processes: started together, output prefixed, stopped in order, never left behind.
+"""Child processes of a run: output prefixed, stopped in order, never left behind.
 
-psutil does the process work: of the kept libraries it alone lets us stop in an order of our own and reach
-processes that no longer listen.
+psutil stops them in an order of our own and reaches processes that no longer react.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import IO
 
 import psutil
 
-from fulmar_bringup.node_table import NodeSpec, Parameter
+from fulmar_bringup.run_plan import NodeSpec, Parameter
 from fulmar_ros.middleware import middleware_environment
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
@@ -47,11 +46,7 @@ class ProcessGroup:
     """The children of one run."""
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
-        """Begin without children.
-
-        Args:
-            environment: Of every child, on top of ours.
-        """
+        """Begin without children, whose environment is ours and what is given."""
         self._environment = {**os.environ, **child_environment(), **(environment or {})}
         self._children: dict[str, psutil.Popen] = {}
         self._relays: dict[str, _Relay] = {}
@@ -83,21 +78,14 @@ class ProcessGroup:
         return None
 
     def stop(self, *names: str) -> list[Ended]:
-        """Stop some children and wait for them: asked first, then killed.
-
-        Args:
-            names: Which; those that have ended already are reported too.
-
-        Returns:
-            How each ended.
-        """
+        """Stop children by name, asked first, then killed; returns how each ended, also before."""
         chosen = [(name, self._children[name]) for name in names if name in self._children]
         killed: set[int] = set()
         # Not SIGINT: it ends a node that still imports its modules with a traceback, SIGTERM without a word.
         for number, patience_s in ((signal.SIGTERM, PATIENCE_S), (signal.SIGKILL, 2.0)):
             alive = [child for _, child in chosen if child.poll() is None]
             for child in alive:
-                # A stopped process hears nothing but the last signal.
+                # A stopped process only reacts to SIGKILL.
                 chosen_number = signal.SIGKILL if child.status() == psutil.STATUS_STOPPED else number
                 if chosen_number == signal.SIGKILL:
                     killed.add(child.pid)
@@ -110,16 +98,11 @@ class ProcessGroup:
         return [Ended(name, child.poll(), forced=child.pid in killed) for name, child in chosen]
 
     def stop_all(self) -> list[Ended]:
-        """Stop every child that is left: newest first, so that the recorder sees the others' last words."""
+        """Stop every child that is left, newest first, so that the recorder gets the last messages of the others."""
         return [end for name in reversed(list(self._children)) for end in self.stop(name)]
 
     def last_words(self, name: str, *, ended: bool = False) -> str:
-        """The last line that a child has printed, without what ROS puts before a log message.
-
-        Args:
-            name: Of the child.
-            ended: It has ended, and what it left in the pipe is waited for.
-        """
+        """Last line that a child printed, without the log prefix of ROS; of one that `ended` the pipe is drained."""
         if ended:
             self._relays[name].join(LAST_WORDS_S)
         text = self._relays[name].last_line
@@ -171,7 +154,7 @@ class _Relay(threading.Thread):
             if not text:
                 continue
             self.last_line = text
-            # Nobody may listen any more, but a pipe that is not emptied would hold the child up.
+            # The terminal may be gone, but a pipe that is not emptied would block the child.
             with contextlib.suppress(OSError, ValueError, AttributeError):
                 sys.stderr.write(f"[{self._child}] {text}\n")
                 sys.stderr.flush()

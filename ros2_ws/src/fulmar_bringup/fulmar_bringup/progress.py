@@ -18,25 +18,13 @@ from fulmar_bringup.console import console
 
 
 def step_bar(what: str, total: int) -> contextlib.AbstractContextManager[Callable[[float], None]]:
-    """Show progress towards a number of control steps.
-
-    Args:
-        what: One word for the work.
-        total: Steps in all.
-
-    Returns:
-        A context that gives a function to call with the steps done so far.
-    """
+    """Progress of some work of `total` control steps: a context whose function receives the steps done so far."""
     return _bar(what, total, TextColumn("{task.completed:,} of {task.total:,} steps"), TimeRemainingColumn())
 
 
 @contextlib.contextmanager
 def live_line() -> Iterator[Callable[[float, float | None, str], None]]:
-    """Show one line about a system without a planned end.
-
-    Returns:
-        A context that gives a function to call with the time [s], the distance from the goal [m] and the mode.
-    """
+    """One line about a system without planned end; the function receives time [s], distance from goal [m], mode."""
     with Progress(TextColumn("{task.description}"), console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=None)
         yield lambda time_s, distance_m, mode: bar.update(
@@ -51,15 +39,7 @@ def state_words(distance_m: float | None, mode: str) -> str:
 
 @contextlib.contextmanager
 def time_bar(what: str, total_s: float) -> Iterator[Callable[..., None]]:
-    """Show progress through simulated time.
-
-    Args:
-        what: One word for the work.
-        total_s: Simulated time in all [s].
-
-    Returns:
-        A context that gives a function to call with the time that has passed [s] and, if there are any, a few words.
-    """
+    """Progress through `total_s` of simulated time [s]; the function receives the time passed [s] and a few words."""
     columns = (
         TextColumn(what),
         BarColumn(),
@@ -74,14 +54,7 @@ def time_bar(what: str, total_s: float) -> Iterator[Callable[..., None]]:
 
 @contextlib.contextmanager
 def work_bar(what: str) -> Iterator[Callable[[float, float], None]]:
-    """Show progress through work of several kinds.
-
-    Args:
-        what: One word for the work.
-
-    Returns:
-        A context that gives a function to call with what is done so far, and of how much.
-    """
+    """Progress of work of several kinds; the function receives how much is done so far, and of how much."""
     columns = (TextColumn(what), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task(what, total=None)

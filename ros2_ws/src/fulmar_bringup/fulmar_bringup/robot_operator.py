@@ -1,4 +1,4 @@
-"""A person's side of a system that runs already: asks its services, from a process of its own."""
+"""A person's side of a system that runs already: finds robots, asks their services, looks at their wires."""
 
 from __future__ import annotations
 
@@ -7,36 +7,64 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from fulmar_bringup.reset_robots import release_without_node, robots_to_reset
-from fulmar_bringup.running_robots import running_robots, unfit_publishers
-from fulmar_bringup.stop_robots import ANSWER_S, Answer, Stopped, spaces_with, stop_robots
+from fulmar_bringup.estop_robots import (
+    ANSWER_S,
+    Answer,
+    Stopped,
+    release_without_node,
+    robots_to_reset,
+    spaces_with,
+    stop_robots,
+)
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot_name import namespace_of
-from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP
-from fulmar_ros.command_writers import full_name
-from fulmar_ros.middleware import set_up_middleware
-from fulmar_ros.node_robot import heard_words
+from fulmar_core.topics import ESTOP_RESET, JOY, STATUS, SWAP, WIRES, Wire
+from fulmar_core.wire_check import wire_problems
+from fulmar_ros.graph import full_name, offers_of, robot_namespaces, running_robots_text
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import ros_node
 
-FIND_S = 7.0  # whose first announcements are lost announces himself again after 3 s
+DISCOVER_S = 1.5  # until the nodes of the domain have found this one
+
+
+def running_robots(node: Node, *, find_s: float = DISCOVER_S) -> set[str]:
+    """Namespaces with a plant or a controller, after some time to find them."""
+    time.sleep(find_s)
+    return robot_namespaces(node)
+
+
+def unfit_publishers(node: Node, spaces: set[str]) -> list[str]:
+    """Publishers on the wires of robots from which nothing arrives, one sentence each."""
+    return [
+        problem
+        for space in sorted(spaces)
+        for wire in WIRES
+        if not wire.name.startswith("/")
+        for problem in _of_wire(node, wire, f"{space.rstrip('/')}/{wire.name}")
+    ]
+
+
+def _of_wire(node: Node, wire: Wire, topic: str) -> list[str]:
+    reliable = wire.source == "operator" and wire is not JOY
+    return wire_problems(wire, topic, offers_of(node, topic), reliable=reliable)
+
+
+FIND_S = 7.0  # a node whose first announcements are lost announces itself again after 3 s
 LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
 ASK_AGAIN_S = 0.5  # a controller says at once that it has a request
 
 
 class Operator:
-    """Finds robots by what they offer, and asks."""
+    """Finds robots by their services, and calls these."""
 
     def __init__(self, node: Node) -> None:
-        """Ask through a node that spins already."""
+        """Call through a node that spins already."""
         self._node = node
 
     def robots_with(self, service: str, robot: str | None, *, wait_s: float) -> list[str]:
@@ -48,33 +76,19 @@ class Operator:
                 found &= {namespace_of(robot)}
             if time.monotonic() > until or (found and robot is not None):
                 return sorted(found)
-            if found:  # who is found first is rarely alone: the others get a moment
+            if found:  # the first one is rarely alone: the others get a moment
                 until = min(until, time.monotonic() + SETTLE_S)
             time.sleep(LOOK_S)
 
     def ask(self, service: str) -> tuple[bool, str]:
-        """Call a Trigger service by its full name.
-
-        Returns:
-            Whether it was done, and what was said.
-
-        Raises:
-            RunFailed: No answer comes.
-        """
+        """Call a Trigger service by its full name; raises RunFailed where no answer comes."""
         answer = self.ask_all([service])[service]
         if answer is None:
-            raise RunFailed(f"nobody answers on {service} within {ANSWER_S:g} s.")
+            raise RunFailed(f"no node answers on {service} within {ANSWER_S:g} s.")
         return answer
 
     def ask_all(self, services: Sequence[str]) -> dict[str, Answer | None]:
-        """Call Trigger services by their full names, all at once.
-
-        Args:
-            services: Which.
-
-        Returns:
-            What each said; None where no answer comes within 2 s.
-        """
+        """Call Trigger services by their full names, all at once; None where no answer comes within 2 s."""
         clients = {service: self._node.create_client(Trigger, service) for service in services}
         futures: dict[str, Future] = {}
         until = time.monotonic() + ANSWER_S
@@ -104,9 +118,9 @@ class Operator:
         }
         return came | {space: release_without_node(self._node, space) for space in sorted(without)}
 
-    def heard_words(self) -> str:
-        """A sentence that lists the robots that are heard now."""
-        return heard_words(self._node)
+    def running_robots_text(self) -> str:
+        """A sentence that lists the robots that run now."""
+        return running_robots_text(self._node)
 
     def look_at_wires(self) -> tuple[set[str], list[str]]:
         """Namespaces of the robots that run here, and publishers on their wires from which nothing arrives."""
@@ -144,7 +158,7 @@ class Operator:
         while not (status and self._takes_swaps(space)):
             if time.monotonic() > until:
                 raise RunFailed(
-                    f"no controller of '{robot}' is heard in this ROS domain. {self.heard_words()}"
+                    f"no controller of '{robot}' runs in this ROS domain. {self.running_robots_text()}"
                 )
             time.sleep(LOOK_S)
         before, until, asked_s = status.get("swap_requests"), time.monotonic() + answer_s, 0.0
@@ -170,12 +184,6 @@ class Operator:
 @contextlib.contextmanager
 def operator() -> Iterator[Operator]:
     """An operator whose node spins until the context ends."""
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     errors: list[Exception] = []
-    node = rclpy.create_node(f"operator_{os.getpid()}")
-    try:
-        with spinning(node, errors.append):
-            yield Operator(node)
-    finally:
-        rclpy.try_shutdown()
+    with ros_node(f"operator_{os.getpid()}", errors.append) as node:
+        yield Operator(node)

@@ -14,13 +14,18 @@ from typing import Any
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.domains import claimed_domain
-from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
 from fulmar_bringup.goal_plan import is_endless, shown_path
-from fulmar_bringup.node_table import NodeSpec, RunPlan
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import state_words, time_bar
-from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, raise_if_ended, while_starting
+from fulmar_bringup.readiness import (
+    CONTROLLER_AND_RECORDER,
+    raise_if_ended,
+    wait_for_publisher,
+    wait_for_reader,
+    while_starting,
+)
+from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_bringup.system_rows import system_rows
@@ -36,8 +41,8 @@ from policy_server.controllers import controller_entry
 
 STOPPED = "stopped by the user"
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
-SILENT_S = 2.0  # a controller that has said nothing for so long hangs, in real time
-PLANT_SILENT_S = 3.0  # the same for a plant, which says something once a second
+SILENT_S = 2.0  # a controller without a status for so long hangs, in real time
+PLANT_SILENT_S = 3.0  # the same for a plant, which publishes its status once a second
 LOCKSTEP_SILENT_S = 10.0  # in lock step both are busy, and a plant itself waits 5 s for an answer
 
 
@@ -87,7 +92,8 @@ def _run(request: RunRequest, watch: Watch) -> Execution:
     failure, plant, ends = "", Report(), list[Ended]()
     folders = contextlib.ExitStack()
     try:
-        wires_folder = Path(folders.enter_context(_wires_folder()))
+        folder = tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
+        wires_folder = Path(folders.enter_context(folder))  # for the wires of an emulator that are files
         specs = list(system_rows(plan, record=_recording(request), wires_folder=wires_folder).values())
         for spec in specs:
             group.start(spec)
@@ -123,19 +129,12 @@ def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
     They start while discovery looks for others, so that the look costs no time. It ends before they are up.
     """
     group.stop(*(spec.name for spec in specs))
-    shutil.rmtree(
-        record, ignore_errors=True
-    )  # it did not exist before; a recorder that was quick has made it
-
-
-def _wires_folder() -> tempfile.TemporaryDirectory[str]:
-    """A folder for the wires of an emulator that are files."""
-    return tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
+    shutil.rmtree(record, ignore_errors=True)  # absent before; a quick recorder may have made it
 
 
 def _with_ends(failure: str, ends: list[Ended]) -> str:
-    """Add the children that did not end well when they were asked to, unless the failure speaks of them already."""
-    # SIGTERM itself ends a child only before it can listen, and then nothing is lost.
+    """Add the children that did not end well when they were stopped, unless the failure names them already."""
+    # SIGTERM itself ends a child only before its handler is installed, and then nothing is lost.
     bad = [end for end in ends if end.returncode not in (0, -signal.SIGTERM)]
     if failure:
         bad = [end for end in bad if end.name not in failure and not end.forced]
@@ -230,13 +229,9 @@ def silence_limits_s(plan: RunPlan) -> tuple[float, float]:
 
 
 def raise_if_silent(name: str, report: Report, limit_s: float) -> None:
-    """Give up on a node that has reported and then fell silent for longer than a limit [s].
-
-    Raises:
-        RunFailed: It has.
-    """
-    silent_s = time.monotonic() - report.heard
-    if report.heard and silent_s > limit_s:
+    """Raise RunFailed for a node that has reported and then fell silent for longer than a limit [s]."""
+    silent_s = time.monotonic() - report.received_s
+    if report.received_s and silent_s > limit_s:
         raise RunFailed(f"{name}: has not reported for {silent_s:.1f} s; it hangs")
 
 
@@ -250,16 +245,9 @@ def with_plant_reaction(reason: str, overseer: Supervisor) -> str:
 
 def _recording(request: RunRequest) -> dict[str, str]:
     plan = request.plan
-    more = {
-        "goal": list(request.goal) if request.goal else None,
-        "command": request.command,
-        **_of_goals(plan),
-    }
-    return {
-        "directory": str(request.record),
-        "info": run_info(plan, more),
-        "files": attachments(plan),
-    }
+    goal = list(request.goal) if request.goal else None
+    info = run_info(plan, {"goal": goal, "command": request.command, **_of_goals(plan)})
+    return {"directory": str(request.record), "info": info, "files": attachments(plan)}
 
 
 def _of_goals(plan: RunPlan) -> dict[str, Any]:

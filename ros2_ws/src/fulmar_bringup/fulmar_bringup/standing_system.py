@@ -9,10 +9,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.external_ready import wait_for_publisher, wait_for_reader
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import RunRequest, chosen_recording, plan_run
 from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.readiness import raise_if_ended, wait_for_publisher, wait_for_reader, while_starting
 from fulmar_bringup.run_executor import (
     LAST_WORDS_S,
     STOPPED,
@@ -22,7 +21,7 @@ from fulmar_bringup.run_executor import (
     silence_limits_s,
     with_plant_reaction,
 )
-from fulmar_bringup.starting import raise_if_ended, while_starting
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor
 from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
@@ -104,7 +103,7 @@ def plan_system(
 
 @dataclass(frozen=True)
 class Ending:
-    """How a system came down."""
+    """How a system ended."""
 
     failure: str  # why it failed; empty where it was stopped
     watchdog_trips: int | None  # of the plant; None where it has not reported any number
@@ -116,7 +115,7 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
     Args:
         request: Of `plan_system`.
         emit: Called with each event; see `SystemEvents`. The first is `started`.
-        show: Called several times a second with what a person wants to see.
+        show: Called several times a second with time, distance and mode.
 
     Returns:
         How it ended.
@@ -154,7 +153,7 @@ def _who(plan: RunPlan) -> dict[str, Any]:
 
 
 def _get_ready(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
-    """Wait for the controller, give it what stands about, and start the plant."""
+    """Wait for the controller, publish the obstacles, and start the plant."""
     external = controller_entry(plan.controller).is_external
     if external:
         wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))

@@ -1,6 +1,6 @@
-"""The operator's side of a run: gives goal and obstacles, starts the plant when all are ready, and watches.
+"""The operator's side of a run: publishes goal and obstacles, starts the plant when all are ready, and watches.
 
-The only module of the bringup that speaks ROS while a run is on. What came of the run is read from its bag.
+The only module of the bringup that uses ROS during a run. The result of the run is read from its bag.
 """
 
 from __future__ import annotations
@@ -12,15 +12,13 @@ from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, field
 from functools import partial
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.safety.estop import HOLDS, SILENT
@@ -28,16 +26,14 @@ from fulmar_core.tasks import load_task
 from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
-from fulmar_ros.late_subscribers import LateSubscribers
+from fulmar_ros.graph import offers_of
 from fulmar_ros.living_plant import refuse_living_plant, sees_living_plant
-from fulmar_ros.middleware import set_up_middleware
-from fulmar_ros.operator_subscription import SUBSCRIPTIONS
+from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
-from fulmar_ros.wire_watch import offers_of
+from fulmar_ros.runtime import ros_node
 
 START_TIMEOUT_S = 30.0
-TELL_AGAIN_S = 0.5  # after an e-stop was silent, before the goal is told once more
+REPEAT_S = 0.5  # after an e-stop was silent, before the goal is published again
 SUBSCRIBES_S = 1.0  # for an external controller that publishes already to subscribe its goal
 STOP_S = 1.0  # for a plant to come to rest when a run is stopped
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
@@ -50,20 +46,21 @@ class Report:
     level: str = "ok"
     message: str = ""
     values: dict[str, str] = field(default_factory=dict)
-    heard: float = 0.0  # monotonic [s]
+    received_s: float = 0.0  # when, by a monotonic clock; 0: nothing yet [s]
 
 
 class Supervisor:
     """Operator of one robot."""
 
-    def __init__(self, node: Node, plan: RunPlan) -> None:
-        """Listen to plant and controller of the plan's robot."""
+    def __init__(self, node: Node, plan: RunPlan, errors: list[Exception] | None = None) -> None:
+        """Listen to plant and controller of the plan's robot; `errors` gets what a callback raises."""
         task = load_task(plan.task)
         self._node, self._plan, self._task = node, plan, task
         self._made_s = time.monotonic()
         self.plant, self.controller, self.recorder = Report(), Report(), Report()
         self._changed = threading.Condition()
-        self._error: Exception | None = None
+        self._errors: list[Exception] = [] if errors is None else errors
+        self.fail = self._errors.append  # gives up the wait of whoever waits
         wire = GOAL_WIRES[task.goal_topic]
         self._goal = node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
         self._sent: list[GoalMessage] = []  # of the current goal
@@ -79,28 +76,21 @@ class Supervisor:
         node.create_subscription(
             DiagnosticArray,
             DIAGNOSTICS.name,
-            self._hear,
+            self._on_diagnostics,
             subscriber_qos(DIAGNOSTICS, reliable=True, depth=10),
         )
-        node.create_subscription(DiagnosticArray, STATUS.name, self._hear, subscriber_qos(STATUS))
+        node.create_subscription(DiagnosticArray, STATUS.name, self._on_diagnostics, subscriber_qos(STATUS))
         self._plant_service = node.create_client(ChangeState, "plant/change_state")
 
     def sees_living_plant(self) -> bool:
-        """Whether a plant of this robot is at work already; call before ours is configured.
-
-        Returns as soon as one is seen, and otherwise when this node has had `DISCOVERY_S` to discover others.
-        """
+        """Whether a plant of this robot runs already, within `DISCOVERY_S`; call before ours is configured."""
         return sees_living_plant(self._node, self._plan.namespace, since_s=self._made_s)
 
     def refuse_living_plant(self) -> None:
-        """Refuse to go on where a plant of this robot is at work already, unless it is dead.
-
-        Raises:
-            ConfigError: With its name, process and host.
-        """
+        """Raise ConfigError, with name, process and host, where a plant of this robot runs already."""
         refuse_living_plant(self._node, self._plan.namespace, since_s=self._made_s, spins=True)
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             parts = {"plant": self.plant, "controller": self.controller, "recorder": self.recorder}
             part = parts.get(status.name.removeprefix(f"{self._plan.robot_name}: "))
@@ -112,7 +102,7 @@ class Supervisor:
                 )
                 part.message = status.message
                 part.values = {pair.key: pair.value for pair in status.values}
-                part.heard = time.monotonic()
+                part.received_s = time.monotonic()
                 self._changed.notify_all()
 
     def give_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None], listeners: int = 1) -> None:
@@ -120,12 +110,12 @@ class Supervisor:
 
         A recorder may find this operator later than the controller does, and a short run would be over by then.
 
-        Velocities that follow one another are all sent now, stamped with the time when each begins: what a controller
-        tracks then hangs on the plant's clock alone.
+        Velocities in sequence are all sent now, each stamped with its begin, so that tracking depends on the plant's
+        clock alone.
 
-        An e-stop that was silent for a moment, as on a busy computer that starts many nodes, makes the controller
-        refuse the goal or forget it. It was not pressed, and nothing has moved yet: it is given again, stamped a
-        nanosecond later, since a repetition with the same stamp counts for nothing.
+        An e-stop that was silent for a moment, as on a busy computer, makes the controller refuse or forget the goal.
+        It was not pressed, and nothing has moved yet: the goal is published again, stamped a nanosecond later, since a
+        repetition with the same stamp does not count.
 
         Args:
             goal: The goal, without a batch axis.
@@ -144,12 +134,12 @@ class Supervisor:
         def found() -> bool:
             return all(wire.get_subscription_count() >= SUBSCRIPTIONS * listeners for wire in wires)
 
-        while not (self._told(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
+        while not (self._publish_parts(parts, stamps, alive) and self._before_silence(found, stamps, alive)):
             parts = [(part, stamp + 1) for part, stamp in parts]
             stamps = {stamp for _, stamp in parts}
             self.wait_until(lambda: not self._reason.startswith(SILENT), alive)
             self._raise_if_pressed()
-            time.sleep(TELL_AGAIN_S)
+            time.sleep(REPEAT_S)
             self._raise_if_pressed()
 
     @property
@@ -162,13 +152,13 @@ class Supervisor:
         if self._reason.startswith(HOLDS) and not self._reason.startswith(SILENT):
             raise RunFailed(f"the controller refused the goal: {self._reason}")
 
-    def _told(
+    def _publish_parts(
         self, parts: Sequence[tuple[Goal, int]], stamps_ns: Set[int], alive: Callable[[], None]
     ) -> bool:
-        """Publish goals, each when the controller has the one before; False if a silent e-stop came between."""
+        """Publish goals, each once the controller has the one before; False if a silent e-stop came between."""
         self._sent = []
         for part, stamp in parts:
-            self.controller.values.pop("goal_refused", None)  # of what was told before
+            self.controller.values.pop("goal_refused", None)  # of earlier goals
             self._sent.append(goal_message(part, self._task.goal_topic, stamp, self._plan.frames))
             self._goal.publish(self._sent[-1])
             if not self._before_silence(partial(self._has, stamp), stamps_ns, alive):
@@ -176,7 +166,7 @@ class Supervisor:
         return True
 
     def _has(self, stamp_ns: int) -> bool:
-        """Whether the controller says that it has the goal of a time."""
+        """Whether the controller reports the goal of a stamp."""
         return self.controller.values.get("goal_stamp_ns") == str(stamp_ns)
 
     def _before_silence(
@@ -206,14 +196,9 @@ class Supervisor:
             self._obstacles.publish(self._sent_obstacles[0])
 
     def publish_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
-        """Publish a goal, with the obstacles if the task has any, to a controller that reports nothing.
+        """Publish a goal, and obstacles if the task has any, to a controller that reports nothing; as `give_goal`.
 
-        The recorder has found this operator by then. A controller that subscribes later receives both all the same.
-
-        Args:
-            goal: The goal, without a batch axis.
-            time_ns: As of `give_goal`.
-            alive: Called while waiting; raises to give up.
+        The recorder has found this operator by then, and a controller that subscribes later receives both, too.
         """
         self.wait_until(lambda: self._goal.get_subscription_count() >= SUBSCRIPTIONS, alive)
         until_s = time.monotonic() + SUBSCRIBES_S  # one that takes its goal from elsewhere never subscribes
@@ -276,32 +261,17 @@ class Supervisor:
         return (self.plant.message if self.plant.level == "error" else last_words()) or "it gave no reason"
 
     def wait_until(self, condition: Callable[[], bool], alive: Callable[[], None]) -> None:
-        """Wait for something that the nodes say.
-
-        Args:
-            condition: Looked at whenever a node said something.
-            alive: Called ten times a second; raises to give up.
-        """
+        """Wait for a condition, checked with each report; `alive` runs ten times a second and raises to give up."""
         with self._changed:
             while not self._changed.wait_for(condition, 0.1):
-                if self._error is not None:
-                    raise RunFailed(f"the supervisor failed: {self._error!r}") from self._error
+                if self._errors:
+                    raise RunFailed(f"the supervisor failed: {self._errors[0]!r}") from self._errors[0]
                 alive()
-
-    def fail(self, error: Exception) -> None:
-        """A callback of ours raised this; whoever waits is told."""
-        self._error = error
 
 
 @contextlib.contextmanager
 def supervisor(plan: RunPlan) -> Iterator[Supervisor]:
     """A supervisor of a plan's robot that listens in a thread of its own until the context ends."""
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("supervisor", namespace=plan.namespace)
-    try:
-        overseer = Supervisor(node, plan)
-        with spinning(node, overseer.fail):
-            yield overseer
-    finally:
-        rclpy.try_shutdown()
+    errors: list[Exception] = []
+    with ros_node("supervisor", errors.append, namespace=plan.namespace) as node:
+        yield Supervisor(node, plan, errors)

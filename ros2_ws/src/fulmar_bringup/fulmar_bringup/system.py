@@ -1,4 +1,4 @@
-"""What one can start: a robot, a task, a controller and a backend, as read from `configs/systems`."""
+"""Systems of `configs/systems`: a robot, a task, a controller and a backend."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BACKENDS = (*SIMULATED, "hardware")
 
 @dataclass(frozen=True)
 class Guards:
-    """What watches over a system, and what feeds it, beside what every system has."""
+    """Safety functions and estimator of a system, beside what every system has."""
 
     estimator: str | None = (
         None  # file of configs/estimators: odometry comes from poses and inertial readings
@@ -176,26 +176,14 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
 
 
 def gains_note(robot: str, controller: str | None) -> str:
-    """What to say where a law drives a robot with default gains; empty where none does.
-
-    Args:
-        robot: The robot.
-        controller: Name of a controller; None where there is none.
-
-    Raises:
-        ConfigError: As of `gains_of`.
-    """
+    """Note on a control law with default gains; empty for other controllers, or None. Raises as `gains_of`."""
     if controller is None or not controller_entry(controller).is_law:
         return ""
     return default_gains_note(load_robot(robot), controller)
 
 
 def default_hardware(robot: str, asked: str | None = None) -> str:
-    """The hardware file to use, as a path.
-
-    Args:
-        robot: The robot.
-        asked: A name of `configs/hardware`, or a path that ends in `.yaml`; by default the robot's own file.
+    """Path of the hardware file, by a name of `configs/hardware` or a path; by default the robot's own.
 
     Raises:
         ConfigError: There is none, it has a mistake, or it is of another robot.
@@ -226,12 +214,7 @@ def default_control_hz(robot: str, task: str, controller: str, backend: str) -> 
 def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:
     """Guards of the matching system file; where there is none, nothing in simulation, and on hardware an e-stop.
 
-    Where motion capture alone knows where a robot is, an estimator makes odometry of it.
-
-    Args:
-        controller: Name of the controller.
-        backend: Name of the backend.
-        hardware: Hardware file, where the backend is hardware.
+    Where the pose comes from motion capture alone, an estimator makes odometry of it.
     """
     system = system_of(controller, backend)
     if system is not None:

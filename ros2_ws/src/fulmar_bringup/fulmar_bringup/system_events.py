@@ -1,4 +1,4 @@
-"""What happens to a running system, as events made of what its plant and controller report. Knows no ROS."""
+"""Events of a running system, from the reports of its plant and controller. Knows no ROS."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Reported(Protocol):
     level: str
     message: str
     values: dict[str, str]
-    heard: float  # when it came, by a monotonic clock [s]
+    received_s: float  # when, by a monotonic clock [s]
 
 
 class SystemEvents:
@@ -33,18 +33,12 @@ class SystemEvents:
     """
 
     def __init__(self, emit: Emit) -> None:
-        """Begin with nothing known.
-
-        Args:
-            emit: Called with each event.
-        """
+        """Begin with nothing known; `emit` is called with each event."""
         self._emit = emit
         self._goals, self._goal_s = "0", 0.0
         self._refused = ("", "0")
         self._done = 0
-        self._inside_s: float | None = (
-            None  # since when the robot is at its goal; infinite once that is reported
-        )
+        self._inside_s: float | None = None  # since when the robot is at its goal; infinite once reported
         self._controller: tuple[str, str] | None = None
         self._swap = ""
         self._held = False
@@ -52,12 +46,9 @@ class SystemEvents:
         self._faults: dict[str, str] = {}
 
     def look(self, plant: Reported, controller: Reported, time_s: float) -> None:
-        """Compare the newest reports with those before.
+        """Compare the newest reports with those before; `time_s` is the robot's own time [s].
 
-        Args:
-            plant: Of the plant.
-            controller: Of the controller; empty values where it reports nothing.
-            time_s: The robot's own time [s].
+        A controller that reports nothing has empty values.
         """
         self._look_at_estop(plant, time_s)
         if controller.values:
@@ -72,8 +63,8 @@ class SystemEvents:
         if controller.values.get("mode") == "armed":
             self._acts_since = None
         elif self._acts_since is None:
-            self._acts_since = controller.heard
-        return self._acts_since is not None and plant.heard - self._acts_since > ARRIVES_S
+            self._acts_since = controller.received_s
+        return self._acts_since is not None and plant.received_s - self._acts_since > ARRIVES_S
 
     def _look_at_estop(self, plant: Reported, time_s: float) -> None:
         held = plant.message.startswith(HOLDS)

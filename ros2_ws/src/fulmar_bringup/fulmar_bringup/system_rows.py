@@ -1,4 +1,4 @@
-"""The rows of a system: every node of a plan, in the order of its start, with whom each one waits for.
+"""The rows of a system: every node of a plan, in the order of its start, and the subscribers that each waits for.
 
 `fulmar run`, `fulmar up`, the launch file, `evaluate --through ros`, the fault suite, re-runs through a node and the
 benchmarks start these rows, or some of them.
@@ -10,10 +10,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from fulmar_bringup.emulation import emulation_of
+from fulmar_bringup.emulation import Emulation, emulation_of
 from fulmar_bringup.node_table import (
-    NodeSpec,
-    RunPlan,
     commander_specs,
     emulator_spec,
     guard_specs,
@@ -22,6 +20,7 @@ from fulmar_bringup.node_table import (
     recorder_spec,
     run_goals_spec,
 )
+from fulmar_bringup.run_plan import NodeSpec, RunPlan, node_row
 from fulmar_bringup.system import System
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.robot import load_robot
@@ -37,6 +36,7 @@ def system_rows(
     *,
     record: Mapping[str, str] | None = None,
     wires_folder: Path | None = None,
+    emulation: Emulation | None = None,
     port: str = "",
 ) -> dict[str, NodeSpec]:
     """Every row of a plan.
@@ -45,6 +45,7 @@ def system_rows(
         plan: What to run.
         record: Of the recorder: arguments of `recorder_spec`; None: nothing is recorded.
         wires_folder: Where the wires of an emulated device that are files are made.
+        emulation: Emulated device, in the place of the one that the hardware file describes.
         port: Where a device is, in the place of what the hardware file says.
 
     Returns:
@@ -55,8 +56,9 @@ def system_rows(
     """
     rows = [recorder_spec(plan, **record)] if record is not None else []
     if plan.emulated:
-        assert wires_folder is not None
-        emulation = emulation_of(load_hardware(plan.hardware), wires_folder)
+        if emulation is None:
+            assert wires_folder is not None
+            emulation = emulation_of(load_hardware(plan.hardware), wires_folder)
         rows.append(emulator_spec(plan, emulation))
         port = port or emulation.port
     rows += [plant_spec(plan, port=port), *guard_specs(plan), *commander_specs(plan)]
@@ -69,17 +71,9 @@ def system_rows(
 
 def own_nodes(system: System) -> tuple[NodeSpec, ...]:
     """Rows of the nodes that a system file names beside those that every system has."""
+    space = namespace_of(system.name or system.robot)
     return tuple(
-        NodeSpec(
-            node.name,
-            node.module.partition(".")[0],
-            node.module.rpartition(".")[2],
-            node.module,
-            namespace_of(system.name or system.robot),
-            dict(node.parameters),
-            inputs=node.inputs,
-            outputs=node.outputs,
-        )
+        node_row(space, node.name, node.module, node.parameters, inputs=node.inputs, outputs=node.outputs)
         for node in system.nodes
     )
 

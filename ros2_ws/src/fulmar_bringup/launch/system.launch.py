@@ -11,7 +11,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import NodeSpec
+from fulmar_bringup.run_plan import NodeSpec
 
 ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",
@@ -24,8 +24,8 @@ ARGUMENTS = {
     "policy": "folder of a policy bundle",
     "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
     "topic": "topic that the adapter takes, in the place of the file's",
-    "emulate": "true: with backend hardware, an emulator speaks for the device",
-    "goals": "a file of configs/goals, without .yaml, that a node of its own tells",
+    "emulate": "true: with backend hardware, an emulator stands in for the device",
+    "goals": "a file of configs/goals, without .yaml, that a node of its own publishes",
 }
 
 

@@ -95,30 +95,6 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
     path.write_text(head + yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
 
 
-def use_calibration(path: Path | None, robot: str) -> None:
-    """Let this process, and whatever it starts from now on, load a robot as calibrated.
-
-    Args:
-        path: The file; None changes nothing.
-        robot: Whom it shall be for.
-
-    Raises:
-        ConfigError: It cannot be read, is for another robot, or says what this robot does not have.
-    """
-    if path is None:
-        return
-    from fulmar_core.robot import load_robot
-
-    calibration = load_calibration(path)
-    if calibration.robot != robot:
-        raise ConfigError(
-            f"{path} is for '{calibration.robot}', not for '{robot}'. Identify '{robot}' first."
-        )
-    os.environ.pop(VARIABLE, None)
-    calibrated(load_robot(robot), calibration)
-    os.environ[VARIABLE] = str(path.absolute())
-
-
 def calibration_path() -> Path | None:
     """The file in use, if there is one."""
     text = os.environ.get(VARIABLE, "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.calibration import calibrated, calibration_in_use
+from fulmar_core.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
 from fulmar_core.config import load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError
@@ -240,6 +241,28 @@ def load_robot(name: str) -> Robot:
         return calibrated(robot, calibration)
     except ValueError as error:
         raise ConfigError(f"the calibration of '{name}': {error}") from None
+
+
+def use_calibration(path: Path | None, robot: str) -> None:
+    """Let this process, and whatever it starts from now on, load a robot as calibrated.
+
+    Args:
+        path: The file; None changes nothing.
+        robot: Whom it shall be for.
+
+    Raises:
+        ConfigError: It cannot be read, is for another robot, or says what this robot does not have.
+    """
+    if path is None:
+        return
+    calibration = load_calibration(path)
+    if calibration.robot != robot:
+        raise ConfigError(
+            f"{path} is for '{calibration.robot}', not for '{robot}'. Identify '{robot}' first."
+        )
+    os.environ.pop(VARIABLE, None)
+    calibrated(load_robot(robot), calibration)
+    os.environ[VARIABLE] = str(path.absolute())
 
 
 def _check_spans(robot: Robot, path: Path) -> None:

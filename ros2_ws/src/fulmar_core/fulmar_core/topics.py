@@ -21,6 +21,9 @@ ESTOP_TRIGGER, ESTOP_RESET, GIVE_BACK = "estop/trigger", "estop/reset", "teleop/
 # Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
 SIMULATION_START_NS = 1_000_000_000
 
+# Shares of full command, or m/s, rad/s and rad: by the kind of actuator, as docs/topics.md lists them.
+EFFORT_UNIT = "of each actuator, see above"
+
 
 @dataclass(frozen=True)
 class Wire:
@@ -39,6 +42,8 @@ class Wire:
     content: str  # for people
     recorded: bool = True
     latest: int = 1  # messages that late subscribers of a latched wire still get
+    unit: str = "none"  # of the message's numbers, for people
+    frame: str = "none"  # that they are given in, for people
 
 
 ODOMETRY = Wire(
@@ -47,7 +52,9 @@ ODOMETRY = Wire(
     "plant",
     "stream",
     "every plant tick",
-    "measured pose in `odom` and twist in `base_link`, stamped at measurement",
+    "measured pose and twist, stamped at measurement",
+    unit="m, m/s, rad/s",
+    frame="`odom`; twist in `base_link`",
 )
 IMU = Wire(
     "imu/data",
@@ -56,6 +63,8 @@ IMU = Wire(
     "stream",
     "every plant tick",
     "specific force (+g at rest) and turn rate; no orientation",
+    unit="m/s², rad/s",
+    frame="`imu_link`",
 )
 MOCAP = Wire(
     "mocap/pose",
@@ -64,6 +73,8 @@ MOCAP = Wire(
     "best_effort",
     "every capture, where an estimator runs or `mocap_hz` is set",
     "pose as motion capture reports it, Z up, stamped at capture or a constant time after",
+    unit="m",
+    frame="`odom`, `map` or `world`",
 )
 TRUTH = Wire(
     "ground_truth/odom",
@@ -71,7 +82,9 @@ TRUTH = Wire(
     "plant",
     "stream",
     "every plant tick",
-    "the simulator's own state; never read by a deployed controller",
+    "true state of the simulator; never read by a deployed controller",
+    unit="m, m/s, rad/s",
+    frame="`map`; twist in `base_link`",
 )
 ACTUATORS_STATE = Wire(
     "actuators/state",
@@ -79,7 +92,8 @@ ACTUATORS_STATE = Wire(
     "plant",
     "stream",
     "every plant tick",
-    "what was really applied, after limits and watchdog; `effort` by actuator name",
+    "command that was applied, after limits and watchdog; `effort` by actuator name",
+    unit=EFFORT_UNIT,
 )
 ACTUATORS_HEALTH = Wire(
     "actuators/health",
@@ -87,7 +101,8 @@ ACTUATORS_HEALTH = Wire(
     "controller",
     "stream",
     "control rate, from a controller that estimates it",
-    "share of its thrust that each valve gives by the controller's own estimate, 0 to 1; `effort` by actuator name",
+    "the controller's estimate of each valve's thrust; `effort` by actuator name",
+    unit="share of nominal thrust, 0 to 1",
 )
 CLOCK = Wire(
     "/clock",
@@ -96,6 +111,7 @@ CLOCK = Wire(
     "best_effort",
     "every plant tick, at most 200 Hz",
     "simulated time",
+    unit="s, ns",
 )
 COMMAND = Wire(
     "actuators/command",
@@ -104,6 +120,7 @@ COMMAND = Wire(
     "stream",
     "control rate",
     "`effort` by actuator name, stamped as the observation it answers",
+    unit=EFFORT_UNIT,
 )
 OBSERVATION = Wire(
     "controller/observation",
@@ -111,7 +128,9 @@ OBSERVATION = Wire(
     "controller",
     "stream",
     "control rate",
-    "the very vector that the controller was fed; names are its terms",
+    "input vector of the controller; names are its terms",
+    unit="of each term, see [observations.md](observations.md)",
+    frame="of each term",
 )
 ACTION = Wire(
     "controller/action",
@@ -119,7 +138,8 @@ ACTION = Wire(
     "controller",
     "stream",
     "control rate",
-    "the very vector that the controller gave, before limits",
+    "output vector of the controller, before limits",
+    unit=EFFORT_UNIT,
 )
 METADATA = Wire(
     "controller/metadata",
@@ -127,7 +147,7 @@ METADATA = Wire(
     "controller",
     "latched",
     "at load",
-    "JSON: which controller this is, with the SHA-256 of what defines it",
+    "JSON: name of the controller and SHA-256 of its definition",
 )
 STATUS = Wire(
     "controller/status",
@@ -136,6 +156,7 @@ STATUS = Wire(
     "latched",
     "on change and at least 2 Hz",
     "mode, reason, ages, latencies, overruns, rejections",
+    unit="in the name of each value",
 )
 DIAGNOSTICS = Wire(
     "/diagnostics",
@@ -152,6 +173,8 @@ GOAL_POSE = Wire(
     "latched",
     "on demand",
     "goal with heading, as RViz's 2D Goal Pose publishes it",
+    unit="m",
+    frame="`odom`",
 )
 GOAL_POINT = Wire(
     "goal_point",
@@ -160,6 +183,8 @@ GOAL_POINT = Wire(
     "latched",
     "on demand",
     "goal without heading",
+    unit="m",
+    frame="`odom`",
 )
 GOAL_PATH = Wire(
     "goal_path",
@@ -167,7 +192,9 @@ GOAL_PATH = Wire(
     "operator",
     "latched",
     "on demand",
-    "waypoints in their order; after the last one the first comes again",
+    "waypoints in order, repeated from the first after the last",
+    unit="m",
+    frame="`odom`",
 )
 GOAL_POSES = Wire(
     "goal_poses",
@@ -176,6 +203,8 @@ GOAL_POSES = Wire(
     "latched",
     "on demand",
     "the same as `goal_path`, for publishers of PoseArray",
+    unit="m",
+    frame="`odom`",
 )
 GOAL_VELOCITY = Wire(
     "goal_velocity",
@@ -183,8 +212,10 @@ GOAL_VELOCITY = Wire(
     "operator",
     "latched",
     "on demand",
-    "velocity and turn rate to track, in `base_link`; holds until the next one; a stamp ahead says when it begins",
+    "velocity and turn rate to track until the next one; a stamp in the future says when it begins",
     latest=100,
+    unit="m/s, rad/s",
+    frame="`base_link`",
 )
 OBSTACLES = Wire(
     "obstacles",
@@ -192,7 +223,9 @@ OBSTACLES = Wire(
     "operator",
     "latched",
     "on demand",
-    "cylinders in `odom` to keep off; `scale.x` is the diameter",
+    "cylinders to avoid; `scale.x` is the diameter",
+    unit="m",
+    frame="`odom`",
 )
 
 
@@ -204,7 +237,9 @@ def thing_wire(name: str) -> Wire:
         "plant",
         "stream",
         f"with each odometry, where there is a {name}",
-        f"place of the {name}, stamped as the odometry",
+        f"pose of the {name}, stamped as the odometry",
+        unit="m",
+        frame="`odom`",
     )
 
 
@@ -223,7 +258,8 @@ DEVICE_STATE = Wire(
     "plant",
     "stream",
     "every physics step of an emulated device",
-    "what an emulated device does by itself, whoever is dead; `effort` by actuator name",
+    "actuator state inside an emulated device, also after its driver died; `effort` by actuator name",
+    unit=EFFORT_UNIT,
 )
 ESTOP = Wire(
     "estop",
@@ -231,23 +267,24 @@ ESTOP = Wire(
     "operator",
     "latched",
     "10 Hz, where there is one",
-    "true, once and from any publisher: nothing moves until a reset; silence of an e-stop node says the same",
+    "true, once and from any publisher, stops the robot until a reset; so does the silence of an e-stop node",
 )
 ESTOP_RELEASED = Wire(
     "estop/released",
     "std_msgs/msg/String",
     "operator",
     "stream",
-    "once a reset",
-    "a reset of the e-stop succeeded; the data names the node that reset it",
+    "once per reset",
+    "name of the node that reset the e-stop",
 )
 TELEOP = Wire(
     "teleop/command",
     "sensor_msgs/msg/JointState",
     "operator",
     "stream",
-    "20 Hz while a person has the robot",
-    "a person's command, `effort` by actuator name; goes before the controller's until it is given back",
+    "20 Hz while a person drives",
+    "a person's command, `effort` by actuator name; overrides the controller until control is given back",
+    unit=EFFORT_UNIT,
 )
 JOY = Wire(
     "joy",
@@ -256,6 +293,7 @@ JOY = Wire(
     "stream",
     "10 Hz and more, where there is a gamepad",
     "axes and buttons of a gamepad, for teleoperation",
+    unit="-1 to 1",
 )
 SWAP = Wire(
     "controller/swap",
@@ -263,7 +301,7 @@ SWAP = Wire(
     "operator",
     "stream",
     "on demand",
-    "folder of the policy bundle to go on with; `controller/status` tells what came of it",
+    "folder of the policy bundle to load; `controller/status` reports the result",
 )
 VELOCITY_COMMAND = Wire(
     "cmd_vel",
@@ -271,15 +309,19 @@ VELOCITY_COMMAND = Wire(
     "controller",
     "stream",
     "control rate",
-    "for robots that take speed and turn rate: `linear.x` and `angular.z`, stamped as the observation it answers",
+    "command of a differential drive: `linear.x` and `angular.z`, stamped as the observation it answers",
+    unit="m/s, rad/s",
+    frame="`base_link`",
 )
 TRANSFORMS = Wire(
     "/tf",
     "tf2_msgs/msg/TFMessage",
     "device",
     "stream",
-    "as its publishers like",
-    "frames, recorded where tf2_msgs is installed; nothing that controls needs them",
+    "of its publishers",
+    "frames, recorded where tf2_msgs is installed; not used for control",
+    unit="m",
+    frame="each its own",
 )
 
 WIRES: tuple[Wire, ...] = (

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_core.errors import ConfigError
 from fulmar_core.identification.drives import Drive, drive_of
 from fulmar_core.robot import Robot, load_robot

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episodes

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.run_reader import read_run
-from fulmar_bags.run_record import Actuation, Motion, RunRecord
-from fulmar_bringup.external_ready import command_input
+from fulmar_bags.run_record import Actuation, Motion, RunRecord, read_run
 from fulmar_bringup.planning import RunRequest
+from fulmar_bringup.readiness import command_input
 from fulmar_bringup.run_executor import Execution, execute
 from fulmar_core.errors import FulmarError
 from fulmar_evaluation.run_summary import summarise

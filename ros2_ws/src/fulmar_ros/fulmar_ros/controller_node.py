@@ -29,17 +29,15 @@ from fulmar_core.safety.fallback import Standby
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ODOMETRY
-from fulmar_ros.control_beat import ControlBeat
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
+from fulmar_ros.convert import OdometryReader, VectorReader
+from fulmar_ros.deadline import ControlBeat
+from fulmar_ros.fallback import MakeController, PolicySwap, line_up, load_other
 from fulmar_ros.goal_messages import GoalMessage
-from fulmar_ros.line_up import MakeController, line_up, load_other
-from fulmar_ros.node_robot import own_frames
-from fulmar_ros.parameters import read_parameters
-from fulmar_ros.policy_swap import PolicySwap
+from fulmar_ros.graph import WireWatch
+from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.wire_readers import OdometryReader, VectorReader
-from fulmar_ros.wire_watch import WireWatch
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 SAFE_REPEATS = 5
@@ -55,7 +53,7 @@ class ControllerNode(LifecycleNode):
         *,
         cli_args: list[str] | None = None,
     ) -> None:
-        """Read the parameters and, unless told otherwise, start.
+        """Read the parameters and, unless `autostart` is off, start.
 
         Args:
             make_controller: Loads the controller; called at configuration.
@@ -70,7 +68,7 @@ class ControllerNode(LifecycleNode):
         self.robot = load_robot(self.settings.robot)
         self.task = load_task(self.settings.task)
         self._make_controller, self._request_exit = make_controller, request_exit
-        self._speaking = threading.Lock()  # held from the look at whether commands may go out until one has
+        self._sending = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
         self.guard: GuardedLoop | None = None  # while configured
         self._estop = EstopMonitor(required=self.settings.estop)  # a press outlives a new configuration
@@ -130,7 +128,7 @@ class ControllerNode(LifecycleNode):
         self.wires.publish_metadata(succession.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
-        self._status_timer = self.create_timer(PERIOD_S / 4, self._tell_idle_status)
+        self._status_timer = self.create_timer(PERIOD_S / 4, self._publish_idle_status)
         return DONE
 
     @property
@@ -153,7 +151,7 @@ class ControllerNode(LifecycleNode):
         self._beat.renew()
         settle_memory()
         if not self.settings.lockstep:
-            self._beat.start(self._step, lambda: self._speak(self.wires.repeat_command), self._fail)
+            self._beat.start(self._step, lambda: self._send(self.wires.repeat_command), self._fail)
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -174,13 +172,13 @@ class ControllerNode(LifecycleNode):
         if self.guard is not None:
             self._fall_silent()
             self._status.repeat()
-            self._tell_status()
+            self._publish_status()
 
     def _fall_silent(self) -> None:
         self._guarded.set(activated=False)
         self._beat.halt()
         newest = self._guarded.newest
-        with self._speaking:
+        with self._sending:
             for _ in range(SAFE_REPEATS):
                 self.wires.publish_safe(newest.stamp_ns if newest else 0)
         self.wires.flush()
@@ -194,15 +192,15 @@ class ControllerNode(LifecycleNode):
 
     def _on_estop(self, message: Bool) -> None:
         self._estop.receive(bool(message.data), time.monotonic_ns())
-        self._tell_status()
+        self._publish_status()
 
     def _on_estop_released(self, _message: String) -> None:
         self._estop.release(time.monotonic_ns())
-        self._tell_status()
+        self._publish_status()
 
     def _on_swap(self, message: String) -> None:
         self._swap.ask(message.data)
-        self._tell_status()  # at once: an operator repeats the request until then
+        self._publish_status()  # at once: an operator repeats the request until then
 
     def _load(self, folder: str) -> Standby:
         return load_other(self._make_controller, self.robot, self.task, self.settings, folder)
@@ -218,7 +216,7 @@ class ControllerNode(LifecycleNode):
             problem = self._guarded.take_goal(goal, stamp_ns(message.header.stamp), time.monotonic_ns())
         if problem:
             self.get_logger().warning(f"goal refused: {problem}")
-        self._tell_status()
+        self._publish_status()
         self._go_on()
 
     def _on_obstacles(self, message: MarkerArray) -> None:
@@ -228,7 +226,7 @@ class ControllerNode(LifecycleNode):
             return
         stamp = stamp_ns(message.markers[0].header.stamp) if message.markers else 0
         self._guarded.take_obstacles(discs, stamp)
-        self._tell_status()
+        self._publish_status()
 
     def _on_thing(self, name: str, message: PoseStamped) -> None:
         pose, problem = thing_of(message, self._frames)
@@ -247,7 +245,7 @@ class ControllerNode(LifecycleNode):
 
     def _on_bearing(self, message: Bool) -> None:
         self._guarded.take_bearing(bool(message.data))
-        self._tell_status()
+        self._publish_status()
         self._go_on()
 
     def _go_on(self) -> None:
@@ -321,7 +319,7 @@ class ControllerNode(LifecycleNode):
             self._give_up(f"the controller raised {type(error).__name__}: {error}", stamp)
             return
         speaks = step is not None or decision.mode is not Mode.IDLE
-        if speaks and not self._speak(partial(self.wires.publish_command, command, stamp)):
+        if speaks and not self._send(partial(self.wires.publish_command, command, stamp)):
             return
         self._status.steps += 1
         if step is not None:
@@ -329,7 +327,7 @@ class ControllerNode(LifecycleNode):
             self._publish_estimate(stamp)
             if guard.note(step.refusal):
                 self._announce()
-        self._tell_status(decision)
+        self._publish_status(decision)
 
     def _act(self, guard: GuardedLoop, inputs: Inputs) -> Step:
         began = time.perf_counter_ns()
@@ -337,12 +335,12 @@ class ControllerNode(LifecycleNode):
         self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
         return step
 
-    def _speak(self, publish: Callable[[], None]) -> bool:
+    def _send(self, publish: Callable[[], None]) -> bool:
         """Publish a command, and say so, if commands may still go out.
 
         What a controller that hung comes up with after all must not follow the safe command of the end.
         """
-        with self._speaking:
+        with self._sending:
             activated = self.guard is not None and self.guard.flags.activated  # a step may outlive its guard
             if activated:
                 publish()
@@ -360,14 +358,14 @@ class ControllerNode(LifecycleNode):
 
     def _give_up(self, reason: str, stamp: int) -> None:
         """Command what is safe; let the fallback go on, or, where there is none, latch a fault and end the process."""
-        if not self._speak(partial(self.wires.publish_command, self.robot.actuators.safe_command, stamp)):
+        if not self._send(partial(self.wires.publish_command, self.robot.actuators.safe_command, stamp)):
             return
         if self._guarded.fall_back(reason):
             self.get_logger().error(reason)
             self._announce()
         else:
             self._fail(reason)
-        self._tell_status()
+        self._publish_status()
 
     def _fail(self, reason: str) -> None:
         """Latch a fault and end the process; its last words are what is safe."""
@@ -375,16 +373,16 @@ class ControllerNode(LifecycleNode):
         self._guarded.set(latched_fault=reason)
         self._request_exit(FAILED)
 
-    def _tell_idle_status(self) -> None:
+    def _publish_idle_status(self) -> None:
         """Publish the status where no control step does it."""
         self._status.wire_problems = self._wire_watch.look()
         flags = self._guarded.flags
         if self.settings.lockstep or not flags.activated or flags.latched_fault:
-            self._tell_status()
+            self._publish_status()
 
-    def _tell_status(self, decision: Decision | None = None) -> None:
+    def _publish_status(self, decision: Decision | None = None) -> None:
         guard = self._guarded
-        self._status.tell(
+        self._status.publish(
             self.wires.health,
             decision or guard.decide(time.monotonic_ns()),
             guard,

@@ -1,4 +1,4 @@
-"""What a controller node tells of itself on `controller/status` and `/diagnostics`."""
+"""Status of a controller node on `controller/status` and `/diagnostics`."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from fulmar_core.health.beliefs import Beliefs
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.deadline import Deadlines, Spread
+from fulmar_ros.fallback import PolicySwap
 from fulmar_ros.health import Health
-from fulmar_ros.policy_swap import PolicySwap
 
 PERIOD_S = 0.4  # at least 2 Hz
 
 
 class ControllerStatus:
-    """Publishes when something changed, and at least twice a second.
+    """Status of a controller.
 
     Attributes:
         steps: Control steps so far.
@@ -25,7 +25,7 @@ class ControllerStatus:
     """
 
     def __init__(self, swap: PolicySwap, *, goals_streamed: bool) -> None:
-        """Report changes of policies too; goals that are streamed are no news each."""
+        """Report swaps of policies too; streamed goals count as no change."""
         self._swap, self._goals_streamed = swap, goals_streamed
         self.steps = 0
         self.inference_ms = Spread()
@@ -34,10 +34,10 @@ class ControllerStatus:
         self._said_at = 0.0
 
     def repeat(self) -> None:
-        """Say it the next time whether or not anything changes."""
+        """Publish the next time whether or not anything changed."""
         self._said_at = 0.0
 
-    def tell(
+    def publish(
         self,
         health: Health,
         decision: Decision,
@@ -46,14 +46,9 @@ class ControllerStatus:
         *,
         beliefs: Beliefs,
     ) -> None:
-        """Publish, if it is time to.
+        """Publish on `health`, on change and at least twice a second.
 
-        Args:
-            health: Where to.
-            decision: Of the arbiter, for now.
-            guard: Has the controller, its inputs and its goal.
-            deadlines: The beat.
-            beliefs: Of the actuators, where they are a warning.
+        `decision` is the arbiter's for now, `beliefs` are warnings about actuators.
         """
         mission, succession, refusal = guard.mission, guard.switch, guard.refusal
         standby, last_input_ns = succession.current, guard.flags.last_input_ns

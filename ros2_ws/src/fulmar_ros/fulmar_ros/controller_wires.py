@@ -1,4 +1,4 @@
-"""What a controller publishes and hears: one object for every wire on its side."""
+"""Publishers and subscriptions of a controller: one object for every wire on its side."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from fulmar_core.topics import (
     ACTUATORS_HEALTH,
     ACTUATORS_STATE,
     AIR_BEARING,
-    DIAGNOSTICS,
     ESTOP,
     ESTOP_RELEASED,
     METADATA,
@@ -39,10 +38,9 @@ from fulmar_core.topics import (
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
-from fulmar_ros.node_robot import name_of, own_frames
 from fulmar_ros.operator_subscription import subscribe_operator
-from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.subscriber_wait import FLUSH_S, flush, publish_patiently
+from fulmar_ros.parameters import name_of, own_frames
+from fulmar_ros.qos import FLUSH_S, flush, publish_patiently, publisher_qos, subscriber_qos
 
 APPLIED_DEPTH = 50  # states of the actuators that may wait while this process does something else
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
@@ -74,19 +72,18 @@ class ControllerWires:
         Args:
             node: Owner of the endpoints.
             robot: The robot.
-            task: Says on which topic goals come.
+            task: Has the topic of the goals.
             observation_names: Of the terms that the controller observes.
-            on_odometry: Receives every odometry message, serialised.
-            on_goal: Told every goal.
-            on_obstacles: Told all obstacles whenever they change.
-            on_thing: Told the name of a thing and where it is.
-            on_estop: Told whether the e-stop is pressed.
-            on_estop_released: Called after each reset of the e-stop.
-            on_swap: Told which policy shall go on.
+            on_odometry: Receives odometry, serialised.
+            on_goal: Receives every goal.
+            on_obstacles: Receives all obstacles whenever they change.
+            on_thing: Receives the name of a thing and its pose.
+            on_estop: Receives whether the e-stop is pressed.
+            on_estop_released: Receives each reset of the e-stop.
+            on_swap: Receives the folder of the policy that shall take over.
             on_applied: Receives what the actuators do, serialised, of robots whose actuators can be watched.
             on_bearing: Receives whether the air bearing is on; None where there is none.
-            lockstep: Ask for lost odometry again, since the plant waits for its answer, and wait for readers that lag
-                behind.
+            lockstep: Ask for lost odometry again, since the plant waits, and wait for readers that lag behind.
         """
         wire = command_wire(robot)
         qos = partial(publisher_qos, lockstep=lockstep)
@@ -102,16 +99,11 @@ class ControllerWires:
             self._health = node.create_publisher(JointState, ACTUATORS_HEALTH.name, qos(ACTUATORS_HEALTH))
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
-        diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self.health = Health(f"{name_of(node, robot)}: controller", [status, diagnostics])
+        self.health = Health(node, f"{name_of(node, robot)}: controller", status)
         self._actuators, self._frames = robot.actuators, own_frames(node, robot)
-        self._streams = [
-            self._command,
-            self._observation,
-            self._action,
-            *([self._health] if self._health else []),
-        ]
-        self._publishers = (*self._streams, self._metadata, status, diagnostics)
+        streams = (self._command, self._observation, self._action, self._health)
+        self._streams = [publisher for publisher in streams if publisher is not None]
+        self._publishers = (*self._streams, self._metadata, *self.health.publishers)
         self._write_command = self._command_writer()
         self._newest: bytes | None = None
         self._write_action = VectorWriter(robot.actuators.names)
@@ -144,8 +136,10 @@ class ControllerWires:
         self.subscribed = {ODOMETRY: lockstep, **dict.fromkeys(reliably, True)}  # and whether reliably
         for thing in task.things:
             stream = subscriber_qos(thing.wire, reliable=lockstep)
-            told = partial(on_thing, thing.name)
-            self._subscriptions.append(node.create_subscription(PoseStamped, thing.wire.name, told, stream))
+            on_pose = partial(on_thing, thing.name)
+            self._subscriptions.append(
+                node.create_subscription(PoseStamped, thing.wire.name, on_pose, stream)
+            )
 
     def _command_writer(self) -> TwistWriter | VectorWriter:
         return TwistWriter(self._frames) if self._by_velocity else VectorWriter(self._actuators.names)
@@ -169,7 +163,7 @@ class ControllerWires:
             self._publish(self._command, self._newest)
 
     def forget_command(self) -> None:
-        """Have nothing to repeat."""
+        """Repeat no command until the next one."""
         self._newest = None
 
     def publish_safe(self, stamp: int) -> None:
@@ -177,18 +171,18 @@ class ControllerWires:
         self._publish(self._command, self._command_writer().raw(self._actuators.safe_command, stamp))
 
     def destroy(self, node: LifecycleNode) -> None:
-        """Give every endpoint back."""
+        """Destroy every endpoint."""
         for subscription in self._subscriptions:
             node.destroy_subscription(subscription)
         for publisher in self._publishers:
             node.destroy_publisher(publisher)
 
     def flush(self) -> None:
-        """Wait, not for ever, until every subscriber has the last messages."""
+        """Wait for a limited time until every subscriber has the last messages."""
         flush(self._streams, self._flush_s)
 
     def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
-        """Publish the very vectors behind a command, where somebody listens."""
+        """Publish the observation and the action of a command, where they have a subscriber."""
         if self._observation.get_subscription_count():
             self._publish(self._observation, self._write_observation.raw(observation, stamp))
         if self._action.get_subscription_count():
@@ -196,14 +190,14 @@ class ControllerWires:
 
     @property
     def health_wanted(self) -> bool:
-        """Whether somebody listens to the health of the actuators."""
+        """Whether the health of the actuators has a subscriber."""
         return self._health is not None and bool(self._health.get_subscription_count())
 
     def publish_actuators_health(self, effectiveness: np.ndarray, stamp: int) -> None:
-        """Publish what is believed of each actuator; only where that is wanted."""
+        """Publish the estimated effectiveness of each actuator, where `health_wanted`."""
         assert self._health is not None
         self._publish(self._health, self._write_health.raw(effectiveness, stamp))
 
     def publish_metadata(self, text: str) -> None:
-        """Say who controls: a JSON object."""
+        """Publish the metadata of the controller that acts: a JSON object."""
         self._metadata.publish(String(data=text))

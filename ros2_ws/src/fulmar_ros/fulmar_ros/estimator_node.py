@@ -8,7 +8,6 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
@@ -23,18 +22,17 @@ from fulmar_core.estimation.motion_filter import load_estimator
 from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.topics import DIAGNOSTICS, IMU, MOCAP, ODOMETRY
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.health import Health
-from fulmar_ros.node_robot import name_of, own_frames
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 WATCH_S = 0.1
 STATUS_PERIOD_S = 0.5
 FLUSH = Duration(seconds=0.3)
-FRAMES = ("odom", "map", "world")  # what motion captures call the room; all with Z up
+FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
 BODY_AXES = np.ix_((0, 1, 5), (0, 1, 5))  # of a 6 × 6 covariance: x, y and yaw
 
 
@@ -70,17 +68,16 @@ class EstimatorNode(Node):
         self._published_ns = -1
         self._published, self._refused = 0, 0
         self._problem, self._refusal = self._estimator.problem, ""
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
         self._prior = False
         self._said: tuple[object, ...] = ()
         self._said_s = 0.0
         self._publisher = self.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
-        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{name_of(self, robot)}: estimator", [diagnostics])
+        self._health = Health(self, f"{name_of(self, robot)}: estimator")
         self.create_subscription(PoseStamped, MOCAP.name, self._on_pose, subscriber_qos(MOCAP, depth=5))
         # The readings drive the velocity: each counts.
         self.create_subscription(Imu, IMU.name, self._on_imu, subscriber_qos(IMU, reliable=True, depth=50))
-        self.create_timer(WATCH_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(WATCH_S, self._publish_status, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_pose(self, message: PoseStamped) -> None:
         p, q = message.pose.position, message.pose.orientation
@@ -100,21 +97,21 @@ class EstimatorNode(Node):
             message.linear_acceleration_covariance[0] == -1.0
             or message.angular_velocity_covariance[0] == -1.0
         ):
-            return  # REP-145: it says itself that it has none
+            return  # REP-145: marks fields that are absent
         a, w = message.linear_acceleration, message.angular_velocity
         sample = ImuSample(np.array([a.x, a.y, a.z]), np.array([w.x, w.y, w.z]))
         with self._lock:
             self._take(self._estimator.see_imu(sample, stamp_ns(message.header.stamp)))
 
     def _take(self, problem: str) -> None:
-        """Publish what is believed now, if it is newer than what was; call with the lock held."""
+        """Publish the estimate, if it is newer than the last one; call with the lock held."""
         if not self._prior:
             take_priority_with_helpers(CONTROL_PRIORITY)  # a controller waits for us
             self._prior = True
         if problem:
             self._refuse(problem)
             return
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
         estimate = self._estimator.estimate()
         self._problem = self._estimator.problem
         if estimate is not None and estimate.stamp_ns > self._published_ns:
@@ -136,9 +133,9 @@ class EstimatorNode(Node):
         self._refused += 1
         self._refusal = reason
 
-    def _tell(self) -> None:
+    def _publish_status(self) -> None:
         with self._lock:
-            silent_s = time.monotonic() - self._heard_s
+            silent_s = time.monotonic() - self._received_s
             stale = f"nothing usable comes for {silent_s:.1f} s" if silent_s > self._bridge_s else ""
             problem = self._problem or stale
             key = (problem[:16], self._estimator.epoch, self._refused > 0)
@@ -156,7 +153,7 @@ class EstimatorNode(Node):
         self._health.publish("warn" if problem else "ok", problem or "estimating", values)
 
     def stop(self) -> None:
-        """Nothing to close: whoever hears no odometry stops by itself."""
+        """Wait for the last odometry to arrive; nodes that receive none stop by themselves."""
         self._publisher.wait_for_all_acked(FLUSH)
 
 
@@ -169,7 +166,7 @@ def _in_body(covariance: np.ndarray, yaw: float) -> np.ndarray:
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(EstimatorNode))
 
 

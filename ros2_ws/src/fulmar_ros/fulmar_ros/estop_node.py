@@ -8,7 +8,6 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -21,7 +20,6 @@ from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
 from fulmar_core.topics import (
-    DIAGNOSTICS,
     ESTOP,
     ESTOP_RELEASED,
     ESTOP_RESET,
@@ -31,9 +29,8 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.health import Health
-from fulmar_ros.node_robot import name_of
 from fulmar_ros.operator_subscription import subscribe_operator
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
@@ -53,7 +50,7 @@ class EstopNode(Node):
     """Publishes ten times a second whether the button is pressed; nodes that no longer receive it stop the robot."""
 
     def __init__(self, _request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
-        """Begin to say it.
+        """Begin to publish.
 
         Args:
             cli_args: ROS arguments of this node alone, where it shares a process.
@@ -66,14 +63,13 @@ class EstopNode(Node):
         robot = load_robot(settings.robot)
         self._button = EstopButton()
         self._button.pressed = settings.pressed
-        self._told_s = 0.0
+        self._reported_s = 0.0
         self._published = 0
         self._own: deque[tuple[int, int, int]] = deque(maxlen=OWN_MESSAGES)  # number, and sent between [ns]
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
         self._released = self.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
         subscribe_operator(self, Bool, ESTOP, self._on_estop, with_info=True)
-        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{name_of(self, robot)}: estop", [diagnostics])
+        self._health = Health(self, f"{name_of(self, robot)}: estop")
         wire = command_wire(robot)
         if wire is VELOCITY_COMMAND:
             self.create_subscription(TwistStamped, wire.name, self._on_velocity, subscriber_qos(wire))
@@ -87,8 +83,8 @@ class EstopNode(Node):
         self.create_service(Trigger, ESTOP_TRIGGER, self._trigger)
         self.create_service(Trigger, ESTOP_RESET, self._reset)
         self._prior = False
-        # The first word comes with the first beat: one from here, before anybody spins us, would be followed by a
-        # silence that takes goals away.
+        # The first message comes with the first beat: one from here, before the node spins, would be followed by a
+        # silence that cancels goals.
         self.create_timer(1.0 / REPUBLISH_HZ, self._beat, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_command(self, source: str, message: JointState) -> None:
@@ -100,11 +96,11 @@ class EstopNode(Node):
         self._button.receive_command(VELOCITY_COMMAND.name, zero, time.monotonic_ns())
 
     def _on_estop(self, message: Bool, info: dict[str, Any]) -> None:
-        """Latch a press by any other publisher; what it says besides does not count."""
+        """Latch a press by any other publisher, whose other messages do not count."""
         if not message.data or self._is_own(info) or self._button.pressed:
             return
         self._button.press()
-        self._tell()
+        self._publish()
         self.get_logger().warning(f"e-stop pressed by another publisher of {self._publisher.topic_name}")
 
     def _is_own(self, info: dict[str, Any]) -> bool:
@@ -113,7 +109,7 @@ class EstopNode(Node):
 
     def _trigger(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._button.press()
-        self._tell()
+        self._publish()
         self.get_logger().warning("e-stop pressed")
         response.success, response.message = True, "pressed: every actuator goes to its safe state"
         return response
@@ -122,7 +118,7 @@ class EstopNode(Node):
         problem = self._button.reset(time.monotonic_ns())
         if not problem:
             self._released.publish(String(data=self.get_fully_qualified_name()))
-        self._tell()
+        self._publish()
         self.get_logger().warning(f"e-stop reset {problem}" if problem else "e-stop reset: released")
         response.success = not problem
         response.message = problem or "released: controllers wait for a new goal"
@@ -132,28 +128,28 @@ class EstopNode(Node):
         if not self._prior:  # in the executor's thread, which is not there before
             take_priority_with_helpers(CONTROL_PRIORITY)  # its silence stops the robot
             self._prior = True
-        self._tell()
+        self._publish()
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         pressed = self._button.pressed
         self._published += 1
         begin_ns = time.time_ns()
         self._publisher.publish(Bool(data=pressed))
         self._own.append((self._published, begin_ns, time.time_ns()))
-        if time.monotonic() - self._told_s >= 1.0:
-            self._told_s = time.monotonic()
+        if time.monotonic() - self._reported_s >= 1.0:
+            self._reported_s = time.monotonic()
             level, words = ("warn", "pressed") if pressed else ("ok", "released")
             self._health.publish(level, words, {"pressed": str(pressed).lower()})
 
     def stop(self) -> None:
-        """Last word before the process ends: pressed. Silence would say the same, half a second later."""
+        """Publish a last press before the process ends; silence would do the same half a second later."""
         self._button.press()
-        self._tell()
+        self._publish()
         self._publisher.wait_for_all_acked(FLUSH)
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(EstopNode))
 
 

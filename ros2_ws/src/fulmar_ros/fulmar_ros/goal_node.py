@@ -1,4 +1,4 @@
-"""The node `goals`: tells a robot, from a file, where to go or how to move, and watches how far it comes."""
+"""The node `goals`: publishes goals from a file, one after another, and reports progress."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -25,16 +24,16 @@ from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, ODOMETRY
+from fulmar_core.topics import GOAL_WIRES, ODOMETRY
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
+from fulmar_ros.graph import running_robots_text
 from fulmar_ros.health import Health
-from fulmar_ros.late_subscribers import LateSubscribers
-from fulmar_ros.node_robot import heard_words, name_of, own_frames
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.operator_subscription import LateSubscribers
+from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
-PATIENCE_S = 3.0  # for the first odometry and for somebody who listens, before a person is told
+PATIENCE_S = 3.0  # for the first odometry and the first subscriber, before a warning
 WATCH_S = 0.1
 STATUS_PERIOD_S = 0.5  # at least 1 Hz
 FLUSH = Duration(seconds=0.5)
@@ -47,11 +46,11 @@ class GoalSettings:
     goals: str = "lab_pose"  # name of a file in configs/goals, or a path that ends in .yaml
     robot: str = "floating_platform"
     control_hz: float = 10.0  # goals come at most so often in the robot's own time [Hz]
-    as_path: bool = False  # tell all positions or poses at once
+    as_path: bool = False  # publish all positions or poses at once
     input_timeout_s: float = 0.5  # without usable odometry, before a robot shall stand still, at rate 1 [s]
     rate: float = 1.0  # seconds of the robot's own time a wall-clock second
-    lockstep: bool = False  # tell the goal with each odometry: plant and controller wait for it
-    stay: bool = False  # go on when everything is done, until told to stop
+    lockstep: bool = False  # publish the goal with each odometry: plant and controller wait for it
+    stay: bool = False  # go on when everything is done, until stopped
     # End with exit code 1 when so long after the start there is no usable odometry, or no subscriber; 0: wait [s].
     give_up_s: float = 0.0
 
@@ -93,26 +92,25 @@ class GoalNode(Node):
         self._title = goals.title
         self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
         self._request_exit = request_exit
-        self._gate = InputGate(robot.limits, frozen_after=0)  # whether a sensor is stuck, controllers judge
+        self._gate = InputGate(robot.limits, frozen_after=0)  # controllers check for stuck sensors
         self._lock = threading.Lock()
-        self._told: Goal | None = None
+        self._sent: Goal | None = None
         self._newest: Measurement | None = None
-        self._time_ns, self._told_at_ns = 0, 0  # of the sequence; it stands still while no odometry comes
+        self._time_ns, self._sent_at_ns = 0, 0  # of the sequence; it stands still while no odometry comes
         self._period_ns = round(1e9 / self._settings.control_hz)
         self._timeout_s = self._settings.input_timeout_s / min(self._settings.rate, 1.0)
         self._progress = self._sequence.progress
         self._said, self._said_at = "", 0.0
         self._problem, self._stale, self._over = "", False, False
         self._alone_checked = False
-        self._heard = self._settings.stay  # whoever starts all nodes together knows that somebody will listen
+        self._subscribers_checked = self._settings.stay  # nodes that start together subscribe each other
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
         self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
         self._message: GoalMessage | None = None  # the newest
         if not self._settings.lockstep:  # there a goal comes with each odometry
             LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
-        diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{name}: goals", [diagnostics])
+        self._health = Health(self, f"{name}: goals")
         self.create_subscription(
             Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
         )
@@ -126,17 +124,15 @@ class GoalNode(Node):
             problem = self._gate.problem(measurement)
             if self._over or problem:
                 self._problem = problem or ""
-                if self._settings.lockstep and self._told is not None and not self._over:
-                    self._tell(
-                        self._told, measurement.stamp_ns
-                    )  # others wait for a goal with this very stamp
+                if self._settings.lockstep and self._sent is not None and not self._over:
+                    self._publish_goal(self._sent, measurement.stamp_ns)  # others wait for this stamp
                 return
             was_done = self._sequence.done
             self._resume(measurement)
             goal = self._sequence.step(planar_of(measurement.state), self._time_ns / 1e9)
-            self._tell_progress()
+            self._publish_progress()
             if self._is_due(goal):
-                self._tell(goal, measurement.stamp_ns)
+                self._publish_goal(goal, measurement.stamp_ns)
             if self._sequence.done and not was_done:
                 self._over = not self._settings.stay
                 self.get_logger().info(self._farewell())
@@ -155,20 +151,20 @@ class GoalNode(Node):
         self._problem, self._stale = "", False
 
     def _is_due(self, goal: Goal) -> bool:
-        if self._told is None or self._settings.lockstep:
+        if self._sent is None or self._settings.lockstep:
             return True
-        if np.array_equal(goal.targets, self._told.targets):
+        if np.array_equal(goal.targets, self._sent.targets):
             return False
-        return self._sequence.done or self._time_ns - self._told_at_ns >= self._period_ns
+        return self._sequence.done or self._time_ns - self._sent_at_ns >= self._period_ns
 
-    def _tell(self, goal: Goal, stamp_ns: int) -> None:
+    def _publish_goal(self, goal: Goal, stamp_ns: int) -> None:
         self._message = goal_message(goal, self._sequence.topic, stamp_ns, self._frames)
         self._publisher.publish(self._message)
-        if self._single and self._told is None:
+        if self._single and self._sent is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
-        self._told, self._told_at_ns = goal, self._time_ns
+        self._sent, self._sent_at_ns = goal, self._time_ns
 
-    def _tell_progress(self) -> None:
+    def _publish_progress(self) -> None:
         if self._sequence.progress != self._progress:
             self._progress = self._sequence.progress
             self.get_logger().info(self._progress)
@@ -181,7 +177,7 @@ class GoalNode(Node):
         if self._sequence.topic == "goal_path":
             return "done: one round is over; the controller goes round until another goal comes"
         if self._sequence.topic == "goal_velocity":
-            return "done: the robot is told to stand still"
+            return "done: the robot stands still"
         return "done: the robot stays until another goal comes"
 
     def _watch(self) -> None:
@@ -192,14 +188,12 @@ class GoalNode(Node):
             now = time.monotonic()
             limit_s = self._timeout_s if self._newest else PATIENCE_S
             late = now - self._usable_at > limit_s and not self._settings.lockstep
-            late = late and not (
-                self._newest is None and self._settings.give_up_s
-            )  # that ends with a line of its own
+            late = late and (self._newest is not None or not self._settings.give_up_s)  # that has its own end
             if late and not self._stale and not self._over:
                 self._stale = True
                 self._pause()
-        if not self._heard and now - self._began > PATIENCE_S:
-            self._heard = True  # told once
+        if not self._subscribers_checked and now - self._began > PATIENCE_S:
+            self._subscribers_checked = True  # once
             if not self._settings.give_up_s and (alone := self._without_subscriber()):
                 self.get_logger().warning(alone)
 
@@ -218,7 +212,7 @@ class GoalNode(Node):
             self._over = True
         self.get_logger().error(
             f"{missing} (after {self._settings.give_up_s:g} s). Start the robot and its controller, or wait for them: "
-            f"fulmar goals --wait. {heard_words(self)}"
+            f"fulmar goals --wait. {running_robots_text(self)}"
         )
         self._request_exit(FAILED)
 
@@ -229,14 +223,14 @@ class GoalNode(Node):
             self.get_logger().warning(f"waiting for odometry: {reason}")
             return
         stands = self._stand_still()
-        then = "the robot is told to stand still" if stands else "the goal stays as it is"
+        then = "the goal is standstill" if stands else "the goal stays as it is"
         self.get_logger().warning(f"no usable odometry for {self._timeout_s:g} s ({reason}): {then}")
 
     def _stand_still(self) -> bool:
-        """End a velocity that was told; other goals need no end."""
-        if self._sequence.topic != "goal_velocity" or self._told is None or self._newest is None:
+        """End a velocity goal; other goals need no end."""
+        if self._sequence.topic != "goal_velocity" or self._sent is None or self._newest is None:
             return False
-        self._tell(STANDSTILL, self._newest.stamp_ns)
+        self._publish_goal(STANDSTILL, self._newest.stamp_ns)
         return True
 
     def _without_subscriber(self) -> str:
@@ -254,7 +248,7 @@ class GoalNode(Node):
         return any(info.node_name != "recorder" for info in self.get_subscriptions_info_by_topic(topic))
 
     def stop(self) -> None:
-        """Last words: a robot that was told a velocity is told to stand still."""
+        """Publish standstill after a velocity goal."""
         with self._lock:
             if not self._over:
                 self._stand_still()
@@ -267,7 +261,7 @@ def _topic_of(task: str) -> str:
 
 
 def main() -> None:
-    """Tell goals until they are done, or until told to stop."""
+    """Publish goals until they are done, or until stopped."""
     sys.exit(run_node(GoalNode))
 
 

@@ -6,9 +6,12 @@ import time
 from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
 from rclpy.publisher import Publisher
 
+from fulmar_core.topics import DIAGNOSTICS
 from fulmar_ros.convert import stamp_of
+from fulmar_ros.qos import publisher_qos
 
 LEVELS = {"ok": DiagnosticStatus.OK, "warn": DiagnosticStatus.WARN, "error": DiagnosticStatus.ERROR}
 
@@ -16,14 +19,10 @@ LEVELS = {"ok": DiagnosticStatus.OK, "warn": DiagnosticStatus.WARN, "error": Dia
 class Health:
     """Publishes the status of one part of the system."""
 
-    def __init__(self, name: str, publishers: list[Publisher]) -> None:
-        """Publish under a name.
-
-        Args:
-            name: `<robot>: plant` or the like.
-            publishers: Of DiagnosticArray.
-        """
-        self._name, self._publishers = name, publishers
+    def __init__(self, node: Node, name: str, *more: Publisher) -> None:
+        """Publish on `/diagnostics` under a name such as `<robot>: plant`, and with more publishers of its type."""
+        own = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
+        self._name, self.publishers = name, [*more, own]
 
     def publish(self, level: str, message: str, values: Mapping[str, str]) -> None:
         """Publish one status.
@@ -37,5 +36,5 @@ class Health:
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         array = DiagnosticArray(status=[status])
         array.header.stamp = stamp_of(time.time_ns())
-        for publisher in self._publishers:
+        for publisher in self.publishers:
             publisher.publish(array)

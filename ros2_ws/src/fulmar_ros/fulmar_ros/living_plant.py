@@ -1,4 +1,4 @@
-"""Another plant that lives in the ROS domain under the same name: found, named and refused before ours begins."""
+"""Detects another plant of the same name in the ROS domain, before ours begins."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rclpy.node import Node
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS
-from fulmar_ros.command_writers import full_name
+from fulmar_ros.graph import full_name
 from fulmar_ros.qos import subscriber_qos
 
 PLANT = "plant"  # name of the node
@@ -32,15 +32,14 @@ def refuse_living_plant(
 ) -> None:
     """Refuse to start a plant under a namespace where another one lives.
 
-    Returns at once where the node is old enough and nothing is found. A plant that dies while it is asked who it is
-    does not count. A node that is created after a plant was killed never discovers that one.
+    A plant that dies meanwhile does not count, and a node created after a plant was killed never discovers it.
 
     Args:
         node: Looks at the graph; where it is a plant itself, it does not count.
         namespace: Of the plant, absolute.
         since_s: When the node was created, on the monotonic clock [s].
         spins: Whether another thread serves the node's callbacks.
-        within_s: How old the node has to be before it finds nothing [s].
+        within_s: Age of the node from which on nothing found means nothing there [s].
 
     Raises:
         ConfigError: Another plant lives there; with its name, process and host.

@@ -1,4 +1,4 @@
-"""How Fast DDS is set up for every process of Fulmar, unless its environment says otherwise."""
+"""Fast DDS settings of every process of Fulmar, unless its environment has others."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 # Jazzy's name of the file, and that of later ones.
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-# Says soon who is there, and sends again soon what got lost.
+# Announces nodes early, and resends lost messages early.
 OWN_PROFILES = Path(__file__).with_name("fast_dds.xml")
 
 
 def middleware_environment() -> dict[str, str]:
     """The variables that Fast DDS reads, as this process or a child of it should have them."""
-    own = {DISCOVERY_RANGE: os.environ.get(DISCOVERY_RANGE, "LOCALHOST")}  # nobody on the network finds us
+    own = {DISCOVERY_RANGE: os.environ.get(DISCOVERY_RANGE, "LOCALHOST")}  # not visible on the network
     if not any(name in os.environ for name in PROFILES):
         own |= dict.fromkeys(PROFILES, str(OWN_PROFILES))
     return own

@@ -1,14 +1,17 @@
-"""Subscriptions of operator wires: from volatile and from latched publishers, each message once."""
+"""Latched wires of operators, for volatile and latched publishers and subscribers alike."""
 
 from __future__ import annotations
 
 import inspect
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy
 from rclpy.subscription import Subscription
 
 from fulmar_core.topics import Wire
@@ -67,10 +70,7 @@ def subscribe_operator(
 
 
 class _Once:
-    """A callback of several subscriptions that passes each message on once.
-
-    A message is recognised by when and as which of its publisher's it was sent.
-    """
+    """A callback of several subscriptions that passes each message on once, by its source time and number."""
 
     # Asks rclpy for message info.
     __signature__ = inspect.signature(lambda message, info: None)
@@ -91,7 +91,7 @@ class _Once:
             self._callback(message)
 
     def _is_second(self, sent_ns: int, number: int) -> bool:
-        """Whether this message came before; without a time of sending, twice is better than never."""
+        """Whether this message came before; one without a source time is passed on each time."""
         key = (sent_ns, number)
         if not sent_ns or key in self._known:
             return bool(sent_ns)
@@ -100,3 +100,40 @@ class _Once:
         self._order.append(key)
         self._known.add(key)
         return False
+
+
+LOOK_S = 0.5  # a subscriber that was there at the look before is matched by now
+
+
+class LateSubscribers:
+    """Repeats latched messages for volatile subscribers that come late, which the middleware leaves out.
+
+    Nodes that subscribe the topic latched, as ours do, need no repetition and cause none.
+    """
+
+    def __init__(self, node: Node, publisher: Publisher, current: Callable[[], Sequence[Any]]) -> None:
+        """Look twice a second; `current` gives the messages as they were sent, so that nobody sees anything new."""
+        self._node, self._publisher, self._current = node, publisher, current
+        self._seen: set[bytes] = set()
+        self._served: set[bytes] = set()
+        node.create_timer(LOOK_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _look(self) -> None:
+        seen = self._volatile()
+        late = (seen & self._seen) - self._served
+        self._served = (self._served | late) & seen
+        self._seen = seen
+        if late:
+            for message in self._current():
+                self._publisher.publish(message)
+
+    def _volatile(self) -> set[bytes]:
+        """Subscriptions of nodes that have no latched one, by their endpoints."""
+        latched, volatile = set(), {}
+        for info in self._node.get_subscriptions_info_by_topic(self._publisher.topic_name):
+            subscriber = (info.node_namespace, info.node_name)
+            if info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                latched.add(subscriber)
+            else:
+                volatile[bytes(info.endpoint_gid)] = subscriber
+        return {endpoint for endpoint, subscriber in volatile.items() if subscriber not in latched}

@@ -1,4 +1,4 @@
-"""ROS parameters as a frozen dataclass: declared, typed and checked in one call."""
+"""Parameters of a node as a frozen dataclass, declared and checked in one call; name and frames of its robot."""
 
 from __future__ import annotations
 
@@ -11,22 +11,17 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.robot import Robot
+from fulmar_core.robot_name import Frames, frames_of
 
 T = TypeVar("T")
-QOS_OVERRIDES = (
-    "qos_overrides."  # rclpy declares these with the publisher or the subscription that they are for
-)
+QOS_OVERRIDES = "qos_overrides."  # rclpy declares these with the publisher or subscription that they are for
 
 
 def read_parameters(node: Node, cls: type[T]) -> T:
-    """Declare one parameter for each field and read them all.
+    """Declare one parameter for each field of a dataclass and read them all.
 
-    Args:
-        node: Whose parameters.
-        cls: Dataclass whose fields all have defaults; its `__post_init__` may raise ValueError.
-
-    Returns:
-        The filled dataclass.
+    All fields have defaults; `__post_init__` may raise ValueError.
 
     Raises:
         ConfigError: A parameter has another type than its default or is not known, or the dataclass refuses it.
@@ -49,12 +44,9 @@ def read_parameters(node: Node, cls: type[T]) -> T:
 
 
 def _refuse_unknown(node: Node, known: Iterable[str]) -> None:
-    """Refuse parameters that were given to a node and that it does not have: a misspelt one would change nothing.
+    """Refuse parameters that the node does not have: a misspelt one would change nothing.
 
-    What `-p` and files say for other nodes does not come here; what they say for all nodes does.
-
-    Raises:
-        ConfigError: There is one; rclpy's own, such as `use_sim_time`, are none.
+    Those for all nodes count, those for other nodes do not, nor do rclpy's own, such as `use_sim_time`.
     """
     for name in node._parameter_overrides:
         if name not in known and not node.has_parameter(name) and not name.startswith(QOS_OVERRIDES):
@@ -71,3 +63,13 @@ def _as_number(node: Node, name: str, default: object, error: Exception) -> floa
         node.declare_parameter(name, default, ignore_override=True)
         return float(given.value)
     raise ConfigError(f"parameter '{name}' of node '{node.get_name()}': {error}") from error
+
+
+def name_of(node: Node, robot: Robot) -> str:
+    """Name of a node's robot: its namespace; without one, the robot's type."""
+    return node.get_namespace().strip("/") or robot.name
+
+
+def own_frames(node: Node, robot: Robot) -> Frames:
+    """Frames of a node's robot."""
+    return frames_of(name_of(node, robot), robot.name)

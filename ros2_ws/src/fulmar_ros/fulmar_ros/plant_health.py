@@ -1,4 +1,4 @@
-"""What a plant says about itself on the diagnostics."""
+"""Diagnostics of a plant."""
 
 from __future__ import annotations
 
@@ -7,31 +7,25 @@ import socket
 import time
 from collections.abc import Callable
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode
 
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.topics import DIAGNOSTICS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
-from fulmar_ros.command_writers import UNNAMED
+from fulmar_ros.graph import UNNAMED, WireWatch
 from fulmar_ros.health import Health
-from fulmar_ros.lockstep_loop import LockstepLoop
+from fulmar_ros.plant_clock import SimulatedTime, WallTime
+from fulmar_ros.plant_loops import LockstepLoop, RealtimeLoop
 from fulmar_ros.plant_wires import PlantWires
-from fulmar_ros.qos import publisher_qos
-from fulmar_ros.realtime_loop import RealtimeLoop
-from fulmar_ros.simulated_time import SimulatedTime
-from fulmar_ros.wall_time import WallTime
-from fulmar_ros.wire_watch import WireWatch
 
-LOOK_S = 0.1  # how soon a change is noticed
-AT_LEAST_S = 1.0  # how often it is said without a change
+LOOK_S = 0.1  # between two looks for a change
+AT_LEAST_S = 1.0  # between two reports without a change
 NAMES_LOOKS = 10  # in which discovery reports the name of a node whose publisher is known
 HANGS_S = 0.5  # a step that takes longer than this, and than ten ticks, will not come back
 
 
 class PlantHealth:
-    """Looks at a plant's loop from outside its thread, and publishes what it finds.
+    """Watches a plant's loop from outside its thread, and publishes its status.
 
     Attributes:
         mode: inactive, waiting, running, stopping, finished or fault.
@@ -52,22 +46,22 @@ class PlantHealth:
         self.more: Callable[[], dict[str, str]] = dict
 
     def open(self, node: LifecycleNode, *, started_ns: int) -> None:
-        """Begin to publish; with when the node was created, by the wall clock [ns]."""
+        """Begin to publish; the node was created at `started_ns` of the wall clock [ns]."""
         self._place = {
             "node": node.get_fully_qualified_name(),
             "host": socket.gethostname(),
             "pid": str(os.getpid()),
             "started_ns": str(started_ns),
         }
-        self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{self._robot}: plant", [self._publisher])
+        self._health = Health(node, f"{self._robot}: plant")
         self._wire_watch = WireWatch(node, self._wires.subscribed)
-        self._timer = node.create_timer(LOOK_S, self.tell)
+        self._timer = node.create_timer(LOOK_S, self.publish)
 
     def close(self, node: LifecycleNode) -> None:
-        """Publish no more."""
+        """Stop publishing."""
         node.destroy_timer(self._timer)
-        node.destroy_publisher(self._publisher)
+        for publisher in self._health.publishers:
+            node.destroy_publisher(publisher)
 
     def watch(
         self,
@@ -77,14 +71,14 @@ class PlantHealth:
         lockstep: LockstepLoop,
         realtime: RealtimeLoop | None,
     ) -> None:
-        """Look at these from now on; `realtime` is None where the plant runs in lock step."""
+        """Watch these from now on; `realtime` is None where the plant runs in lock step."""
         self._guard, self._wires, self._clock = guard, wires, clock
         self._lockstep, self._realtime = lockstep, realtime
 
-    def tell(self) -> None:
-        """Publish when something changed, and now and then."""
+    def publish(self) -> None:
+        """Publish on change, and once a second."""
         self._wires.see_writers()
-        level, message, key = self._verdict()
+        level, message, key = self._status()
         more = self.more()
         unfit = BETWEEN.join(self._wire_watch.look())
         warning = more.get("warning", "") or unfit
@@ -97,8 +91,8 @@ class PlantHealth:
         self._said, self._said_at = changed, now
         self._health.publish(level, message, self._values() | {WIRE_WARNINGS: unfit} | more)
 
-    def _verdict(self) -> tuple[str, str, str]:
-        """Level, message, and what of the message counts as a change."""
+    def _status(self) -> tuple[str, str, str]:
+        """Level, message, and the part of the message whose change counts."""
         if self.mode == "fault":
             return "error", self.reason, "fault"
         contested = self._contested()
@@ -117,11 +111,8 @@ class PlantHealth:
                 tripped, silent_ns = self._guard.watchdog.tripped, self._guard.watchdog.silent_ns(now)
             if tripped:
                 limit_ms = self._guard.watchdog.timeout_ns / 1e6
-                return (
-                    "error",
-                    f"{NO_COMMAND} {silent_ns / 1e6:.0f} ms (limit {limit_ms:.0f} ms): actuators in their safe state",
-                    "tripped",
-                )
+                limit = f"(limit {limit_ms:.0f} ms): actuators in their safe state"
+                return "error", f"{NO_COMMAND} {silent_ns / 1e6:.0f} ms {limit}", "tripped"
         stopped = self._estop()
         if stopped:
             return stopped
@@ -141,7 +132,7 @@ class PlantHealth:
         return "" if self._guard.person or self.mode == "finished" else contested
 
     def _estop(self) -> tuple[str, str, str] | None:
-        """The verdict while the e-stop holds: before it ever allowed anything it is a state, after that an event."""
+        """Status while the e-stop holds: a warning before it was ever released, an error once it stops a run."""
         with self._wires.lock:
             reason = self._guard.estop.reason(time.monotonic_ns())
             level = "error" if self._guard.estop.was_released and self.mode == "running" else "warn"

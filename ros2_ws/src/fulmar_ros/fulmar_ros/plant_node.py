@@ -9,7 +9,7 @@ from collections.abc import Callable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from fulmar_core.backend import AirBearing, Backend, Sample
+from fulmar_core.backend import AirBearing, Backend
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
 from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
@@ -20,21 +20,16 @@ from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import CLOCK, DIAGNOSTICS
 from fulmar_ros.air_bearing import AirBearingWires
-from fulmar_ros.clock_owner import other_clocks
-from fulmar_ros.first_episode import first_episode
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
-from fulmar_ros.lockstep_loop import LockstepLoop, OnStep
-from fulmar_ros.node_robot import name_of
-from fulmar_ros.paced_capture import MakeCapture, capture_maker
-from fulmar_ros.parameters import read_parameters
+from fulmar_ros.motion_capture import MakeCapture, capture_maker
+from fulmar_ros.parameters import name_of, read_parameters
+from fulmar_ros.plant_clock import SimulatedTime, WallTime, other_clocks
 from fulmar_ros.plant_health import PlantHealth
-from fulmar_ros.plant_settings import PlantSettings
+from fulmar_ros.plant_loops import LockstepLoop, OnStep, RealtimeLoop
+from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import subscriber_qos
-from fulmar_ros.realtime_loop import RealtimeLoop
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.simulated_time import SimulatedTime
-from fulmar_ros.wall_time import WallTime
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -44,9 +39,9 @@ PATIENCE_S = 2.0  # for a backend that hangs in a step, before the node goes on 
 
 
 class PlantNode(LifecycleNode):
-    """Publishes what the backend measures, applies what controllers command, and stops when they fall silent.
+    """Publishes what the backend measures, applies what controllers command, and stops when commands stop.
 
-    The backend runs between activation and deactivation, in a thread of its own that no callback can hold up.
+    Between activation and deactivation the backend runs in a thread of its own, which no callback can delay.
     """
 
     def __init__(
@@ -58,7 +53,7 @@ class PlantNode(LifecycleNode):
         settings_class: type[PlantSettings] = PlantSettings,
         cli_args: list[str] | None = None,
     ) -> None:
-        """Read the parameters and, unless told otherwise, start.
+        """Read the parameters and, unless `autostart` is off, start.
 
         Args:
             make_backend: Builds the backend; called at configuration.
@@ -75,7 +70,7 @@ class PlantNode(LifecycleNode):
         self._started_ns = time.time_ns()
         self.settings = read_parameters(self, settings_class)
         self.robot = load_robot(self.settings.robot)
-        load_scenario(self.settings.scenario)  # a wrong name is told before anything starts
+        load_scenario(self.settings.scenario)  # a wrong name is refused before anything starts
         load_task(self.settings.task)
         self._make_backend, self._request_exit, self._simulated = make_backend, request_exit, simulated
         self._backend: Backend | None = None
@@ -87,9 +82,8 @@ class PlantNode(LifecycleNode):
         self.health.awaited = self.settings.wait_for_subscribers
         timeout_s = self.settings.timeout_s(self.robot)
         if timeout_s == 0.0:
-            self.get_logger().warning(
-                "THE COMMAND WATCHDOG IS OFF: actuators stay as they are when a controller dies."
-            )
+            off = "THE COMMAND WATCHDOG IS OFF: actuators stay as they are when a controller dies."
+            self.get_logger().warning(off)
             timeout_s = 1e9
         self.guard = ActuatorGuard(
             self.robot.actuators,
@@ -100,19 +94,15 @@ class PlantNode(LifecycleNode):
         )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:
-            refuse_living_plant(
-                self, self.get_namespace(), since_s=self._made_s, spins=False, within_s=BRIEFLY_S
-            )
+            space = self.get_namespace()
+            refuse_living_plant(self, space, since_s=self._made_s, spins=False, within_s=BRIEFLY_S)
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:
-                    raise FulmarError(
-                        f"plant of '{name_of(self, self.robot)}' could not start: {self.health.reason}"
-                    )
-            self._twin_words = self.create_subscription(
-                DiagnosticArray,
-                DIAGNOSTICS.name,
-                self._yield_to_older,
-                subscriber_qos(DIAGNOSTICS, reliable=True, depth=10),
+                    name = name_of(self, self.robot)
+                    raise FulmarError(f"plant of '{name}' could not start: {self.health.reason}")
+            qos = subscriber_qos(DIAGNOSTICS, reliable=True, depth=10)
+            self._twin_reports = self.create_subscription(
+                DiagnosticArray, DIAGNOSTICS.name, self._yield_to_older, qos
             )
             self._twin_timer = self.create_timer(LATE_S, self._end_watch)
 
@@ -166,22 +156,15 @@ class PlantNode(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Let go of the backend and every endpoint."""
+        """Stop, make safe, and destroy the backend and every endpoint."""
         self._dismantle()
         return DONE
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop, make safe and let go, from whatever state."""
-        self._dismantle()
-        return DONE
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """As on shutdown: an error never leaves actuators as they are."""
-        self._dismantle()
-        return DONE
+    # From whatever state, and after an error too: actuators are never left as they are.
+    on_shutdown = on_error = on_cleanup
 
     def stop(self) -> int:
-        """Last words before the process ends: the safe command, several times.
+        """Publish the safe command several times before the process ends.
 
         Returns:
             Exit code: 2 where the last configuration was refused for a mistake in a file.
@@ -193,18 +176,11 @@ class PlantNode(LifecycleNode):
             finally:
                 self._backend.close()
                 if self._air is not None:
-                    self._air.tell()
+                    self._air.publish()
         return self._exit_code
 
     def run_episode(self, episode: Episode, *, number: int, seed: int, steps: int, on_step: OnStep) -> None:
-        """Run one episode in lock step, from the caller's thread, on a configured node.
-
-        Args:
-            episode: Where to start and in which world.
-            number: Number of the episode.
-            seed: Seed of the sensor noise.
-            steps: Control steps to run.
-            on_step: Told about every step.
+        """Run control steps of an episode in lock step, from the caller's thread, on a configured node.
 
         Raises:
             LockstepError: If the controller does not answer in time.
@@ -239,7 +215,7 @@ class PlantNode(LifecycleNode):
         )
 
     def _make_loops(self, backend: Backend) -> None:
-        """New loops: neither counts nor deadlines survive a deactivation."""
+        """New loops with new counts and deadlines."""
         self._lockstep = LockstepLoop(
             backend,
             self.wires,
@@ -247,16 +223,11 @@ class PlantNode(LifecycleNode):
             self.clock,
             control_hz=self.settings.control_rate(self.robot),
             answer_timeout_s=self.settings.answer_timeout_s,
-            publish_bearing=self._air.tell_everybody if self._air else lambda: None,
+            publish_bearing=self._air.publish_and_wait if self._air else lambda: None,
         )
         self._realtime = RealtimeLoop(backend, self.wires, self.guard, self.clock, rate=self.settings.rate)
-        self.health.watch(
-            self.guard,
-            self.wires,
-            self.clock,
-            self._lockstep,
-            None if self.settings.lockstep else self._realtime,
-        )
+        realtime = None if self.settings.lockstep else self._realtime
+        self.health.watch(self.guard, self.wires, self.clock, self._lockstep, realtime)
 
     def _halt(self) -> None:
         self._stop.set()
@@ -280,15 +251,14 @@ class PlantNode(LifecycleNode):
         try:
             self._wait_for_subscribers()
             self.health.mode = "running"
-            sample = self._first_sample(backend)
+            sample = backend.reset(first_episode(self.robot, self.settings), seed=self.settings.seed)
             if self.settings.lockstep:
-                self._lockstep.run(
-                    sample, self._count(1.0 / self.settings.control_rate(self.robot)), self._stop
-                )
+                steps = self._count(1.0 / self.settings.control_rate(self.robot))
+                self._lockstep.run(sample, steps, self._stop)
             else:
                 self._realtime.run(sample, self._count(self.robot.timing.physics_dt), self._stop)
             self.health.mode = "stopping"
-            self.wires.listening = False  # from here on nobody has to command
+            self.wires.listening = False  # from here on no command is due
             self._make_safe()
             self.health.mode = "inactive" if self._stop.is_set() else "finished"
         except FulmarError as error:
@@ -298,11 +268,8 @@ class PlantNode(LifecycleNode):
 
     def _yield_to_older(self, message: DiagnosticArray) -> None:
         """End where an older plant of our name lives that discovery reported late; a younger one ends itself."""
-        older = [
-            place
-            for began, place in others_in(message, self.get_fully_qualified_name())
-            if began < self._started_ns
-        ]
+        others = others_in(message, self.get_fully_qualified_name())
+        older = [place for began, place in others if began < self._started_ns]
         if older:
             self.get_logger().error(
                 f"{older[0]} lives in this ROS domain already. This plant is younger, and ends."
@@ -313,13 +280,10 @@ class PlantNode(LifecycleNode):
     def _end_watch(self) -> None:
         """Look for older plants no more."""
         self._twin_timer.cancel()
-        self.destroy_subscription(self._twin_words)
-
-    def _first_sample(self, backend: Backend) -> Sample:
-        return backend.reset(first_episode(self.robot, self.settings), seed=self.settings.seed)
+        self.destroy_subscription(self._twin_reports)
 
     def _count(self, dt: float) -> int | None:
-        """How many loops of `dt` seconds fill the duration; None for no end."""
+        """Number of steps of `dt` [s] within the duration; None for no end."""
         return round(self.settings.duration_s / dt) if self.settings.duration_s > 0.0 else None
 
     def _wait_for_subscribers(self) -> None:
@@ -337,7 +301,7 @@ class PlantNode(LifecycleNode):
         except Exception as error:  # noqa: BLE001 - a broken backend must not keep the process alive
             self.get_logger().error(f"the backend could not be made safe: {type(error).__name__}: {error}")
         finally:
-            self.health.tell()
+            self.health.publish()
             self._request_exit(FAILED)
 
     def _make_safe(self) -> None:

@@ -1,12 +1,18 @@
-"""What a plant node can be told."""
+"""ROS parameters of a plant node, and the first episode that they describe."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import Episode, draw_episode
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import Robot
 from fulmar_core.safety.watchdog import checked_timeout, default_timeout
+from fulmar_core.tasks import load_task
 
 MOST_MOCAP_HZ = 1000.0  # the fastest cameras; a plant could not publish more often in real time [Hz]
 BY_RATE = -1.0  # stands for a value that follows from the control rate
@@ -28,11 +34,11 @@ class PlantSettings:
     duration_s: float = 0.0  # simulated time after which the plant stops; 0: never [s]
     command_timeout_s: float = BY_RATE  # 0 switches the watchdog off
     answer_timeout_s: float = 5.0  # longest wait for a controller in lock step [s]
-    wait_for_subscribers: int = 0  # of odom, or of what an estimator is told, before the first step
+    wait_for_subscribers: int = 0  # of odom, or of an estimator's inputs, before the first step
     estimated: bool = False  # publish mocap/pose in the place of odom: an estimator makes odom of it
     mocap_hz: float = 0.0  # publish mocap/pose so often, also beside odom; 0: at every tick in its place [Hz]
     mocap_late_s: float = 0.0  # by which a pose is stamped and sent after its capture [s]
-    estop: bool = False  # nothing moves before an e-stop is heard
+    estop: bool = False  # nothing moves before a message of an e-stop
     autostart: bool = True
 
     def __post_init__(self) -> None:
@@ -72,3 +78,15 @@ class PlantSettings:
             return checked_timeout(self.command_timeout_s)
         # Simulated slower than life, commands come later than any clock on a real robot would allow.
         return default_timeout(1.0 / self.control_rate(robot)) / min(self.rate, 1.0)
+
+
+def first_episode(robot: Robot, settings: PlantSettings) -> Episode:
+    """The seed's episode, begun at rest where the parameters say.
+
+    Raises:
+        ConfigError: A name is unknown, or a file is wrong.
+    """
+    x, y, heading = (np.asarray(float(value)) for value in settings.start)
+    task, scenario = load_task(settings.task), load_scenario(settings.scenario)
+    episode = draw_episode(robot, task, scenario, seed=settings.seed, number=0)
+    return Episode(at_rest(x, y, np.deg2rad(heading)), episode.goal, episode.world)

@@ -1,9 +1,10 @@
-"""What a plant publishes and hears: one object for every wire on its side."""
+"""Publishers, subscriptions and answer times of a plant: one object for every wire on its side."""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections import OrderedDict
 from collections.abc import Sequence
 from functools import partial
 
@@ -39,24 +40,81 @@ from fulmar_core.topics import (
     command_wire,
     thing_wire,
 )
-from fulmar_ros.command_writers import writers_of
-from fulmar_ros.convert import ImuWriter, OdometryWriter, PoseWriter, VectorWriter, stamp_of
+from fulmar_ros.convert import (
+    ImuWriter,
+    OdometryWriter,
+    PoseWriter,
+    TwistReader,
+    VectorReader,
+    VectorWriter,
+    stamp_of,
+)
 from fulmar_ros.deadline import Spread
-from fulmar_ros.node_robot import own_frames
+from fulmar_ros.graph import writers_of
+from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.operator_subscription import subscribe_operator
-from fulmar_ros.paced_capture import MakeCapture
-from fulmar_ros.qos import publisher_qos, subscriber_qos
-from fulmar_ros.sent_states import SentStates
-from fulmar_ros.simulated_time import SimulatedTime
-from fulmar_ros.subscriber_wait import FLUSH_S, flush, publish_patiently
-from fulmar_ros.wire_readers import TwistReader, VectorReader
+from fulmar_ros.parameters import own_frames
+from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.qos import FLUSH_S, flush, publish_patiently, publisher_qos, subscriber_qos
+
+REMEMBERED = 256  # states whose answer may still come, at least
+
+
+class SentStates:
+    """Remembers stamps of the plant's clock with the steady time of their sending. Not thread-safe."""
+
+    def __init__(self, too_old_ns: int) -> None:
+        """Begin empty; a command may answer a state that was sent at most `too_old_ns` ago, > 0 [ns]."""
+        self._too_old_ns = too_old_ns
+        self._waiting: OrderedDict[int, int] = OrderedDict()  # stamp to time of sending; no answer yet
+        self._young: OrderedDict[int, int] = OrderedDict()  # the same, of all that may still be answered
+        self._newest_ns = 0
+        self._outdated_ns = 0  # every stamp up to this one is too old
+
+    def note(self, stamp_ns: int, now_ns: int) -> None:
+        """Note that a state of a stamp [ns] was sent now, by a steady clock [ns]; of repetitions the first counts."""
+        if not self._newest_ns or stamp_ns < self._newest_ns:  # the first, or somebody set the clock back
+            self._waiting.clear()
+            self._young.clear()
+            self._outdated_ns = stamp_ns - 1
+        self._newest_ns = stamp_ns
+        self._waiting.setdefault(stamp_ns, now_ns)
+        self._young.setdefault(stamp_ns, now_ns)
+        self._age(now_ns)
+        while len(self._waiting) > REMEMBERED:
+            self._waiting.popitem(last=False)
+
+    def outdated(self, stamp_ns: int, now_ns: int) -> bool:
+        """Whether a stamp is that of a state which is too old by now; never for 0, which stands for none."""
+        self._age(now_ns)
+        return 0 < stamp_ns <= self._outdated_ns
+
+    def answered(self, stamp_ns: int, now_ns: int) -> int | None:
+        """How long the first answer to a state took; None for any other answer [ns]."""
+        sent_ns = self._waiting.pop(stamp_ns, None)
+        return None if sent_ns is None else now_ns - sent_ns
+
+    def close(self) -> None:
+        """Accept and time no more answers to what was sent so far."""
+        self._waiting.clear()
+        self._young.clear()
+        self._outdated_ns = self._newest_ns
+
+    def _age(self, now_ns: int) -> None:
+        while self._young:
+            stamp_ns, sent_ns = next(iter(self._young.items()))
+            if now_ns - sent_ns <= self._too_old_ns:
+                return
+            self._young.popitem(last=False)
+            self._outdated_ns = stamp_ns
+
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
 LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 
 
 class PlantWires:
-    """Publishers, the command subscription, and the times between them."""
+    """Publishers, subscriptions and response times of a plant node."""
 
     def __init__(
         self,
@@ -76,11 +134,11 @@ class PlantWires:
         Args:
             node: Owner of the endpoints.
             robot: The robot.
-            guard: Takes the commands; only touched under `self.lock`.
+            guard: Receives the commands; only touched under `self.lock`.
             simulated: Whether the truth is published.
             clock: Whether the clock is published.
-            odometry: Whether the plant says where it is; if not, somebody else does.
-            mocap: Publish the poses of the motion capture that it makes.
+            odometry: Whether the plant publishes odometry; if not, another node does.
+            mocap: Makes the motion capture whose poses are published; None: none.
             lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
                 clock, without it, a person may take the actuators, and commands go before other work.
             simulated_time: Clock of a simulated plant, by which actuators follow commands.
@@ -92,11 +150,11 @@ class PlantWires:
         self.lock = threading.Condition()
         self.latency_ms = Spread()
         self.answers = 0  # states that a command has answered
-        self.listening = True  # whether commands of controllers are heard
+        self.listening = True  # whether commands of controllers count
         self._guard = guard
         self._simulated_time = simulated_time
         self._sent = SentStates(guard.watchdog.timeout_ns)
-        # Who knows where the robot is from elsewhere answers stamps of another clock.
+        # Without them, commands answer odometry of another node, whose stamps are of another clock.
         self._knows_ages = simulated or odometry
         self.answered_ns: int | None = None  # stamp of the newest command that was taken
         self._clock_ns = 0
@@ -119,12 +177,10 @@ class PlantWires:
         self._write_imu = ImuWriter(robot, frames)
         self._write_state = VectorWriter(robot.actuators.names)
         self._node = node
-        self._things: dict[
-            str, Publisher
-        ] = {}  # most robots are alone, so that each is made when it is there
+        self._things: dict[str, Publisher] = {}  # each made with its first pose: most robots are alone
         wire = command_wire(robot)
-        # By the clock the newest command counts. A reliable reader would hold it back while one that a network lost is
-        # asked for again, which takes seconds.
+        # By the clock the newest command counts. A reliable reader would hold it back for seconds while a lost one is
+        # sent again.
         commands = subscriber_qos(wire, reliable=lockstep)
         names = robot.actuators.names
         by_velocity = wire is VELOCITY_COMMAND
@@ -150,7 +206,7 @@ class PlantWires:
         self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
 
     def destroy(self, node: LifecycleNode) -> None:
-        """Give every endpoint back."""
+        """Destroy every endpoint."""
         self.end_capture()
         for subscription in (self._commands, *self._operator):
             node.destroy_subscription(subscription)
@@ -163,20 +219,20 @@ class PlantWires:
         return [*(publisher for publisher in made if publisher is not None), *self._things.values()]
 
     def subscribers(self) -> int:
-        """Matched subscriptions of the odometry, of the poses in its place, or of the actuators' state."""
+        """Matched subscriptions of the odometry, else of the poses, else of the actuators' state."""
         return int((self._odometry or self._poses or self._state).get_subscription_count())
 
     def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
-        """Publish what the backend reports; the odometry first, since somebody waits for it.
+        """Publish a sample, the odometry first, since the controller waits for it.
 
         Args:
             sample: From the backend.
-            time_ns: Time of measurement, where the sample names none [ns].
-            resend: Only the odometry, once more.
+            time_ns: Time of measurement, where the sample has none [ns].
+            resend: Repeat only the odometry.
         """
         if sample.stamp_ns is not None:
             if 0 <= self._captured_ns - sample.stamp_ns <= BACK_NS:
-                return  # a device that has nothing new; further back, somebody has set the clock
+                return  # a device that has nothing new; further back, the clock was set
             time_ns = self._captured_ns = sample.stamp_ns
         with self.lock:
             self._sent.note(time_ns, time.monotonic_ns())
@@ -208,12 +264,12 @@ class PlantWires:
         self._publish(self._things[name], self._write_pose.write(rigid_of(at_rest(*pose)), time_ns))
 
     def publish_truth(self, sample: Sample, time_ns: int) -> None:
-        """Publish where the robot really is, if the backend knows and somebody listens."""
+        """Publish the true state, if the backend knows it and it has a subscriber."""
         if self._truth is not None and sample.truth is not None and self._truth.get_subscription_count():
             self._publish(self._truth, self._write_truth.raw(sample.truth, time_ns))
 
     def publish_applied(self, command: np.ndarray, time_ns: int) -> None:
-        """Publish what the actuators are doing from this time on, if somebody listens."""
+        """Publish what the actuators do from this time on, if it has a subscriber."""
         if self._state.get_subscription_count():
             self._publish(self._state, self._write_state.raw(command, time_ns))
 
@@ -223,12 +279,12 @@ class PlantWires:
             self._mocap.close()
 
     def expect_no_answers(self) -> None:
-        """Take and time no command any more that answers what was sent so far."""
+        """Accept and time no more commands that answer what was sent so far."""
         with self.lock:
             self._sent.close()
 
     def flush(self) -> None:
-        """Wait, not for ever, until every subscriber has the last states."""
+        """Wait for a limited time until every subscriber has the last states."""
         flush(self._publishers(), self._flush_s)
 
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:

@@ -1,12 +1,20 @@
-"""Quality of service of each wire, for publishers and for subscribers.
+"""Quality of service of each wire, and waiting for its readers.
 
-Follows `Wire.delivery`. No deadline is requested anywhere: a publisher that offers none would never match.
+QoS follows `Wire.delivery`. No deadline is requested anywhere: a publisher that offers none would never match.
 """
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterable
+from typing import Any
+
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.duration import Duration
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from fulmar_core.errors import LockstepError
 from fulmar_core.topics import Wire
 
 STREAM_DEPTH = 50  # a recorder that the machine holds up for as many steps still gets them all
@@ -60,3 +68,50 @@ def _profile(*, reliable: bool, latched: bool, depth: int) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
+
+
+# What rclpy raises where the history is full has no public name.
+
+
+PATIENCE_S = 4.0  # less than a plant waits for an answer, so that whoever is held up says why
+FLUSH_S = 2.0  # at the end of a run; a launcher that asked for the end waits 4 s
+PAUSE_S = 0.002  # the middleware waits with the interpreter held; here others get it
+
+
+def publish_patiently(publisher: Publisher, message: Any) -> None:
+    """Publish, as soon as the readers have room.
+
+    A reader that lags behind holds up lock step. One whose process has died counts until the run is ended for that,
+    or until the middleware misses it.
+
+    Args:
+        publisher: With everything kept, see `publisher_qos`.
+        message: Of its type.
+
+    Raises:
+        LockstepError: No room was made for 4 s.
+    """
+    until = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            publisher.publish(message)
+            return
+        except RCLError as error:
+            if time.monotonic() > until:
+                raise LockstepError(
+                    f"{publisher.topic_name}: a reader has taken nothing for {PATIENCE_S:g} s and holds up lock step. "
+                    f"Does the recorder hang? ({str(error).splitlines()[0]})"
+                ) from error
+            time.sleep(PAUSE_S)
+
+
+def flush(publishers: Iterable[Publisher], limit_s: float) -> None:
+    """Wait until every reader has what was published, not for ever.
+
+    Args:
+        publishers: Reliable ones.
+        limit_s: For all of them together [s].
+    """
+    until = time.monotonic() + limit_s
+    for publisher in publishers:
+        publisher.wait_for_all_acked(Duration(seconds=max(0.0, until - time.monotonic())))

@@ -1,4 +1,4 @@
-"""What a recorder says about itself on the diagnostics, once a second and so into the bag too."""
+"""Diagnostics of a recorder, once a second, and so in the bag too."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
+from fulmar_bags.ring import RECORDER
 from fulmar_bags.writer_thread import SLOW_S, Account
-from fulmar_core.topics import DIAGNOSTICS
-from fulmar_ros.fault_signs import RECORDER
 from fulmar_ros.health import Health
-from fulmar_ros.qos import publisher_qos
 
 PERIOD_S = 1.0
 COMMANDERS = "command_publishers"  # key of the publishers of commands that the recorder is matched with
-LITTLE_ROOM = 200_000_000  # bytes free on the disk; below, it is told before it is full
+LITTLE_ROOM = 200_000_000  # bytes free on the disk; below, it is a warning
 
 
 class RecorderHealth:
@@ -38,20 +35,19 @@ class RecorderHealth:
             node: Publishes and keeps the time.
             robot: Name of the robot.
             directory: The bag; its disk is watched.
-            account: Asked once a second.
+            account: The account of the recording now.
             mode: What the recorder is doing, in a word or two.
-            commanders: Publishers of commands whose messages reach the recorder.
+            commanders: Number of publishers of commands that the recorder is matched with.
         """
         self._commanders = commanders
         self._account, self._mode, self._directory = account, mode, directory
-        publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._health = Health(f"{robot}: {RECORDER}", [publisher])
-        node.create_timer(PERIOD_S, self.tell)
+        self._health = Health(node, f"{robot}: {RECORDER}")
+        node.create_timer(PERIOD_S, self.publish)
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Publish what became of the messages so far."""
         account, free = self._account(), _free_bytes(self._directory)
-        level, message = verdict(account, free)
+        level, message = status_of(account, free)
         values = {
             "mode": self._mode(),
             COMMANDERS: str(self._commanders()),
@@ -68,16 +64,8 @@ class RecorderHealth:
         self._health.publish(level, message or self._mode(), values)
 
 
-def verdict(account: Account, free_bytes: int) -> tuple[str, str]:
-    """Level and words for an account.
-
-    Args:
-        account: Of a recording that goes on.
-        free_bytes: Room on its disk.
-
-    Returns:
-        `ok`, `warn` or `error`, and what is wrong; empty if nothing is.
-    """
+def status_of(account: Account, free_bytes: int) -> tuple[str, str]:
+    """Level (`ok`, `warn` or `error`) and problem, empty if there is none, of an account and the room on its disk."""
     dropped = sum(account.dropped.values())
     lost = f"; {dropped} messages were dropped" if dropped else ""
     if account.problem:

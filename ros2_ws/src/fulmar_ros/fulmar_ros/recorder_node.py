@@ -14,13 +14,12 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from fulmar_bags.per_goal import BagPerGoal
-from fulmar_bags.ring import BagRing
+from fulmar_bags.ring import BagRing, fault_finder
 from fulmar_bags.writer import BagWriter, check_free
 from fulmar_bags.writer_thread import BagThread
 from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
 from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire, thing_wire
-from fulmar_ros.fault_signs import fault_finder
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import EVERYTHING, subscriber_qos
@@ -76,8 +75,8 @@ class RecorderNode(Node):
             lambda: self._mode,
             lambda: sum(each.get_publisher_count() for each in commands),
         )
-        told = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
-        sys.stdout.write(f"{told} {self._directory}\n")
+        doing = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
+        sys.stdout.write(f"{doing} {self._directory}\n")
         sys.stdout.flush()
 
     @property
@@ -118,7 +117,7 @@ class RecorderNode(Node):
         return {topic: wire.latest for wire, topic in self._topics.items() if wire.delivery == "latched"}
 
     def _new_ring(self) -> BagRing:
-        """A ring; that no bag could be written is told now, not at the fault.
+        """A ring; a folder that cannot be written is refused now, not at the fault.
 
         Raises:
             BagError: If it could not.
@@ -141,12 +140,12 @@ class RecorderNode(Node):
         return lambda data: put(topic, data, time.time_ns())
 
     def _attach_provenance(self) -> None:
-        """Tell the code and the packages; git and a slow disk may take seconds, in which messages come already."""
+        """Attach code version and packages; git and a slow disk may take seconds, while messages come already."""
         for name, data in attachments().items():
             self._thread.attach(name, data)
 
     def stop(self) -> int:
-        """Wait until nothing more comes, close the bag, and say what is in it."""
+        """Wait until no more messages come, close the bag, and print its content."""
         self._provenance.join(LONGEST_GOODBYE_S)
         deadline = time.monotonic() + LONGEST_GOODBYE_S
         before = -1
@@ -178,7 +177,7 @@ def _message_class(wire: Wire) -> type | None:
 
 
 def main() -> None:
-    """Record until told to stop."""
+    """Record until stopped."""
     sys.exit(run_node(RecorderNode))
 
 

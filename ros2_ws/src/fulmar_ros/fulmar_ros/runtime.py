@@ -1,7 +1,7 @@
-"""How every node process lives: start, spin, stop in order, and an exit code that says how it went.
+"""Life cycle of every node process: start, spin, orderly stop, and exit code.
 
 The only home of `rclpy.init` and of spinning. The executor spins in a thread of its own, so that the main
-thread is free for signals and for a control loop's last words.
+thread is free for signals and for the last messages of a control loop.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ RequestExit = Callable[[int], None]
 
 
 def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | None = None) -> int:
-    """Build one node, spin it until it is told to stop, and stop it in order.
+    """Build one node, spin it until it is stopped, and stop it in order.
 
     SIGINT, SIGTERM, SIGQUIT and, unless `nohup` had it ignored, SIGHUP (the terminal or the ssh connection is gone) ask
     for an orderly end with exit code 0. A node may have a method `stop()`: it is
@@ -87,7 +87,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
 def end_with_parent() -> None:
     """Ask the kernel for SIGINT when the launcher that started us dies, so that no node is left behind.
 
-    Only for children that were told their launcher's id; a node that a person started outlives the shell as usual.
+    Only for children with their launcher's id in the environment; a node that a person started outlives the shell.
     """
     parent = os.environ.get("FULMAR_PARENT_PID", "")
     if parent.isdecimal():
@@ -121,7 +121,7 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
 
     Args:
         node: The node.
-        on_error: Told, in that thread, what a callback raised; no further callback is served then.
+        on_error: Called in that thread with what a callback raised; no further callback is served then.
     """
     executor, over = _executor(), Future()
     executor.add_node(node)
@@ -132,7 +132,7 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
             # which burns a core and starves the timers. A finite wait in a loop does what spin() should.
             while not over.done():
                 executor.spin_until_future_complete(over, timeout_sec=SPIN_S)
-        except Exception as error:  # noqa: BLE001 - whatever a callback raises is the owner's to judge
+        except Exception as error:  # noqa: BLE001 - whatever a callback raises, the owner decides
             # The node may have been destroyed below a callback that took too long to end.
             if not (over.done() and isinstance(error, InvalidHandle)):
                 on_error(error)
@@ -146,6 +146,19 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
         thread.join(timeout=2.0)
         executor.shutdown()
         node.destroy_node()
+
+
+@contextlib.contextmanager
+def ros_node(name: str, on_error: Callable[[Exception], None], *, namespace: str = "") -> Iterator[Node]:
+    """A node of a process that is no node itself: rclpy starts, the node spins, and both end with the context."""
+    set_up_middleware()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node(name, namespace=namespace or None)
+        with spinning(node, on_error):
+            yield node
+    finally:
+        rclpy.try_shutdown()
 
 
 def _stop(node: Any) -> int:

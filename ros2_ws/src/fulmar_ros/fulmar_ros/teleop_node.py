@@ -1,4 +1,4 @@
-"""The node `teleop`: a person's hand on the robot, by keyboard or gamepad, with a dead-man switch.
+"""The node `teleop`: manual control by keyboard or gamepad, with a dead-man switch.
 
 Nothing is sent before the switch is held for the first time. From then on the person has the robot: let go, and it
 stands still; the controller gets it back only when the person says so.
@@ -30,14 +30,14 @@ from fulmar_core.robot import load_robot
 from fulmar_core.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping
 from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
 from fulmar_ros.convert import VectorWriter
-from fulmar_ros.node_robot import heard_words
+from fulmar_ros.graph import running_robots_text
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 RATE_HZ = 20.0
 SAFE_REPEATS = 5
-PATIENCE_S = 3.0  # for a plant that receives the commands, before a person is told
+PATIENCE_S = 3.0  # for a plant that receives the commands, before a warning
 ANSWER_S = 2.0  # a plant that does not answer a request by then is asked again
 FLUSH = Duration(seconds=0.3)
 HELP = "w/s ahead, back · a/d turn · q/e left, right · hold a key: it is the dead-man switch · g give back · x end"
@@ -114,11 +114,11 @@ class TeleopNode(Node):
             self._thread.start()
 
     def _look_for_plant(self) -> None:
-        """Say once that nobody receives the commands, where that is so."""
+        """Warn once if no plant receives the commands."""
         self._patience.cancel()
         if not self._publisher.get_subscription_count():
             self.get_logger().warning(
-                f"no plant subscribes {self._publisher.topic_name}. {heard_words(self)}"
+                f"no plant subscribes {self._publisher.topic_name}. {running_robots_text(self)}"
             )
 
     def _on_joy(self, message: Joy) -> None:
@@ -162,11 +162,11 @@ class TeleopNode(Node):
         """Ask the plant to listen to the controller again; it refuses while the hand still moves something."""
         if not self._has_robot or (self._request and time.monotonic() - self._asked_at < ANSWER_S):
             return
-        if self._request is not None:  # who was asked has died meanwhile, or hangs
+        if self._request is not None:  # the plant that was asked has died, or hangs
             self._service.remove_pending_request(self._request)
             self._request = None
         if not self._service.service_is_ready():
-            self._say(f"nobody takes the robot back: is its plant running? {heard_words(self)}")
+            self._say(f"nobody takes the robot back: is its plant running? {running_robots_text(self)}")
             return
         self._asked_at = time.monotonic()
         self._request = self._service.call_async(Trigger.Request())
@@ -187,7 +187,7 @@ class TeleopNode(Node):
         self._said = words or self._said
 
     def stop(self) -> None:
-        """Last words: the safe command, several times; the robot stands still until somebody gives it back."""
+        """Publish the safe command several times; the robot stands still until a person gives it back."""
         self._over.set()
         if self._has_robot:
             for _ in range(SAFE_REPEATS):
@@ -209,7 +209,7 @@ def _keys_at_once() -> Iterator[None]:
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(TeleopNode))
 
 

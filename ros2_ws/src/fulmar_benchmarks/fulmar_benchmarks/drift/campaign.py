@@ -25,7 +25,7 @@ from fulmar_benchmarks.outcomes import Judged
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
 from fulmar_benchmarks.unit import Unit, done_already
 from fulmar_benchmarks.work import Outcome, do_all
-from fulmar_bringup.node_table import RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_benchmarks.latency.watched_system import STEP_HZ, request_at, watched_system
 
 ALLOWED_MB = 5.0

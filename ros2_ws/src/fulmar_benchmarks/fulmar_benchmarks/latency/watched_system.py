@@ -12,10 +12,10 @@ import psutil
 
 from fulmar_bringup.bag_origin import run_info
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_bringup.processes import ProcessGroup
-from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.readiness import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import RunFailed

@@ -1,4 +1,4 @@
-"""One commissioning from start to finish: driver up, wires pulsed, driver down, findings."""
+"""One commissioning: start the driver, pulse the wires, stop the driver, report the findings."""
 
 from __future__ import annotations
 
@@ -11,25 +11,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import rclpy
 import yaml
-from rclpy.signals import SignalHandlerOptions
 
+from fulmar_bringup.commissioning.hardware_file import Wire, actuator_names, wires_of
 from fulmar_bringup.commissioning.procedure import Outcome, click, measure
 from fulmar_bringup.commissioning.session import Session
-from fulmar_bringup.commissioning.wires import Wire, actuator_names, wires_of
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.emulation import Emulation, emulation_of
-from fulmar_bringup.node_table import RunPlan, emulator_spec, guard_specs, plant_spec
 from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.commissioning.match import indistinct, left_over
 from fulmar_core.robot import Robot, load_robot
-from fulmar_ros.middleware import set_up_middleware
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import ros_node
 from hardware_drivers.settings import GpioValves, Hardware, hardware_path, load_hardware
 from hardware_drivers.wiring import SIDES
+from policy_server.controllers import EXTERNAL
 
 WIRINGS = ("as_written", "shuffled", "inverted", "dead")  # of an emulated device
 CONTROL_HZ = 10.0  # that the driver's watchdog follows from: 0.2 s
@@ -50,14 +49,7 @@ class Request:
 
 
 def commission(request: Request, say: Say) -> dict[str, Any]:
-    """Click or pulse every wire of a robot.
-
-    Args:
-        request: What to do.
-        say: Prints progress.
-
-    Returns:
-        Findings, as `fulmar commission --json` prints them.
+    """Click or pulse every wire of a robot; returns the findings as `fulmar commission --json` prints them.
 
     Raises:
         ConfigError: The hardware file is wrong, or another run uses this ROS domain.
@@ -90,11 +82,15 @@ def commission(request: Request, say: Say) -> dict[str, Any]:
 def _session(
     request: Request, path: str, hardware: Hardware, emulation: Emulation | None, say: Say
 ) -> Outcome | None:
-    """Start driver, e-stop and perhaps emulator; click or measure; stop all. None after clicks."""
+    """Start the rows of a plan whose external controller is this process, click or measure, and stop them.
+
+    Returns:
+        What was measured; None after clicks.
+    """
     robot, wires = load_robot(hardware.robot), wires_of(hardware)
     plan = RunPlan(
-        robot.name, "go_to_position", "lqr", "hardware", CONTROL_HZ, hardware=path, seed=request.seed,
-        emulated=request.emulate, arm=request.arm, guards=Guards(estop=True),
+        robot.name, "go_to_position", EXTERNAL, "hardware", CONTROL_HZ, hardware=path, seed=request.seed,
+        emulated=emulation is not None, arm=request.arm, guards=Guards(estop=True),
     )  # fmt: skip
     group = ProcessGroup()
 
@@ -102,38 +98,25 @@ def _session(
         end = group.ended()
         return f"{end.text}: {group.last_words(end.name)}" if end else ""
 
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     errors: list[Exception] = []
-    try:
-        node = rclpy.create_node("commission", namespace=plan.namespace)
-        with spinning(node, errors.append):
-            session = Session(
-                node,
-                robot,
-                from_outside=hardware.seen_from_outside,
-                bearing=hardware.has_bearing,
-                ended=ended,
-            )
-            session.needs_poses = request.pulses
-            try:
-                if emulation is not None:
-                    group.start(emulator_spec(plan, emulation))
-                group.start(plant_spec(plan, port=request.port or (emulation.port if emulation else "")))
-                for spec in guard_specs(plan):
-                    group.start(replace(spec, quiet=True))
-                session.until_ready()
-                if not request.pulses:
-                    click(session, robot, wires, say)
-                    return None
-                return measure(session, robot, wires, say)
-            finally:
-                with contextlib.suppress(Exception):  # the driver makes safe by itself at its end
-                    session.make_safe()
-                group.stop("plant")
-                group.stop_all()
-    finally:
-        rclpy.try_shutdown()
+    with ros_node("commission", errors.append, namespace=plan.namespace) as node:
+        session = Session(
+            node, robot, from_outside=hardware.seen_from_outside, bearing=hardware.has_bearing, ended=ended
+        )
+        session.needs_poses = request.pulses
+        try:
+            for row in system_rows(plan, emulation=emulation, port=request.port).values():
+                group.start(replace(row, quiet=row.name == "estop"))
+            session.until_ready()
+            if not request.pulses:
+                click(session, robot, wires, say)
+                return None
+            return measure(session, robot, wires, say)
+        finally:
+            with contextlib.suppress(Exception):  # the driver makes safe by itself at its end
+                session.make_safe()
+            group.stop("plant")
+            group.stop_all()
 
 
 def _findings(robot: Robot, hardware: Hardware, outcome: Outcome, *, flipped: bool) -> dict[str, Any]:
@@ -177,32 +160,22 @@ def _findings(robot: Robot, hardware: Hardware, outcome: Outcome, *, flipped: bo
 
 
 def is_right(hardware: Hardware, emulated: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
-    """Whether the findings are what the emulated wiring is.
-
-    Args:
-        hardware: The file that the driver believed.
-        emulated: Parameters of the emulator.
-        found: Findings.
-    """
+    """Whether the findings are the emulated wiring, by the hardware file and the parameters of the emulator."""
     driver = hardware.driver
     names = actuator_names(load_robot(hardware.robot))
     dead = [int(wire) for wire in emulated.get("dead", [])]
     if isinstance(driver, GpioValves) or "inverted" in emulated:
-        inverted = emulated.get("active_low", getattr(driver, "active_low", None)) != getattr(
-            driver, "active_low", None
-        ) or bool(emulated.get("inverted"))
+        level = getattr(driver, "active_low", None)
+        inverted = emulated.get("active_low", level) != level or bool(emulated.get("inverted"))
         if inverted != found["inverted"]:
             return False
         if emulated.get("inverted"):
             return not found["success"]
-    truth = (
-        [names[thruster] for thruster in emulated["order"]]
-        if "order" in emulated
-        else [
-            ("-" if "-" in side else "") + names[SIDES.index(side.removeprefix("-"))]
-            for side in emulated["sides"]
-        ]
-    )
+    if "order" in emulated:
+        truth = [names[thruster] for thruster in emulated["order"]]
+    else:
+        sides = [("-" * ("-" in side), SIDES.index(side.removeprefix("-"))) for side in emulated["sides"]]
+        truth = [sign + names[side] for sign, side in sides]
     return all(
         wire["drives"] == (None if number in dead else truth[number])
         for number, wire in enumerate(found["wires"])
@@ -239,13 +212,7 @@ def _emulation(hardware: Hardware, folder: Path, request: Request) -> Emulation:
 
 
 def rewired(hardware: Hardware, wiring: str, seed: int) -> Mapping[str, Any]:
-    """Parameters of an emulator whose wiring is not that of the file.
-
-    Args:
-        hardware: The file.
-        wiring: One of WIRINGS.
-        seed: Which shuffle, which dead wire.
-    """
+    """Parameters of an emulator with one of WIRINGS; the seed draws the shuffle or the dead wire."""
     rng, count = random.Random(seed), len(wires_of(hardware))
     valves = hardware.opens_valves
     if wiring == "dead":

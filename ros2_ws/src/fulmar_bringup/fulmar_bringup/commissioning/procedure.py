@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fulmar_bringup.commissioning.hardware_file import Wire, command_of
 from fulmar_bringup.commissioning.session import Session
-from fulmar_bringup.commissioning.wires import Wire, command_of
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.commissioning.match import CLEARLY, Match, match_nozzles, match_sides
@@ -25,11 +25,8 @@ BETWEEN_S = {"floating": 0.6, "coasting": 1.0, "rolling": 0.6}
 # that turns backwards shows at the negative share first, by as much as another at the positive one.
 SHARES = (0.25, 0.34, 0.42, 0.5, 0.65, 0.8, 1.0)
 ALIKE = 3  # shares that the second propeller is tried with, from the one that moved the first: they are alike
-BRAKES = (
-    1.6,
-    1.0,
-    1.0,
-)  # of the share that moved it; astern, propellers push less. Our values, as the next two
+# Of the share that moved it; astern, propellers push less. Our values, as the next two.
+BRAKES = (1.6, 1.0, 1.0)
 CREEPS = 0.01  # a boat that is slower need not be stopped before the next pulse [m/s]
 SPEED_OVER_S = 0.5  # a speed is averaged over so long [s]
 Say = Callable[[str], None]
@@ -44,14 +41,7 @@ class Outcome:
 
 
 def click(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> None:
-    """Open one valve after another for a moment, with the air closed, for a person who listens.
-
-    Args:
-        session: Where to command.
-        robot: With thrusters.
-        wires: Which.
-        say: Prints the wire that clicks.
-    """
+    """Open one valve after another for a moment, with the air closed, for a person who listens."""
     for wire in wires:
         say(wire.name)
         session.pulse(command_of(robot, wire), CLICK_S)
@@ -59,16 +49,7 @@ def click(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> No
 
 
 def measure(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> Outcome:
-    """Pulse one wire after another and identify the actuator behind each.
-
-    Args:
-        session: Where to command, ready.
-        robot: The robot.
-        wires: Which.
-        say: Prints the wire that is pulsed.
-
-    Returns:
-        What each wire drives.
+    """Pulse one wire after another, in a session that is ready, and identify the actuator behind each.
 
     Raises:
         RunFailed: Something ended it; see `Session.pulse`.

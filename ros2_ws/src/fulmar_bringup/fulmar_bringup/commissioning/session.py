@@ -1,4 +1,4 @@
-"""A controller of pulses: commands one wire at a time, reads poses, and stops when anything is not as it must be."""
+"""Controller of commissioning pulses: commands one wire at a time, reads poses, and stops on any problem."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.convert import TwistWriter, VectorWriter
-from fulmar_ros.node_robot import name_of, own_frames
+from fulmar_ros.parameters import name_of, own_frames
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 MOST_TRAVEL_M = 0.5
@@ -42,22 +42,19 @@ READY_S = 40.0  # for driver, poses and air to come up
 
 
 class Session:
-    """One robot under commissioning.
-
-    Every wait commands something and checks first: the e-stop, the driver, the poses, and the way from the start.
-    """
+    """One robot under commissioning; each command first checks e-stop, driver, poses and distance from the start."""
 
     def __init__(
         self, node: Node, robot: Robot, *, from_outside: bool, bearing: bool, ended: Callable[[], str]
     ) -> None:
-        """Create every endpoint.
+        """Create every endpoint of a node in the robot's namespace.
 
         Args:
-            node: Owner of the endpoints, in the robot's namespace.
+            node: The node.
             robot: The robot.
-            from_outside: Whether motion capture alone knows the pose.
+            from_outside: Whether the pose comes from motion capture alone.
             bearing: Whether the robot floats on an air bearing of its driver.
-            ended: Says which process has ended, or nothing.
+            ended: Returns which process has ended, or an empty text.
         """
         self._robot, self._name, self._ended = robot, name_of(node, robot), ended
         self._lock = threading.Lock()
@@ -77,12 +74,8 @@ class Session:
         kind = TwistStamped if by_velocity else JointState
         self._command = node.create_publisher(kind, wire.name, publisher_qos(wire))
         poses = MOCAP if from_outside else ODOMETRY
-        node.create_subscription(
-            PoseStamped if from_outside else Odometry,
-            poses.name,
-            self._on_pose,
-            subscriber_qos(poses, depth=50),
-        )
+        pose_kind = PoseStamped if from_outside else Odometry
+        node.create_subscription(pose_kind, poses.name, self._on_pose, subscriber_qos(poses, depth=50))
         state = subscriber_qos(ACTUATORS_STATE, reliable=True, depth=50)
         node.create_subscription(JointState, ACTUATORS_STATE.name, self._on_applied, state)
         node.create_subscription(
@@ -117,14 +110,7 @@ class Session:
         self._hold(self._robot.actuators.safe_command, seconds)
 
     def pulse(self, command: np.ndarray, seconds: float) -> Pulse:
-        """Command something for some time, then nothing.
-
-        Args:
-            command: Shape (n,).
-            seconds: How long [s].
-
-        Returns:
-            When the driver applied it.
+        """Command something of shape (n,) for some time [s], then nothing; returns when the driver applied it.
 
         Raises:
             RunFailed: The e-stop, the driver, the poses or the way from the start ended it.

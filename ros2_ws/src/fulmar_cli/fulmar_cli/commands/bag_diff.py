@@ -36,7 +36,7 @@ def diff(
     Exit code: 0 the same, 1 something differs or there is nothing to compare or part of a bag could not be read, 2 a
     bag cannot be read.
     """
-    from fulmar_bags.difference import differing
+    from fulmar_bags.comparison import differing
 
     bags = [open_and_warn(bag), open_and_warn(other)]
     found = differing(*bags, tolerance=tolerance, only=topic)

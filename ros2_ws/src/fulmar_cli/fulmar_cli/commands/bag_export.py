@@ -56,7 +56,7 @@ def export(
         file, left_out = write_npz(opened[0], path.with_suffix(".npz"))
         files = [file]
     else:
-        from fulmar_bags.control_steps import course_of
+        from fulmar_bags.control_steps import control_steps_of
         from fulmar_bags.lerobot import write_lerobot
 
         for bag in opened:
@@ -64,7 +64,7 @@ def export(
                 raise BagError(
                     f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
                 )
-        courses = [course_of(bag, task=task) for bag in opened]
+        courses = [control_steps_of(bag, task=task) for bag in opened]
         titles = [course.task.title for course in courses]
         folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
         files, left_out = [folder], []

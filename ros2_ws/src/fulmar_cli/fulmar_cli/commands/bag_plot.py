@@ -41,7 +41,7 @@ def plot(
     files = out or [beside / "plot.html", beside / "plot.png"]
     with knowing_what_it_carries(opened):
         if _has_a_task(bag) and odometry is None:
-            from fulmar_bags.run_reader import read_run
+            from fulmar_bags.run_record import read_run
             from fulmar_evaluation.report import write_report
 
             record = read_run(bag)
@@ -58,7 +58,7 @@ def plot(
 
 def _has_a_task(bag: Path) -> bool:
     """Whether this is a run that can be judged."""
-    from fulmar_bags.run_reader import read_run
+    from fulmar_bags.run_record import read_run
     from fulmar_core.errors import FulmarError
     from fulmar_evaluation.run_evaluation import judge
 

@@ -15,7 +15,7 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 
 if TYPE_CHECKING:
     from fulmar_bags.contents import Bag
-    from fulmar_bags.control_steps import Course
+    from fulmar_bags.control_steps import ControlSteps
 
 WAYS = ("direct", "node")
 SHOWN = 12  # lines of fields that differ
@@ -82,7 +82,7 @@ def rerun(
     from fulmar_bags.comparison import as_json as lines
     from fulmar_bags.comparison import first_difference, read_tolerances
     from fulmar_bags.contents import open_bag
-    from fulmar_bags.control_steps import course_of
+    from fulmar_bags.control_steps import control_steps_of
     from fulmar_bags.figures import controllers_of
     from fulmar_evaluation.rerun.answers_file import check_answers_file, write_answers
     from fulmar_evaluation.rerun.calibration import calibrated_as
@@ -102,7 +102,7 @@ def rerun(
     foreign = opened.info is None
     _check_effect(source, through, foreign=foreign, options={"--goal": goal, "--odometry": odometry})
     with knowing_what_it_carries(opened), calibrated_as(opened):
-        course = course_of(
+        course = control_steps_of(
             opened,
             robot=robot,
             task=task,
@@ -172,7 +172,7 @@ def _check_effect(source: str, through: str, *, foreign: bool, options: dict[str
         raise ConfigError(f"{given[0]} changes nothing where observations are fed. Add --from odometry.")
 
 
-def _chosen(bag: Bag, course: Course, controller: str | None, policy: Path | None) -> tuple[str, str]:
+def _chosen(bag: Bag, course: ControlSteps, controller: str | None, policy: Path | None) -> tuple[str, str]:
     """Name of the controller and folder of its bundle, empty where it has none."""
     from fulmar_bags.control_steps import policy_folder
     from fulmar_core.own_class import is_own

@@ -100,7 +100,7 @@ def verify(
 @bundle.command()
 def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
     """Load a bundle as the robot would: hashes, robot, task, rate, names, shapes, golden vectors."""
-    from fulmar_bringup.planning import checked_rate
+    from fulmar_bringup.plan_checks import checked_rate
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task

@@ -59,7 +59,7 @@ def commission(
     from fulmar_bringup.commissioning.commission import commission as conduct
     from fulmar_bringup.commissioning.hardware_file import line_of, write_line
     from fulmar_bringup.emulation import check_emulated
-    from fulmar_bringup.planning import check_arming
+    from fulmar_bringup.plan_checks import check_arming
     from fulmar_cli.extras import require
     from hardware_drivers.own_driver import check_own_driver
     from hardware_drivers.presence import check_presence

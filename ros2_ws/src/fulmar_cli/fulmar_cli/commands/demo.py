@@ -22,7 +22,7 @@ def demo(
     ] = None,
 ) -> None:
     """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
-    from fulmar_bags.run_reader import read_run
+    from fulmar_bags.run_record import read_run
     from fulmar_bringup.planning import plan_run
     from fulmar_cli.extras import require
     from fulmar_evaluation.report import write_report

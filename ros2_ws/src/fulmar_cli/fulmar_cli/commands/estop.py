@@ -11,7 +11,7 @@ from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.errors import FAILED, RunFailed
 
 if TYPE_CHECKING:
-    from fulmar_bringup.stop_robots import Stopped
+    from fulmar_bringup.estop_robots import Stopped
 
 
 def estop(
@@ -43,7 +43,7 @@ def estop(
             came = person.reset_all(robot)
         else:
             came = {one.space: one.answer or _unanswered(one) for one in person.stop_all(robot)}
-        heard = f" {person.heard_words()}" if robot and not came else ""
+        heard = f" {person.running_robots_text()}" if robot and not came else ""
     answers = [
         {"robot": space.strip("/"), "done": done, "said": words} for space, (done, words) in came.items()
     ]
@@ -64,7 +64,7 @@ def estop(
 
 def _unanswered(robot: Stopped) -> tuple[bool, str]:
     """Whether a robot is stopped for which no e-stop node answers, and words for it."""
-    if robot.heard:
+    if robot.reached:
         return (
             True,
             "stopped on the wire, since no e-stop node answers: it stays so until `fulmar estop --reset`",

@@ -10,8 +10,8 @@ import typer
 from rich.table import Table
 
 from fulmar_bringup.console import console, output, print_json
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.progress import step_bar
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_cli.commands.arguments import (
     CalibrationOption,
     ControllerOption,
@@ -96,12 +96,11 @@ def evaluate(
 
     fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
     """
-    from fulmar_bringup.planning import checked_rate, chosen_policy
+    from fulmar_bringup.plan_checks import checked_rate, chosen_policy
     from fulmar_bringup.system import check_names, gains_note, modules_of
     from fulmar_cli.extras import require
-    from fulmar_core.calibration import use_calibration
     from fulmar_core.disturbances.scenario import check_delays, load_scenario
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robot import load_robot, use_calibration
     from fulmar_core.rollout import WORLDS
     from fulmar_core.tasks import load_task
     from fulmar_evaluation.evaluation import (

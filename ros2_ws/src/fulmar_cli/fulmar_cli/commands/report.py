@@ -37,7 +37,7 @@ def report(
     report has the path, the speed, the actuators and the rates, and says what is missing.
     """
     from fulmar_bags.contents import open_bag
-    from fulmar_bags.run_reader import read_any_run
+    from fulmar_bags.run_record import read_any_run
     from fulmar_core.tasks import load_task
     from fulmar_evaluation.report import write_report
     from fulmar_evaluation.report.bag_plots import write_pictures

@@ -214,12 +214,11 @@ def run(
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
-    from fulmar_bringup.default_task import check_heading, default_task
-    from fulmar_bringup.goal_plan import default_task as task_of_goals
+    from fulmar_bringup.goal_plan import check_heading, default_task, task_of_goals
     from fulmar_bringup.planning import plan_run
     from fulmar_bringup.system import gains_note, modules_of
     from fulmar_cli.extras import require
-    from fulmar_core.calibration import use_calibration
+    from fulmar_core.robot import use_calibration
     from fulmar_evaluation.run_outcome import run_and_evaluate
     from policy_server.controllers import controller_entry
 

@@ -51,7 +51,9 @@ def teleop(
 
         with operator() as person:
             if not person.robots_with(GIVE_BACK, name, wait_s=FIND_S):
-                raise RunFailed(f"no plant of '{name}' is heard in this ROS domain. {person.heard_words()}")
+                raise RunFailed(
+                    f"no plant of '{name}' is heard in this ROS domain. {person.running_robots_text()}"
+                )
             done, words = person.ask(f"{space}/{GIVE_BACK}")
         output.print(words, markup=False)
         raise typer.Exit(0 if done else FAILED)

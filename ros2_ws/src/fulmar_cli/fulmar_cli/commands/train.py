@@ -13,8 +13,8 @@ import typer
 from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import CalibrationOption, JsonOption, SeedOption
 from fulmar_cli.extras import require
-from fulmar_core.calibration import use_calibration
 from fulmar_core.errors import FAILED, ConfigError
+from fulmar_core.robot import use_calibration
 
 if TYPE_CHECKING:
     from training.executors import Executor

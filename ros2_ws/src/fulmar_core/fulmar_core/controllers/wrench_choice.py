@@ -19,9 +19,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
 WRENCH = 3  # force ahead, to the left, and torque
-FULL_SHARE = (
-    1.5  # what a share of 1 asks for, in units: beyond one of them only the direction matters [-]
-)
+FULL_SHARE = 1.5  # what a share of 1 asks for, in units: beyond one of them only the direction matters [-]
 # Of missing all torque, where missing all force weighs 1: about as in the tuned LQR's cost-to-go.
 TORQUE_WEIGHT = 4.4
 VALVE_COST = 0.045  # of an open valve, where missing all force costs 1; what is not worth a valve opens none

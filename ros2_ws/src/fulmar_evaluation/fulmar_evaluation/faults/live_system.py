@@ -13,10 +13,11 @@ from pathlib import Path
 import rclpy
 from rclpy.node import Node
 
-from fulmar_bringup.node_table import NodeSpec, RunPlan, teleop_spec
+from fulmar_bringup.node_table import teleop_spec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
-from fulmar_bringup.starting import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.readiness import CONTROLLER_AND_RECORDER, while_starting
+from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.controller_settings import MOST_COPIES

@@ -9,8 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from fulmar_bringup.domains import reserved_domains
-from fulmar_bringup.environment import environment
+from fulmar_bringup.domains import environment, reserved_domains
 from fulmar_bringup.system import Guards, default_hardware, modules_of
 from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.robot import load_robot

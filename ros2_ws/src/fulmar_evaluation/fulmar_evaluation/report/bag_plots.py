@@ -16,9 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fulmar_bags.contents import Bag
-from fulmar_bags.decode import Odometries, Vectors, joint_vectors, odometries, twist_vectors
+from fulmar_bags.decode import TWIST, Odometries, Vectors, joint_vectors, odometries, twist_vectors
 from fulmar_bags.figures import describe
-from fulmar_bags.plain_twist import TYPE, plain_vectors
 from fulmar_core.errors import ConfigError
 from fulmar_evaluation.report.page import STYLE
 from fulmar_evaluation.report.sources import check_overwrite, source_mark
@@ -29,7 +28,7 @@ COLOUR = CONTROLLER_COLOURS["policy"]
 COMMANDS = {
     "sensor_msgs/msg/JointState": lambda topic: joint_vectors(topic, "effort"),
     "geometry_msgs/msg/TwistStamped": twist_vectors,
-    TYPE: plain_vectors,
+    TWIST: twist_vectors,
 }
 MOST_ACTUATORS = 16
 
@@ -114,7 +113,7 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
         if topic.type in COMMANDS and len(topic):
             vectors = COMMANDS[topic.type](topic)
             if len(vectors) and 0 < len(vectors.names) <= MOST_ACTUATORS:
-                found.append(_actuators(topic.name, vectors, _seconds(vectors, seen, topic.type == TYPE)))
+                found.append(_actuators(topic.name, vectors, _seconds(vectors, seen, topic.type == TWIST)))
     found.append(
         Drawing(
             "How late the odometry came", "Recorded minus stamped, beyond the quickest message.", 2.0, delay

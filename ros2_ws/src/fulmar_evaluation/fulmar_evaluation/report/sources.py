@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from fulmar_bags.folder import files_of
+from fulmar_bags.mcap_records import files_of
 from fulmar_core.errors import ConfigError
 
 MARK = "fulmar-report-of-"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.control_steps import Course
+from fulmar_bags.control_steps import ControlSteps
 from fulmar_core.errors import ConfigError
 from fulmar_evaluation.rerun.rerun import Answers
 
@@ -25,7 +25,7 @@ def check_answers_file(path: Path) -> None:
         raise ConfigError(f"--out {path}: answers are written as .csv or .npz. Give such a name.")
 
 
-def write_answers(course: Course, answers: Answers, path: Path) -> None:
+def write_answers(course: ControlSteps, answers: Answers, path: Path) -> None:
     """Write one row for each step: stamp [ns], whether the controller was asked and why not, and its vectors.
 
     Args:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fulmar_bags.contents import Bag
 from fulmar_bringup.bag_origin import CALIBRATION
-from fulmar_bringup.environment import environment
+from fulmar_bringup.domains import environment
 from fulmar_core.calibration import VARIABLE
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bags.contents import Bag, open_bag
-from fulmar_bringup.environment import environment
+from fulmar_bringup.domains import environment
 from fulmar_core.controllers.classical import entry_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import OWN_FOLDERS, config_names

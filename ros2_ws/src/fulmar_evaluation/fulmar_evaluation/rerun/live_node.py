@@ -21,12 +21,12 @@ from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bags.contents import Bag, json_object
-from fulmar_bags.control_steps import Course
+from fulmar_bags.control_steps import ControlSteps
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_bags.received import ABSENT, Told
+from fulmar_bags.wire_reader import ABSENT, Received
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.node_table import RunPlan
 from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import BagError, RunFailed
@@ -48,9 +48,8 @@ from fulmar_evaluation.rerun.rerun import Answers
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.middleware import set_up_middleware
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import FLUSH_S, flush, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
-from fulmar_ros.subscriber_wait import FLUSH_S, flush
 
 START_TIMEOUT_S, ANSWER_TIMEOUT_S = 30.0, 10.0
 RESEND_S = 0.5
@@ -59,7 +58,7 @@ REASONING_S = 2.0  # for observation and action, which come after the command
 DEPTH = 50
 
 
-def without_repeats(course: Course) -> Course:
+def without_repeats(course: ControlSteps) -> ControlSteps:
     """The same course with each measurement once: in lock step a node answers one only once."""
     kept = np.concatenate(([True], np.diff(course.stamp_ns) != 0))
     rows = ("stamp_ns", "log_ns", "observations", "actions", "commands", "acted", "sample")
@@ -67,7 +66,7 @@ def without_repeats(course: Course) -> Course:
 
 
 def rerun_through_node(
-    bag: Bag, course: Course, controller: str, policy: str, odometry: str | None = None
+    bag: Bag, course: ControlSteps, controller: str, policy: str, odometry: str | None = None
 ) -> tuple[Answers, str | None]:
     """Feed a recorded run to a controller node of its own, in a ROS domain of its own.
 
@@ -158,7 +157,7 @@ class _Heard:
 
 
 def _exchange(
-    raw: dict[str, list[bytes]], course: Course, namespace: str, group: ProcessGroup
+    raw: dict[str, list[bytes]], course: ControlSteps, namespace: str, group: ProcessGroup
 ) -> tuple[Answers, str | None]:
     set_up_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
@@ -179,7 +178,7 @@ def _exchange(
 class _Wires:
     """Our endpoints: those of a plant and of an operator."""
 
-    def __init__(self, node: Node, course: Course, heard: _Heard) -> None:
+    def __init__(self, node: Node, course: ControlSteps, heard: _Heard) -> None:
         self._node, self._heard = node, heard
         goal = GOAL_WIRES[course.task.goal_topic]
         self.odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
@@ -240,7 +239,7 @@ class _Wires:
 
 
 def _feed(
-    raw: dict[str, list[bytes]], course: Course, group: ProcessGroup, wires: _Wires, heard: _Heard
+    raw: dict[str, list[bytes]], course: ControlSteps, group: ProcessGroup, wires: _Wires, heard: _Heard
 ) -> tuple[Answers, str | None]:
     def wait(condition: Callable[[], bool], limit_s: float, what: str) -> None:
         until = time.monotonic() + limit_s
@@ -256,7 +255,7 @@ def _feed(
 
     wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
     time.sleep(SETTLE_S)
-    wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].what)))
+    wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].value)))
     every = {name: getattr(course, name) for name in ("goals", "obstacles", "bearing")}
     every |= {thing.wire.name: course.things[thing.name] for thing in course.task.things}
     told = {name: course.before(each) for name, each in every.items()}
@@ -300,7 +299,7 @@ def _feed(
 
 
 def _tell_applied(
-    course: Course, step: int, applied_at: np.ndarray, answer: np.ndarray, wires: _Wires
+    course: ControlSteps, step: int, applied_at: np.ndarray, answer: np.ndarray, wires: _Wires
 ) -> None:
     """Publish what the actuators did from a step to the next as recorded; the answer where that is not known."""
     write = VectorWriter(course.robot.actuators.names)
@@ -316,7 +315,7 @@ def _answered(heard: _Heard, stamp: int) -> bool:
         return stamp in heard.commands
 
 
-def _raw_messages(bag: Bag, course: Course, odometry: str | None) -> dict[str, list[bytes]]:
+def _raw_messages(bag: Bag, course: ControlSteps, odometry: str | None) -> dict[str, list[bytes]]:
     return {
         "odometry": bag.odometry(odometry).data,
         "goals": bag.of(GOAL_WIRES[course.task.goal_topic]).data,
@@ -328,7 +327,7 @@ def _raw_messages(bag: Bag, course: Course, odometry: str | None) -> dict[str, l
 
 def _tell(
     step: int,
-    told: dict[str, dict[int, list[Told]]],
+    told: dict[str, dict[int, list[Received]]],
     raw: dict[str, list[bytes]],
     wires: _Wires,
     wait: Callable[[Callable[[], bool], float, str], None],

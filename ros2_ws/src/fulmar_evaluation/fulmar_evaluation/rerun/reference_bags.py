@@ -11,7 +11,7 @@ from typing import Any
 
 from fulmar_bags.comparison import Field, first_difference
 from fulmar_bags.contents import Bag, Topic, open_bag
-from fulmar_bags.control_steps import course_of
+from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.decode import stamps_ns
 from fulmar_bringup.domains import own_domain
 from fulmar_core.errors import RunFailed
@@ -169,7 +169,7 @@ def check_reference(path: Path) -> list[Field]:
     from policy_server.shipped import shipped_policy
 
     bag = open_bag(path)
-    course = course_of(bag)
+    course = control_steps_of(bag)
     name = str((bag.info or {}).get("controller"))
     folder = shipped_policy(course.robot.name, course.task.name) if name == "policy" else None
     answers, _ = answers_of(course, name, str(folder or ""), "odometry")

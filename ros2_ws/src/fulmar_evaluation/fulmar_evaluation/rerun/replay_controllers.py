@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_bags.control_steps import Course
+from fulmar_bags.control_steps import ControlSteps
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_evaluation.rerun.rerun import Answers, rerun
@@ -10,7 +10,7 @@ from policy_server.controllers import Choice, controller_entry, load_controller
 
 
 def answers_of(
-    course: Course, name: str, folder: str, source: str, *, follow: bool = False
+    course: ControlSteps, name: str, folder: str, source: str, *, follow: bool = False
 ) -> tuple[Answers, str | None]:
     """Let a controller answer a recorded run, with the fallback that the run had.
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulmar_bags.control_steps import Course
-from fulmar_bags.guarded import RecordedEstop
-from fulmar_bags.received import ABSENT
+from fulmar_bags.control_steps import ControlSteps
+from fulmar_bags.recorded_estop import RecordedEstop
+from fulmar_bags.wire_reader import ABSENT
 from fulmar_core.control_loop import unknown_inputs
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.controllers.law import Law
@@ -43,7 +43,7 @@ class Answers:
 
 
 def rerun(
-    course: Course,
+    course: ControlSteps,
     controller: Controller,
     *,
     source: str = "observations",
@@ -77,7 +77,7 @@ def rerun(
     return _Rerun(course, controller, source, fallback, load).run()
 
 
-def _check_observations(course: Course, controller: Controller) -> None:
+def _check_observations(course: ControlSteps, controller: Controller) -> None:
     if not course.observation_names:
         raise BagError("the bag holds no observations. Use --from odometry to make them anew.")
     names = Observer(course.robot, course.task).names
@@ -101,7 +101,7 @@ class _Rerun:
 
     def __init__(
         self,
-        course: Course,
+        course: ControlSteps,
         controller: Controller,
         source: str,
         fallback: Controller | None,
@@ -120,15 +120,14 @@ class _Rerun:
             course.task,
             settings,
             ControllerSwitch(
-                Standby(controller, "", ""),
-                warm_up(fallback, course.robot, course.task) if fallback else None,
+                Standby(controller, "", ""), warm_up(fallback, course.robot, course.task) if fallback else None
             ),
             self._estop,
             gate=InputGate(course.robot.limits, frozen_after=0),
             applied=self._history if len(course.applied) else None,
         )
         # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
-        self._guard.take_bearing(not course.bearing or bool(course.bearing[0].what))
+        self._guard.take_bearing(not course.bearing or bool(course.bearing[0].value))
         self._guard.activate()
         self._fed = 0
 
@@ -148,16 +147,16 @@ class _Rerun:
         guard.loop.controller.reset()
         for step in range(count):
             for told in obstacles.get(step, ()):
-                guard.take_obstacles(told.what, told.stamp_ns)
+                guard.take_obstacles(told.value, told.stamp_ns)
             for name, poses in things.items():
                 for told in poses.get(step, ()):
-                    guard.take_thing(name, told.what, told.stamp_ns)
+                    guard.take_thing(name, told.value, told.stamp_ns)
             for told in bearing.get(step, ()):
-                guard.take_bearing(bool(told.what))
+                guard.take_bearing(bool(told.value))
             for told in goals.get(step, ()):
-                guard.take_goal(told.what, told.stamp_ns, told.log_ns)
+                guard.take_goal(told.value, told.stamp_ns, told.log_ns)
             for told in changes.get(step, ()):
-                guard.switch.propose(self._successor(*told.what))
+                guard.switch.propose(self._successor(*told.value))
             guard.switch_controller()
             reasons[step], inputs = self._inputs(step)
             if inputs is not None:
@@ -272,7 +271,7 @@ class _Rerun:
 class _States:
     """The state of each odometry message, made when it is asked for."""
 
-    def __init__(self, course: Course) -> None:
+    def __init__(self, course: ControlSteps) -> None:
         seen = course.odometry
         self._pose, self._turn = seen.pose, seen.twist[:, 3:]
         # The arithmetic of `message_reader.measurement_of`, for all messages at once: equal to the last bit.

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_bags.comparison import Field, compare
-from fulmar_bags.control_steps import Course
+from fulmar_bags.control_steps import ControlSteps
 from fulmar_evaluation.rerun.rerun import Answers
 
 FIELDS = ("decision", "observation", "action", "command")
 NUMBER = re.compile(r"-?[0-9]+([.][0-9]+)?")
 
 
-def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
+def judge_answers(course: ControlSteps, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
     """Compare every field that the bag has.
 
     Args:
@@ -54,7 +54,7 @@ def judge_answers(course: Course, answers: Answers, tolerances: Mapping[str, flo
     ]
 
 
-def _lost(course: Course) -> np.ndarray:
+def _lost(course: ControlSteps) -> np.ndarray:
     """Steps whose observation is not in the bag, though a command that is not the safe one shows that there was one."""
     driven = np.isfinite(course.commands).all(axis=1) & (
         course.commands != course.robot.actuators.safe_command

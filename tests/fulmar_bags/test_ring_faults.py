@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fulmar_bags.message_types import type_store
+from fulmar_bags.ring import fault_finder
 from fulmar_core.topics import DIAGNOSTICS, ESTOP, ODOMETRY, STATUS
-from fulmar_ros.fault_signs import fault_finder
 
 TOPICS = {
     STATUS: "/it/controller/status",

@@ -1,4 +1,4 @@
-"""Lock step: publish the state stamped k, wait for the command that answers it, then step."""
+"""The two loops of a plant: lock step with a controller, and real time by the clock."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ import numpy as np
 
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.errors import LockstepError
+from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_ros.deadline import Deadlines
+from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_wires import PlantWires
-from fulmar_ros.simulated_time import SimulatedTime
-from fulmar_ros.wall_time import WallTime
 
 RESEND_S = 0.5
-OnStep = Callable[
-    [Sample, np.ndarray], None
-]  # called with the sample after a step and the command of the step
+OnStep = Callable[[Sample, np.ndarray], None]  # the sample after a step, and the command of the step
 
 
 class LockstepLoop:
@@ -36,16 +35,9 @@ class LockstepLoop:
         answer_timeout_s: float,
         publish_bearing: Callable[[], None] = lambda: None,
     ) -> None:
-        """Join the parts.
+        """Step a simulator at `control_hz` [Hz], waiting at most `answer_timeout_s` [s] for each command.
 
-        Args:
-            backend: A simulator.
-            wires: Endpoints of the plant.
-            guard: The last word on commands.
-            clock: Stamps of the states.
-            control_hz: Command rate [Hz].
-            answer_timeout_s: Longest wait for one answer [s].
-            publish_bearing: Publishes the state of the air bearing, and waits until every subscriber has it.
+        `publish_bearing` publishes the state of the air bearing, and waits until every subscriber has it.
         """
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
         robot: Robot = backend.robot
@@ -59,13 +51,7 @@ class LockstepLoop:
     def run(
         self, sample: Sample, steps: int | None, stop: threading.Event, on_step: OnStep | None = None
     ) -> None:
-        """Step until the number of steps is done or somebody stops it.
-
-        Args:
-            sample: First sample of the episode.
-            steps: How many; None for no end.
-            stop: Set by another thread.
-            on_step: Told about every step.
+        """Step from the first sample of an episode until `steps` are done, None for no end, or `stop` is set.
 
         Raises:
             LockstepError: If an answer does not come in time.
@@ -81,13 +67,13 @@ class LockstepLoop:
             self.steps += 1
             if on_step is not None:
                 on_step(sample, command)
-        # Nobody shall answer the last state, but where it ended belongs into the bag.
+        # The last state needs no answer, but belongs into the bag.
         self._wires.publish_truth(sample, self._clock.now_ns)
 
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp = self._clock.now_ns
         began = time.monotonic()
-        grounded = self._tell_bearing()
+        grounded = self._update_bearing()
         before = self._wires.answered_ns
         self._wires.publish_sample(sample, stamp)
         with self._wires.lock:
@@ -110,15 +96,15 @@ class LockstepLoop:
         return command
 
     def _why_unanswered(self, before_ns: int | None) -> str:
-        """What came in the place of an answer, if anything; with the stamp that was answered before."""
+        """What the plant received in the place of an answer; with the stamp that was answered before."""
         answered_ns = self._wires.answered_ns
         if answered_ns is not None and answered_ns != before_ns:
             return f"the last command is stamped t = {answered_ns / 1e9:.2f} s. A command answers an odom by its stamp."
         refused = f" {self._guard.last_rejection}." if self._guard.last_rejection else ""
         return f"the controller is silent.{refused}"
 
-    def _tell_bearing(self) -> bool:
-        """Publish a change of the air bearing before the state that it is true of; returns whether it is off."""
+    def _update_bearing(self) -> bool:
+        """Publish a change of the air bearing before the state that it belongs to; returns whether it is off."""
         if not isinstance(self._backend, AirBearing):
             return False
         on = self._backend.bearing_on
@@ -126,3 +112,47 @@ class LockstepLoop:
             self._bearing_on = on
             self._publish_bearing()
         return not on
+
+
+class RealtimeLoop:
+    """Steps a backend by the clock; the watchdog acts at every tick."""
+
+    def __init__(
+        self,
+        backend: Backend,
+        wires: PlantWires,
+        guard: ActuatorGuard,
+        clock: SimulatedTime | WallTime,
+        *,
+        rate: float,
+    ) -> None:
+        """Step a simulator or a robot; `rate` is simulated seconds a wall-clock second, > 0."""
+        self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
+        self._dt = backend.robot.timing.physics_dt
+        self.period_s = self._dt / rate
+        self.deadlines = Deadlines(self.period_s)
+        self.ticks = 0
+        self._ticked_ns: int | None = None
+
+    def run(self, sample: Sample, ticks: int | None, stop: threading.Event) -> None:
+        """Tick from the first sample until `ticks` are done, None for no end, or `stop` is set."""
+        take_priority(PLANT_PRIORITY)
+        self._ticked_ns = time.monotonic_ns()
+        self._wires.publish_sample(sample, self._clock.now_ns)
+        while (ticks is None or self.ticks < ticks) and self.deadlines.wait(stop):
+            command, begun_ns = self._command(), self._clock.now_ns
+            sample = self._backend.step(command)
+            applied = command if sample.applied is None else sample.applied
+            self._wires.publish_applied(applied, begun_ns)
+            self._clock.advance(self._dt)
+            self.ticks += 1
+            self._ticked_ns = time.monotonic_ns()
+            self._wires.publish_sample(sample, self._clock.now_ns)
+
+    def since_tick_s(self, now_ns: int) -> float:
+        """Time since the last finished step, 0 before the first [s]; `now_ns` by the monotonic clock."""
+        return 0.0 if self._ticked_ns is None else (now_ns - self._ticked_ns) / 1e9
+
+    def _command(self) -> np.ndarray:
+        with self._wires.lock:
+            return self._guard.output(time.monotonic_ns())

@@ -1,4 +1,4 @@
-"""Reads the records of an MCAP file one after the other, as far as the file goes.
+"""Files of a bag, and the records of an MCAP file one after the other, as far as the file goes.
 
 Needs no index and no footer: damage costs the chunk it is in, and a torn end costs the torn piece.
 """
@@ -20,6 +20,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from fulmar_bags.mcap_file import BEGUN
+from fulmar_bags.metadata import read_custom, read_information
 from fulmar_core.errors import BagError
 
 Record = Schema | Channel | Message | Metadata | Attachment
@@ -42,10 +43,7 @@ _READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
 
 
 def bag_files(bag: Path) -> list[Path]:
-    """The MCAP files of a bag, in the order in which they were written.
-
-    Args:
-        bag: Bag folder, or one of the files itself.
+    """The MCAP files of a bag folder, in the order in which they were written, or the one that is given.
 
     Raises:
         BagError: There is none.
@@ -62,7 +60,7 @@ def bag_files(bag: Path) -> list[Path]:
 
 
 def place_in_bag(path: Path) -> tuple[str, int]:
-    """What files of a bag are sorted by: `run_10.mcap` comes after `run_9.mcap`."""
+    """Sort key of the files of a bag: `run_10.mcap` comes after `run_9.mcap`."""
     name = plain_name(path).stem
     stem, _, number = name.rpartition("_")
     return (stem, int(number)) if number.isdecimal() else (name, 0)
@@ -74,14 +72,9 @@ def plain_name(path: Path) -> Path:
 
 
 def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
-    """Go through an MCAP file.
+    """Schemas, channels, messages, metadata and attachments of an MCAP file, in their order.
 
-    Args:
-        path: The file.
-        damage: Grows by one line for each part that cannot be read.
-
-    Yields:
-        Schemas, channels, messages, metadata and attachments, in the order of the file.
+    `damage` grows by one line for each part that cannot be read.
 
     Raises:
         BagError: The file cannot be opened, is empty, or is no MCAP file at all.
@@ -111,11 +104,7 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
 
 
 def file_bytes(path: Path, damage: list[str]) -> bytes:
-    """What is in a file, unpacked where its name says that it is packed as a whole.
-
-    Args:
-        path: The file.
-        damage: Grows by one line where it cannot be unpacked to its end.
+    """Bytes of a file, unpacked if it is packed as a whole; `damage` grows by a line where that fails on the way.
 
     Raises:
         BagError: It cannot be opened.
@@ -183,3 +172,51 @@ def _records_of(chunk: Chunk) -> list[Any]:
         elif opcode in _READERS:
             records.append(_READERS[opcode](ReadDataStream(BytesIO(data[start:offset])), length))
     return records
+
+
+ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
+GIVE = "Give a bag folder, or the .mcap or .db3 file in it."
+
+
+def storage_of(file: Path) -> str | None:
+    """`mcap` or `sqlite3`, also where the file is packed as a whole; None if neither."""
+    return ENDINGS.get(plain_name(file).suffix)
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Files of a bag in the order of their numbers; a bag may be split into several.
+
+    Raises:
+        BagError: There is none.
+    """
+    if path.is_file():
+        if storage_of(path) is None:
+            raise BagError(f"{path}: this is no bag. {GIVE}")
+        return (path,)
+    if not path.is_dir():
+        raise BagError(f"{path}: there is no such bag. {GIVE}")
+    there = [
+        file for file in path.iterdir() if file.is_file() and (file.suffix != BEGUN or file.stat().st_size)
+    ]
+    for storage in ENDINGS.values():
+        files = [file for file in there if storage_of(file) == storage]
+        if files:
+            return tuple(sorted(files, key=place_in_bag))
+    found = ", ".join(sorted(each.name for each in path.iterdir())[:4])
+    raise BagError(
+        f"{path}: has no .mcap and no .db3 file{f', only {found}' if found else ': it is empty'}. {GIVE}"
+    )
+
+
+def missing_files(path: Path) -> tuple[str, ...]:
+    """Names that `metadata.yaml` lists and that are not in the folder; none where one file alone was given."""
+    listed = read_information(path).get("relative_file_paths") if path.is_dir() else None
+    there = {plain_name(file).name for file in path.iterdir()} if path.is_dir() else set()
+    entries = listed if isinstance(listed, list) else []
+    names = [name for name in entries if isinstance(name, str) and Path(name).name]
+    return tuple(name for name in names if plain_name(Path(name)).name not in there)
+
+
+def custom_text(path: Path, entry: str) -> str:
+    """A text from `custom_data` in the bag's `metadata.yaml`; empty where it is not there."""
+    return read_custom(path if path.is_dir() else path.parent).get(entry, "")

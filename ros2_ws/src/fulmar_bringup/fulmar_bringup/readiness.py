@@ -1,4 +1,4 @@
-"""Readiness of an external controller: its publisher of commands is matched."""
+"""Waiting for nodes to get ready: those of a run, and an external controller."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from fulmar_bringup.console import console
-from fulmar_bringup.node_table import RunPlan
-from fulmar_bringup.supervisor import Supervisor
+from fulmar_bringup.processes import ProcessGroup
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY, Wire, command_wire
@@ -17,6 +18,43 @@ from fulmar_core.wire_check import Offer, wire_problems
 from fulmar_ros.recorder_health import COMMANDERS
 from hardware_drivers.adapter_node import heard_class
 from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
+
+CONTROLLER_AND_RECORDER = 2  # nodes that receive the goal before anything moves
+
+
+def raise_if_ended(group: ProcessGroup) -> None:
+    """Raise RunFailed where a process has ended; with its name, how it ended and, after an error, its last line."""
+    end = group.ended()
+    if end is not None:
+        words = group.last_words(end.name, ended=True) if (end.returncode or 0) > 0 else ""
+        raise RunFailed(f"{end.text} before the run was over" + (f": {words}" if words else ""))
+
+
+def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], None]:
+    """A check to call while nodes get ready; it raises RunFailed once a process ended or the time is over."""
+    began_s = time.monotonic()
+
+    def alive() -> None:
+        raise_if_ended(group)
+        if time.monotonic() - began_s > START_TIMEOUT_S:
+            plant, controller = _last_status(overseer.plant), _last_status(overseer.controller)
+            raise RunFailed(
+                f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the plant said: {plant}; "
+                f"the controller said: {controller}). "
+                "Is another system running in this ROS domain? Try `fulmar doctor`."
+            )
+
+    return alive
+
+
+def _last_status(report: Report) -> str:
+    """Last status of a node and its age: a node that went silent has another fault than one without news."""
+    if not report.received_s:
+        return "nothing"
+    refused = report.values.get("goal_refused")
+    more = f" (it refused the goal: {refused})" if refused else ""
+    return f"{report.message or report.level}{more}, {time.monotonic() - report.received_s:.1f} s ago"
+
 
 TIMEOUT_S = 20.0
 
@@ -44,12 +82,7 @@ def command_input(plan: RunPlan) -> CommandInput:
 
 
 def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
-    """Wait until a node publishes the commands that a plan waits for.
-
-    Args:
-        plan: What runs.
-        overseer: Sees who publishes.
-        alive: Called while waiting; raises to give up.
+    """Wait until a node publishes the commands of a plan; `alive` is called while waiting and raises to give up.
 
     Raises:
         RunFailed: No publisher fits within the time for it; with those that do not, and why.
@@ -86,12 +119,7 @@ def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], 
 
 
 def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
-    """Wait until a plant in lock step, which has been started, no longer waits for subscribers.
-
-    Args:
-        plan: What runs.
-        overseer: Receives what the plant reports.
-        alive: Called while waiting; raises to give up.
+    """Wait until a plant in lock step, which was started, has its subscribers; `alive` as of `wait_for_publisher`.
 
     Raises:
         RunFailed: Too few nodes subscribe its odometry within the time for it.

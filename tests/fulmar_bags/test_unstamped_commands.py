@@ -9,9 +9,8 @@ from rosbags.rosbag2.enums import StoragePlugin
 from typer.testing import CliRunner
 
 from fulmar_bags.contents import open_bag
-from fulmar_bags.control_steps import course_of
-from fulmar_bags.plain_twist import answers_within
-from fulmar_bags.received import ABSENT
+from fulmar_bags.control_steps import answers_within, control_steps_of
+from fulmar_bags.wire_reader import ABSENT
 from fulmar_cli.main import app
 from fulmar_evaluation.report.bag_plots import write_pictures
 from tests.foreign_bag import write_foreign
@@ -19,7 +18,7 @@ from tests.foreign_bag import write_foreign
 
 def test_the_command_of_a_step_is_the_one_that_follows_its_odometry(tmp_path):
     bag = open_bag(write_foreign(tmp_path / "bag", StoragePlugin.MCAP, commands=True))
-    course = course_of(bag, robot="turtlebot2", task="go_to_position", goal=(0.0, 0.0, 0.0))
+    course = control_steps_of(bag, robot="turtlebot2", task="go_to_position", goal=(0.0, 0.0, 0.0))
     np.testing.assert_allclose(course.commands[:, 0], 0.1 * course.sample)
     assert (course.commands[:, 1] == 1.0).all()
 

@@ -11,9 +11,9 @@ from geometry_msgs.msg import PoseArray
 from mcap.records import Channel, Message, Schema
 from rclpy.serialization import serialize_message
 
+from fulmar_bags.mcap_records import read_records
 from fulmar_bags.message_types import type_store
-from fulmar_bags.records import read_records
-from fulmar_bags.run_reader import read_run
+from fulmar_bags.run_record import read_run
 from fulmar_bags.writer import BagWriter
 from fulmar_core.errors import BagError
 from fulmar_core.goal import goal_at
@@ -71,7 +71,7 @@ def rewritten_in_parts(bag: Path, folder: Path) -> Path:
             parts.add_topic(record.topic, schemas[record.schema_id], "stream")
         elif isinstance(record, Message):
             parts.write(topics[record.channel_id], record.data, log_ns=record.log_time)
-            if parts.messages % 1000 == 0:
+            if parts.counts.messages % 1000 == 0:
                 parts.split()
     parts.close()
     return folder

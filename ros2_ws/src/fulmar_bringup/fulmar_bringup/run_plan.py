@@ -1,0 +1,89 @@
+"""What one system or run is started with: its plan, and the rows of its processes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from fulmar_bringup.system import NONE, Guards
+from fulmar_core.recording import Recording
+from fulmar_core.robot_name import Frames, frames_of, namespace_of
+
+Parameter = bool | int | float | str | list[float] | list[int] | list[str]
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """One process with one node."""
+
+    name: str  # of the node
+    package: str  # ament package
+    executable: str  # script that the package installs
+    module: str  # the same as a Python module
+    namespace: str
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+    quiet: bool = False  # prints only warnings and errors
+    remappings: dict[str, str] = field(default_factory=dict)  # topics under other names
+    network: str = ""  # namespace of Linux that it runs in; empty: ours
+    inputs: tuple[str, ...] = ()  # topics without which it is of no use
+    outputs: tuple[str, ...] = ()  # topics that it publishes
+    observed: tuple[str, ...] = ()  # topics that it receives if they are there
+
+
+def node_row(
+    namespace: str, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any
+) -> NodeSpec:
+    """A row of a Python module: its first part is the package, its last part the executable."""
+    package, executable = module.partition(".")[0], module.rpartition(".")[2]
+    return NodeSpec(name, package, executable, module, namespace, dict(parameters), **more)
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """Everything that one run is started with."""
+
+    robot: str
+    task: str
+    controller: str
+    backend: str
+    control_hz: float  # [Hz]
+    name: str = ""  # what the robot is called; empty: as its type
+    policy: str = ""  # folder of a bundle; empty: the shipped one
+    scenario: str = "nominal"
+    seed: int = 0
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x [m], y [m], heading [deg]
+    duration_s: float = 0.0  # 0: until stopped [s]
+    lockstep: bool = False
+    rate: float = 1.0  # simulated seconds a wall-clock second
+    goals: str = ""  # goal file that a node of its own publishes; empty: somebody else gives the goal
+    guards: Guards = NONE
+    supervised: bool = False  # somebody else activates the plant when all are ready
+    hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
+    emulated: bool = False  # an emulator stands in for the device
+    arm: bool = False  # an autopilot may be armed, whatever the hardware file says
+    recording: Recording = Recording()
+    copies: int = 1  # of each command on the wire
+    controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
+    mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
+    remappings: tuple[tuple[str, str], ...] = ()  # topics and their other names, for every node
+    adapter: str = (
+        ""  # hardware file of an adapter, whose commands an external controller speaks; empty: none
+    )
+    adapter_topic: str = ""  # topic that it takes them from; empty: the file's
+    nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
+
+    @property
+    def robot_name(self) -> str:
+        """What the robot is called."""
+        return self.name or self.robot
+
+    @property
+    def namespace(self) -> str:
+        """Namespace of every node and topic of the robot."""
+        return namespace_of(self.robot_name)
+
+    @property
+    def frames(self) -> Frames:
+        """Names of the robot's frames."""
+        return frames_of(self.robot_name, self.robot)

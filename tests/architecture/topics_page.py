@@ -1,0 +1,76 @@
+"""The page docs/topics.md, made of the topic table: `python -m tests.architecture.topics_page > docs/topics.md`."""
+
+from __future__ import annotations
+
+from fulmar_core.topics import ESTOP_RESET, ESTOP_TRIGGER, GIVE_BACK, WIRES, Wire
+
+INTRODUCTION = f"""\
+# Topics
+
+<!-- Generated from fulmar_core/topics.py: python -m tests.architecture.topics_page > docs/topics.md -->
+
+Topic names are relative to the robot's namespace, such as `/turtlebot2/odom`, unless they begin with a slash. The
+namespace is the robot's type or its `--name` ([systems.md](systems.md#several-robots-of-one-type)). Frames follow REP
+103 and REP 105; with a `--name` they have it as a prefix. Units are SI; orientations are quaternions (x, y, z, w).
+Every topic is recorded in the bag of a run.
+
+| Unit of `effort` | Actuators |
+|---|---|
+| 0 (closed) to 1 (open) | valves |
+| -1 to 1, share of full command | propellers |
+| m/s, then rad/s | differential drive: speed, turn rate |
+| m/s, then rad | Ackermann steering: speed, steering angle |
+
+| QoS of the publisher | Meaning |
+|---|---|
+| stream | reliable, volatile, keeps the last 50; in lock step all that a reliable subscriber has not received |
+| latched | reliable, transient local, keeps the last message, or as many as stated |
+| best_effort | best effort, volatile, keeps the last 50 |
+
+Subscribers of Fulmar ask for best effort where only the newest message counts. They receive goals, obstacles and the
+e-stop from volatile publishers, which is the default of rclpy and rclcpp, and from latched ones.
+
+Services: `{ESTOP_TRIGGER}`, `{ESTOP_RESET}` and `{GIVE_BACK}` (std_srvs/Trigger); `air_bearing/enable`
+(std_srvs/SetBool).
+"""
+
+DIRECTIONS = {
+    "plant": "From the plant to controller and recorder",
+    "controller": "From the controller to plant and recorder",
+    "operator": "From the operator to plant and controller",
+    "every node": "From every node to the operator",
+    "device": "From other nodes to the recorder",
+}
+
+HEAD = "| Topic | Type | QoS | Rate | Unit | Frame | Content |\n|---|---|---|---|---|---|---|"
+
+GOALS = """\
+## How long goals are valid
+
+Goals and obstacles are latched: a controller that starts later still receives them. A goal is valid until the next one
+arrives. That includes a velocity whose publisher has died: the robot keeps driving. `fulmar goals` therefore ends with
+a standstill, also when it is interrupted, and commands one when the robot's odometry stops. A node of yours that
+publishes velocities must do the same: watchdogs supervise commands, not goals.
+"""
+
+
+def row(wire: Wire) -> str:
+    """The table row of one topic."""
+    qos = f"latched, last {wire.latest}" if wire.latest > 1 else wire.delivery
+    message = wire.type.replace("/msg/", "/")
+    return (
+        f"| `{wire.name}` | {message} | {qos} | {wire.rate} | {wire.unit} | {wire.frame} | {wire.content} |"
+    )
+
+
+def page() -> str:
+    """The whole page, with one table for each direction."""
+    tables = [
+        "\n".join((f"## {title}\n", HEAD, *(row(wire) for wire in WIRES if wire.source == source), ""))
+        for source, title in DIRECTIONS.items()
+    ]
+    return "\n".join((INTRODUCTION, *tables, GOALS))
+
+
+if __name__ == "__main__":
+    print(page(), end="")  # noqa: T201
