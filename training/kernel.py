@@ -106,7 +106,7 @@ class _Trace:
         twin.take(moving_of(before))
         told = observed_step(twin, before[ASKED], effort=before[EFFORT])
         places = _Places(given, told)
-        for name, part in parts_of(twin.moving()).items():
+        for name, part in parts_of(twin.mutable_state()).items():
             if isinstance(part, float):
                 self.numbers[name] = part
             elif part is not before[name]:

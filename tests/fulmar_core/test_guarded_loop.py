@@ -10,10 +10,9 @@ from fulmar_core.goal import goal_at
 from fulmar_core.guarded_loop import ENDED, GuardedLoop
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import BEARING_OFF, Mode
-from fulmar_core.safety.area import OUT_OF_BOUNDS
+from fulmar_core.safety.fallback import ControllerSwitch, Standby
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import JUMP_M, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from tests.states import planar_state
 
@@ -43,7 +42,7 @@ class Estop:
     """An e-stop that holds where it has a reason."""
 
     def __init__(self):
-        self.heard, self.why = True, ""
+        self.received, self.why = True, ""
 
     def reason(self, now_ns):
         return self.why
@@ -54,11 +53,11 @@ class Bench:
 
     def __init__(self, *, fallback=None, task="go_to_position", armed=True, **settings):
         self.controller, self.estop = Scripted("first"), Estop()
-        self.succession = Succession(
+        self.switch = ControllerSwitch(
             Standby(self.controller, "{}", ""), Standby(fallback, "{}", "") if fallback else None
         )
         self.guard = GuardedLoop(
-            ROBOT, load_task(task), ControllerSettings(**settings), self.succession, self.estop
+            ROBOT, load_task(task), ControllerSettings(**settings), self.switch, self.estop
         )
         self.now_ns = S
         if armed:
@@ -194,10 +193,10 @@ def test_a_goal_during_an_estop_is_refused_and_stays_void():
 
 def test_an_estop_that_was_never_received_keeps_the_goal():
     bench = Bench()
-    bench.estop.heard, bench.estop.why = False, "no e-stop yet"
+    bench.estop.received, bench.estop.why = False, "no e-stop yet"
     assert bench.give() == ""
     assert bench.step()[0].reason == "no e-stop yet"
-    bench.estop.heard, bench.estop.why = True, ""
+    bench.estop.received, bench.estop.why = True, ""
     assert bench.step()[1] == list(GENTLE)
 
 
@@ -316,10 +315,10 @@ def test_a_proposed_controller_takes_over_between_two_steps_with_the_goal_as_far
     bench.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
     for _ in range(2):
         bench.step()
-    assert not bench.guard.turn()
-    bench.succession.propose(Standby(other, "{}", ""))
+    assert not bench.guard.switch_controller()
+    bench.switch.propose(Standby(other, "{}", ""))
     assert bench.step()[1] == list(GENTLE)
-    assert bench.guard.turn()
+    assert bench.guard.switch_controller()
     assert bench.step()[1] == [0.02, 0.01]
     assert bench.guard.mission.done == 1
 

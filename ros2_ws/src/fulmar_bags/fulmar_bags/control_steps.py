@@ -18,7 +18,7 @@ from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.goal import PoseTuple, goal_at
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import Frames
-from fulmar_core.safety.area import NO_AREA
+from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.topics import (
     ACTION,

@@ -38,14 +38,13 @@ from fulmar_bringup.system import (
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.geofence import check_starts
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import checked_name
-from fulmar_core.safety.area import check_places, unreachable
+from fulmar_core.safety.geofence import check_places, check_starts, unreachable
 from fulmar_core.tasks import Task, load_task
 
 DRAWS = 1000  # of a start and a goal, before an area counts as too small for them

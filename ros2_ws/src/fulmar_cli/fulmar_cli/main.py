@@ -36,8 +36,16 @@ from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
 from fulmar_cli.commands.up import up
 from fulmar_cli.extras import advice_for
-from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
-from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
+from fulmar_core.errors import (
+    BAD_USAGE,
+    DONE,
+    FAILED,
+    BagError,
+    BundleError,
+    ConfigError,
+    FulmarError,
+    did_you_mean,
+)
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 

@@ -16,14 +16,14 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from fulmar_bags.message_reader import measurement_of, stamp_ns
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile, load_goals
 from fulmar_core.goal_sequence import STANDSTILL, goal_sequence
 from fulmar_core.paths import config_names
 from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
-from fulmar_core.safety.area import OUT_OF_BOUNDS
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import GOAL_WIRES, ODOMETRY, STATUS

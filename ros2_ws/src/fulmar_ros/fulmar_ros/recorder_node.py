@@ -17,8 +17,7 @@ from fulmar_bags.per_goal import BagPerGoal
 from fulmar_bags.ring import BagRing, fault_finder
 from fulmar_bags.writer import BagWriter, check_free
 from fulmar_bags.writer_thread import BagThread
-from fulmar_core.errors import BagError
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
 from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire, thing_wire
 from fulmar_ros.operator_subscription import subscribe_operator, with_message_info

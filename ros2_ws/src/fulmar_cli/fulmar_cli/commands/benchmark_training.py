@@ -10,7 +10,7 @@ import typer
 
 from fulmar_bringup.console import output, print_result, write_line
 from fulmar_cli.commands.arguments import JsonOption, option
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED
 
 
 def training(

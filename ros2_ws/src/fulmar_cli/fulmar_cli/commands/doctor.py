@@ -8,8 +8,7 @@ import typer
 
 from fulmar_bringup.console import output, print_json
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED, ConfigError, UnknownNameError
 
 
 def doctor(

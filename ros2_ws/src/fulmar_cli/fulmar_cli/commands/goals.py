@@ -76,7 +76,7 @@ def goals(
     from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
-    from fulmar_core.safety.area import check_places
+    from fulmar_core.safety.geofence import check_places
 
     the_robot = load_robot(robot)
     given = None if place is None else single_goal(place)

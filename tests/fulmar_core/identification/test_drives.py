@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.identification.drive import drive_of
-from fulmar_core.identification.windows import cut
+from fulmar_core.identification.drives import cut, drive_of
 
 
 def drive(t, *, yaw=None):

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.safety.area import NO_AREA, check_area, check_places, outside, unreachable
+from fulmar_core.safety.geofence import NO_AREA, check_area, check_places, outside, unreachable
 
 LAB = (0.0, 5.0, -3.0, 0.0)
 

@@ -1,11 +1,4 @@
-"""A round block that is pushed over a floor, slowly enough that it stops where it is left.
-
-Quasi-static: friction on the floor takes any speed from the block at once, so that it moves only as far as the robot
-drives into it. Its disc presses evenly on the floor; what force and moment move it together is an ellipsoid (Howe and
-Cutkosky, "Practical force-motion models for sliding manipulation", 1996), with a moment arm of 2/3 of the radius. A
-force along the contact then moves its middle by 1 / (1 + 9/4) = 4/13 of what the contact point moves, as the rest is
-turning, as long as the contact holds; else by the friction coefficient times the way inwards.
-"""
+"""Contact of a robot's outline with a round block that it pushes."""
 
 from __future__ import annotations
 
@@ -13,10 +6,44 @@ from dataclasses import dataclass
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.dynamics.outline import outline_of
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot, Rolling
 from fulmar_core.rotation import Array
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Everything within `rounding` of a box; a disc is a box without size."""
+
+    ahead: float  # of the box's middle, from the body's origin [m]
+    half_length: float  # [m]
+    half_width: float  # [m]
+    rounding: float  # [m]
+
+    @property
+    def extent(self) -> float:
+        """How far the outline reaches from the body's origin [m]."""
+        return float(((abs(self.ahead) + self.half_length) ** 2 + self.half_width**2) ** 0.5 + self.rounding)
+
+    def nearest(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Point of the box that is nearest to another, both in the body's frame, shapes (...,) [m]."""
+        near = clip(x - self.ahead, -self.half_length, self.half_length) + self.ahead
+        return near, clip(y, -self.half_width, self.half_width)
+
+    def gap(self, x: Array, y: Array) -> Array:
+        """Distance of a point in the body's frame from the outline, negative inside a disc, shapes (...,) [m]."""
+        xp = array_namespace(x)
+        near_x, near_y = self.nearest(x, y)
+        return xp.sqrt((x - near_x) ** 2 + (y - near_y) ** 2) - self.rounding
+
+
+def outline_of(robot: Robot) -> Outline:
+    """The outline that a robot's YAML describes."""
+    if robot.body.footprint is None:
+        return Outline(0.0, 0.0, 0.0, robot.body.radius)
+    length, width = robot.body.footprint
+    return Outline(robot.body.footprint_x, 0.5 * length, 0.5 * width, 0.0)
+
 
 PARTS = 4  # of one step's way; a part has to be shorter than the block's radius
 SIDEWAYS = 4.0 / 13.0

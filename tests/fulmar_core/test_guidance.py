@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.controllers.free_space import CREEP, room_ahead
+from fulmar_core.controllers.guidance import CREEP, room_ahead
 
 WIDE = 0.5
 

@@ -1,16 +1,72 @@
-"""Which controller has its turn: the one that was asked for, a better one while it runs, or the fallback."""
+"""Primary and fallback controller of a node, warm stand-by, and the switch between them."""
 
 from __future__ import annotations
 
+import json
 import threading
-from typing import Generic, TypeVar
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
+import numpy as np
+
+from fulmar_core.control_loop import ControlLoop
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episodes
+from fulmar_core.errors import ConfigError, TaskError
+from fulmar_core.goal import goal_in_float64
+from fulmar_core.own_class import SEPARATOR, one_line
+from fulmar_core.robot import Robot
 from fulmar_core.safety.command_gate import REJECTIONS_TO_LATCH, Rejections
+from fulmar_core.tasks import Task
+
+WARM_UP = 20  # the first inferences are slow; they happen before anything moves
+
+
+@dataclass(frozen=True)
+class Standby:
+    """One controller with its identity."""
+
+    controller: Controller
+    metadata: str  # JSON, ready to publish
+    sha256: str
+
+
+def warm_up(
+    controller: Controller, robot: Robot, task: Task, *, said: dict[str, Any] | None = None
+) -> Standby:
+    """Warm a controller up, on the start of an episode of its task.
+
+    Args:
+        controller: Loaded and checked.
+        robot: The robot.
+        task: What it does.
+        said: More entries of its metadata.
+
+    Raises:
+        ConfigError: It raised.
+    """
+    episode = draw_episodes(robot, task, load_scenario("nominal"), seed=0, numbers=np.zeros(1, dtype=int))
+    loop = ControlLoop(robot, task, controller)
+    loop.begin(goal_in_float64(episode.goal))
+    try:
+        for number in range(WARM_UP):
+            loop.step(episode.start, round(1e9 * number * loop.dt))
+        controller.reset()
+    except TaskError:
+        raise
+    except Exception as error:
+        module = controller.name.partition(SEPARATOR)[0]
+        raise ConfigError(f"controller '{controller.name}' raised {one_line(error, module)}.") from error
+    metadata = {**controller.metadata(), **(said or {})}
+    text = json.dumps(metadata, sort_keys=True)
+    return Standby(controller, text, str(metadata.get("sha256", "")))
+
 
 T = TypeVar("T")
 
 
-class Succession(Generic[T]):
+class ControllerSwitch(Generic[T]):
     """Changes happen between two control steps only; `propose` may be called from any thread.
 
     Attributes:
@@ -51,11 +107,11 @@ class Succession(Generic[T]):
         return self._past_rejections + self._rejections.total
 
     def propose(self, candidate: T) -> None:
-        """Let somebody take over at the next `turn`."""
+        """Let somebody take over at the next `apply`."""
         with self._lock:
             self._next = candidate
 
-    def turn(self) -> bool:
+    def apply(self) -> bool:
         """Between two steps: let the candidate take over, if there is one.
 
         Returns:
@@ -69,7 +125,7 @@ class Succession(Generic[T]):
         self._change(candidate, "")
         return True
 
-    def judge(self, problem: str | None) -> str | None:
+    def note(self, problem: str | None) -> str | None:
         """Note the verdict on a command of `current`.
 
         Args:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.counter_rng import WORLD, Draws
-from fulmar_core.disturbances.outside import outside_wrench, push_is_constant
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
-from fulmar_core.disturbances.world import FIELDS
+from fulmar_core.disturbances.world import FIELDS, outside_wrench, push_is_constant
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 

@@ -1,9 +1,12 @@
-"""Priority of the threads that a robot waits for."""
+"""Process settings: thread priority, and ending with the parent process."""
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
+import signal
+import sys
 
 # Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
 # other, and a controller that spins for ever must not keep the watchdog from closing the valves.
@@ -49,3 +52,20 @@ def give_up_priority() -> None:
     """Make the calling thread an ordinary one: a thread begins with the priority of whoever started it."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+_PR_SET_PDEATHSIG = 1  # prctl(2)
+
+
+def end_with(parent: int, ending: signal.Signals) -> None:
+    """Ask the kernel for a signal when the process that started us dies; Linux alone does so, others go on.
+
+    Args:
+        parent: Its id. Where that is no longer our parent, it is dead already, and the signal comes at once.
+        ending: The signal.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(ending))
+    if os.getppid() != parent:
+        os.kill(os.getpid(), ending)

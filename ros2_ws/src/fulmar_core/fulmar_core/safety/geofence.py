@@ -1,7 +1,4 @@
-"""The area that a robot must not leave: walls of a laboratory, a buoyed piece of water.
-
-Goals lie inside it, and never farther than 1 km from the origin of the world.
-"""
+"""Geofence and area: how far a robot may be from its goal, and where robot and goals may be."""
 
 from __future__ import annotations
 
@@ -9,6 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 
 from fulmar_core.errors import ConfigError
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
 
 NO_AREA = (0.0, 0.0, 0.0, 0.0)  # an area without extent stands for none
 FARTHEST_M = 1000.0  # of a goal from the origin: a goal beyond it is a mistake of units or of frames
@@ -78,3 +77,23 @@ def check_places(what: str, places: Iterable[Sequence[float]], area: Sequence[fl
 
 def _sides(area: Sequence[float]) -> str:
     return f"x {area[0]:g} to {area[1]:g} m, y {area[2]:g} to {area[3]:g} m"
+
+
+def check_starts(robot: Robot, task: Task, *, training: bool = False) -> None:
+    """Refuse a robot whose geofence is smaller than the distances that a task draws its starts from.
+
+    Args:
+        robot: Has the geofence.
+        task: Draws the starts.
+        training: Of the starts for learning, not those for evaluation.
+
+    Raises:
+        ConfigError: Episodes would start beyond the geofence.
+    """
+    key, farthest = task.farthest_start(training=training)
+    if farthest > robot.limits.geofence:
+        raise ConfigError(
+            f"'limits.geofence' = {robot.limits.geofence:g} m of robot '{robot.name}' is smaller than the starts of "
+            f"task '{task.name}', up to {farthest:g} m from the goal ('{key}'). Give the robot a geofence of at least "
+            f"{farthest:g} m, give the task nearer starts, or run it with --start and --goal."
+        )
