@@ -39,7 +39,6 @@ class Measured:
     high: float
 
     def __post_init__(self) -> None:
-        """Refuse intervals that do not hold their own value."""
         if not self.low <= self.value <= self.high:
             raise ValueError(f"low <= value <= high is needed, found {self.low}, {self.value}, {self.high}.")
 

@@ -49,7 +49,6 @@ class ControllerSettings:
     autostart: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse values without meaning."""
         for name in ("control_hz", "rate", "input_timeout_s", "max_run_time_s"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} = {getattr(self, name)} must be a finite number, at least 0.")

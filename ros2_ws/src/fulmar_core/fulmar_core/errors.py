@@ -20,7 +20,6 @@ class UnknownNameError(ConfigError):
     """A name that is not in a closed set, reported with the nearest known one."""
 
     def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
-        """Say what kind of name was not found, and what exists."""
         known = sorted(known)
         super().__init__(f"unknown {what} '{name}'.{did_you_mean(name, known)}")
         self.name = name

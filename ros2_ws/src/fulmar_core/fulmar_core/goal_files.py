@@ -25,7 +25,6 @@ class Positions:
     positions: tuple[tuple[float, float], ...]  # x, y in the world [m, m]
 
     def __post_init__(self) -> None:
-        """Refuse an empty list."""
         if not self.positions:
             raise ValueError("'positions' must have at least one entry.")
 
@@ -43,7 +42,6 @@ class Poses:
     poses: tuple[tuple[float, float, float], ...]  # x, y, heading in the world [m, m, deg]
 
     def __post_init__(self) -> None:
-        """Refuse an empty list."""
         if not self.poses:
             raise ValueError("'poses' must have at least one entry.")
 
@@ -60,7 +58,6 @@ class HeldVelocity:
     hold_s: float  # [s]
 
     def __post_init__(self) -> None:
-        """Refuse no time."""
         if self.hold_s <= 0.0:
             raise ValueError("'hold_s' must be greater than 0.")
 
@@ -74,7 +71,6 @@ class Velocities:
     velocities: tuple[HeldVelocity, ...]
 
     def __post_init__(self) -> None:
-        """Refuse an empty list."""
         if not self.velocities:
             raise ValueError("'velocities' must have at least one entry.")
 
@@ -103,7 +99,6 @@ class FollowedPath:
     lead_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what leads nowhere."""
         if min(self.speed, self.look_ahead, self.turn_gain, self.max_yaw_rate_deg) <= 0.0:
             raise ValueError("speed, look_ahead, turn_gain and max_yaw_rate_deg must be greater than 0.")
         if self.loops < 0:

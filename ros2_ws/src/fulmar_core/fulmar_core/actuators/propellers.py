@@ -35,7 +35,6 @@ class Propellers:
     response: Response = Response()
 
     def __post_init__(self) -> None:
-        """Refuse propellers of one name, and curves that say nothing."""
         if not self.propellers or len(set(self.names)) != len(self.propellers):
             raise ValueError("'propellers' must not be empty, and each needs a name of its own.")
         if len(self.curve) < 2 or list(self.curve) != sorted(self.curve):

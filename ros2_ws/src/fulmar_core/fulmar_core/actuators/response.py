@@ -16,7 +16,6 @@ class Response:
     gain: tuple[float, ...] = ()  # what each actuator really does of what it is told; empty: all of it [-]
 
     def __post_init__(self) -> None:
-        """Refuse times and rates without meaning."""
         if min(self.delay_s, self.lag_s, self.opening_delay_s) < 0.0:
             raise ValueError("delay_s, lag_s and opening_delay_s must not be negative.")
         if any(rate <= 0.0 for rate in (*self.slew, *self.gain)):

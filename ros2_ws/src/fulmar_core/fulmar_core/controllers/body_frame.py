@@ -45,7 +45,6 @@ class BodyFrame:
     """
 
     def __init__(self, robot: Robot, task: Task) -> None:
-        """Look at what the task asks for."""
         self.tracks, self.passes = task.goal_topic == "goal_velocity", task.goal_topic == "goal_path"
         self.heads = task.goal_topic == "goal_pose" or bool(getattr(task, "heads", False))
         self._around = task if isinstance(task, GoToPositionWithObstacles) else None

@@ -48,7 +48,6 @@ class LineOfSightGains:
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
-        """Refuse gains that do not lead to the goal."""
         positive = (
             self.cruise, self.approach, self.braking, self.surge, self.heading, self.turn_rate, self.yaw,
             self.slowing, self.near, self.least_thrust, self.speed_around,
@@ -75,7 +74,6 @@ class LineOfSight(Law):
         control_hz: float | None = None,
         name: str | None = None,
     ) -> None:
-        """Prepare the allocation; arguments as of `Law`."""
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         assert isinstance(robot.actuators, Propellers)
         self._allocation = PropellerAllocation(robot.actuators, least=gains.least_thrust)

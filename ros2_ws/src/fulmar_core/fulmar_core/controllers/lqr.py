@@ -89,7 +89,6 @@ class LqrWeights:
     speed_around: float = 0.0  # among obstacles, as a share; tasks without any need none [-]
 
     def __post_init__(self) -> None:
-        """Refuse weights without a stabilising solution."""
         if min(self.position, self.heading, self.velocity, self.yaw_rate, self.open_valve) < 0.0:
             raise ValueError("weights must not be negative.")
         if min(self.force, self.torque, self.position_error_limit, self.heading_error_limit_deg) <= 0.0:

@@ -62,7 +62,6 @@ class DriftWeights:
     bias: float  # a normalised input opens its valve above one half and this
 
     def __post_init__(self) -> None:
-        """Refuse weights without a solution."""
         if min(self.states) <= 0.0 or self.input <= 0.0:
             raise ValueError("the weights of states and inputs must be greater than 0.")
 
@@ -82,7 +81,6 @@ class LqrDrift(Law):
         control_hz: float | None = None,
         name: str | None = None,
     ) -> None:
-        """Bind the law; arguments as of `Law`."""
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
             raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")

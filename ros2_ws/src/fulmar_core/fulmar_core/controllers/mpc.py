@@ -39,7 +39,6 @@ class MpcGains(LqrWeights):
     rest: float = 1.0  # factor on the LQR's cost of what is left at the end [-]
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be followed."""
         super().__post_init__()
         if self.choices < 1 or self.steps < 1:
             raise ValueError("'choices' and 'steps' must be at least 1.")
@@ -62,7 +61,6 @@ class Mpc(Law):
         control_hz: float | None = None,
         name: str | None = None,
     ) -> None:
-        """Build the model; arguments as of `Law`."""
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
             raise ValueError("the MPC opens and closes valves; this robot has none of that kind.")

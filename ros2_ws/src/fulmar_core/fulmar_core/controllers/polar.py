@@ -41,7 +41,6 @@ class PolarGains:
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
-        """Refuse gains that do not lead to the goal."""
         positive = (self.distance, self.bearing, self.turn, self.near, self.slowing, self.speed_around)
         if min(positive) <= 0.0 or self.heading >= 0.0:
             raise ValueError("all gains must be greater than 0, 'heading' less than 0.")

@@ -43,7 +43,6 @@ class PurePursuitGains:
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
-        """Refuse gains that do not lead to the goal."""
         positive = (
             self.look_ahead, self.cruise, self.approach, self.braking, self.sideways, self.near, self.speed_around,
         )  # fmt: skip

@@ -36,7 +36,6 @@ class Push:
     least: float = 0.0  # smallest, as a share of the largest [-]
 
     def __post_init__(self) -> None:
-        """Refuse negative magnitudes."""
         if min(self.force, self.torque) < 0.0 or not 0.0 <= self.least <= 1.0:
             raise ValueError("force and torque must not be negative, and 'least' must lie in [0, 1].")
 
@@ -51,7 +50,6 @@ class Wave:
     wave_number: Range = (0.25, 3.0)  # [rad/m]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if min(self.force, self.torque, self.wave_number[0]) < 0.0 or not 0.0 <= self.least <= 1.0:
             raise ValueError(
                 "force, torque and wave_number must not be negative, 'least' must lie in [0, 1]."
@@ -68,7 +66,6 @@ class Kick:
     every_s: Range = (4.0, 6.0)  # [s]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if self.force < 0.0:
             raise ValueError("'force' must not be negative.")
         if not 0.0 < self.every_s[0] <= self.every_s[1]:
@@ -84,7 +81,6 @@ class Tether:
     lever: float = 0.0  # farthest that the line is fastened from the body's origin [m]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         low, high = self.stiffness
         if min(low, self.reach, self.lever) < 0.0 or low > high:
             raise ValueError(
@@ -100,7 +96,6 @@ class Slope:
     direction_deg: float = 0.0  # in which it falls, in the world [deg]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if not 0.0 <= self.milliradians[0] <= self.milliradians[1] <= 100.0:
             raise ValueError("'milliradians' must be [low, high] with 0 <= low <= high <= 100.")
 
@@ -120,7 +115,6 @@ class Actuation:
     stranding: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if min(self.noise, self.delay_s, self.failures, self.gain[0], self.failure_chance) < 0.0:
             raise ValueError("noise, delay, gain and failures must not be negative.")
         if self.gain[0] > self.gain[1] or self.failure_chance > 1.0:
@@ -151,7 +145,6 @@ class Sensing:
     yaw_rate_noise: Range = (0.0, 0.0)  # same for the turn rate [rad/s]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:
             raise ValueError("noise, bias, delay and dropout must not be negative, 'dropout' at most 1.")
         for low, high in (self.velocity_noise, self.yaw_rate_noise):
@@ -185,7 +178,6 @@ class Scenario:
     held_s: Range = (0.0, 0.0)  # from when to when, on air, a hand holds the robot where it is [s]
 
     def __post_init__(self) -> None:
-        """Refuse what would do nothing, and times without meaning."""
         for name in ("bearing_late_s", "held_s"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high < math.inf:

@@ -60,7 +60,6 @@ class Block:
     grip: float  # friction between the robot and the block [-]
 
     def __post_init__(self) -> None:
-        """Refuse blocks that cannot exist."""
         if min(self.radius, self.height, self.mass) <= 0.0 or min(self.floor_friction, self.grip) < 0.0:
             raise ValueError("radius, height and mass must be greater than 0, frictions not negative.")
 

@@ -33,7 +33,6 @@ class BeliefReader:
     """Finds what is wrong in the estimated health of one robot."""
 
     def __init__(self, robot: Robot) -> None:
-        """Read the estimates of this robot, which has thrusters."""
         assert isinstance(robot.actuators, Thrusters)
         self._names, self._reach = robot.actuators.names, ForceAuthority(robot.actuators)
         self._torque = robot.performance.torque

@@ -36,7 +36,6 @@ class HealthSettings:
     surprise: float = 16.0  # largest weight of one measurement against a hypothesis, as log-likelihood [-]
 
     def __post_init__(self) -> None:
-        """Refuse what no filter exists for."""
         if min(getattr(self, field.name) for field in fields(self) if field.name not in MAY_BE_0) <= 0.0:
             raise ValueError(
                 "every number of a suspicion must be greater than 0; 'held' and 'retry_s' may be 0."
