@@ -18,7 +18,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
-EVALUATION_SEED = 2026  # of episodes that finished controllers are judged on
+EVALUATION_SEED = 2026  # of episodes that evaluate finished controllers
 HELD_OUT_SEED = 1_000_003  # of episodes that learners are checked on
 EVALUATION_SEEDS = (EVALUATION_SEED, HELD_OUT_SEED)  # no training seeds: no run shall have learned from them
 
@@ -37,17 +37,10 @@ class Episode:
 
 
 def episode_steps(task: Task, control_dt: float) -> int:
-    """Control steps of one episode.
-
-    Args:
-        task: Says how long an episode lasts.
-        control_dt: Time of one control step [s].
-
-    Returns:
-        Number of steps, >= 1.
+    """Control steps of one episode, >= 1.
 
     Raises:
-        ConfigError: The episode is shorter than one control step.
+        ConfigError: The episode is shorter than one control step [s].
     """
     steps = round(task.episode_s / control_dt)
     if steps < 1:
@@ -77,7 +70,7 @@ def draw_episodes(
         seed: Seed of the run, >= 0.
         numbers: Numbers of the episodes, or of the worlds they run in, shape (n,), >= 0.
         repeats: How many episodes each of these worlds has had before, shape (n,); none by default.
-        training: Start where learning starts instead of where judging does.
+        training: Start where learning starts instead of where evaluation does.
 
     Returns:
         As many episodes.

@@ -55,11 +55,7 @@ class BagError(FulmarError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Hint for an unknown name: the nearest one if there is one, else all of them.
-
-    Args:
-        name: What was written.
-        known: What would have been allowed.
+    """Hint for an unknown name: the nearest known one, else all of them.
 
     Returns:
         A sentence that begins with a space, ready to be appended to a message.

@@ -1,4 +1,4 @@
-"""Goals written down: `configs/goals/<name>.yaml`, told apart by `kind`."""
+"""Goal files: `configs/goals/<name>.yaml`, distinguished by `kind`."""
 
 from __future__ import annotations
 
@@ -115,11 +115,7 @@ GoalFile = Positions | Poses | Velocities | FollowedPath
 
 
 def single_goal(place: tuple[float, ...]) -> Positions | Poses:
-    """One place as a goal file would hold it.
-
-    Args:
-        place: x [m], y [m] and, for a pose, heading [deg].
-    """
+    """One place x [m], y [m] and, for a pose, heading [deg], as a goal file would hold it."""
     x, y, *heading = place
     if not heading:
         return Positions("positions", f"position x = {x:g} m, y = {y:g} m", ((x, y),))
@@ -128,13 +124,7 @@ def single_goal(place: tuple[float, ...]) -> Positions | Poses:
 
 
 def load_goals(name: str) -> GoalFile:
-    """Read `configs/goals/<name>.yaml`, or a file anywhere.
-
-    Args:
-        name: Name of a file there, or a path that ends in `.yaml`.
-
-    Returns:
-        The goals.
+    """Read `configs/goals/<name>.yaml`, or a file anywhere whose path ends in `.yaml`.
 
     Raises:
         ConfigError: Unknown name, or a mistake in the file.

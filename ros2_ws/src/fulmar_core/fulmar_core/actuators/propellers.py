@@ -43,7 +43,7 @@ class Propellers:
             raise ValueError(f"'slew' needs {len(self.propellers)} values, one for each propeller.")
         self.response.refuse_lag_beside_slew()
         if self.thrust(self.safe_command).any():
-            raise ValueError("'curve' must be 0 in its middle: a propeller that is told 0 stands still.")
+            raise ValueError("'curve' must be 0 in its middle: a command of 0 stops a propeller.")
 
     binary = False
 

@@ -1,4 +1,4 @@
-"""How fast actuators follow: the same three numbers for every family."""
+"""How fast actuators follow their commands, the same numbers for every family."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Response:
     slew: tuple[float, ...] = ()  # fastest change of each actuator, in its command's unit [per s]
     lag_s: float = 0.0  # time constant of a first-order lag [s]
     opening_delay_s: float = 0.0  # by which closed valves open later than others close [s]
-    gain: tuple[float, ...] = ()  # what each actuator really does of what it is told; empty: all of it [-]
+    gain: tuple[float, ...] = ()  # applied over commanded, of each actuator; empty: 1 [-]
 
     def __post_init__(self) -> None:
         if min(self.delay_s, self.lag_s, self.opening_delay_s) < 0.0:
@@ -22,7 +22,7 @@ class Response:
             raise ValueError("every slew and every gain must be greater than 0.")
 
     def refuse_lag_beside_slew(self) -> None:
-        """Of actuators that follow either way, not both; the servos of wheels have both.
+        """Reject a lag beside a slew; only the servos of wheels have both.
 
         Raises:
             ValueError: Both are given.

@@ -42,7 +42,7 @@ class LineOfSightGains:
     yaw: float  # angular acceleration for an error of the turn rate [1/s]
     slowing: float  # speed falls with this power of the cosine of the bearing [-]
     sideslip: float  # share of the sideslip angle that the heading makes up for [-]
-    corner: float  # share of the cruising speed at a waypoint where the course turns by a quarter or more [-]
+    corner: float  # share of the cruising speed at a waypoint where the path turns by a quarter or more [-]
     near: float  # what counts as there [m]
     least_thrust: float  # less is not worth a propeller's way through its dead band [N]
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]

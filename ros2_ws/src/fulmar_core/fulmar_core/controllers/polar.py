@@ -36,7 +36,7 @@ class PolarGains:
     turn: float  # of the turn on the spot [1/s]
     near: float  # what counts as there [m]
     slowing: float  # speed to a position falls with this power of the cosine of its bearing [-]
-    corner: float  # share of top speed at a waypoint where the course turns by a quarter or more [-]
+    corner: float  # share of top speed at a waypoint where the path turns by a quarter or more [-]
     velocity: float  # share of a velocity error that the command adds [-]
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 

@@ -111,7 +111,7 @@ class Actuation:
     opening_delay_s: Range = (0.0, 0.0)  # by which closed valves open late; closing does not wait [s]
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
-    # Only of such as leave no pose to hold, all at once, where a robot has thrusters that can be lost like that.
+    # Only failures, all at once, after which no pose can be held, where a robot has thrusters that can fail so.
     stranding: bool = False
 
     def __post_init__(self) -> None:
@@ -193,13 +193,7 @@ class Scenario:
 
 
 def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:
-    """How long after the start of an episode the air bearing carries the robot [s].
-
-    Args:
-        scenario: Says between which times it lies.
-        seed: Of the run.
-        number: Of the episode.
-    """
+    """Time after the start of an episode, by seed and number, until the air bearing carries the robot [s]."""
     low, high = scenario.bearing_late_s
     if low == high:
         return low
@@ -215,10 +209,10 @@ def longest_delay(robot: Robot, scenario: Scenario) -> float:
 
 
 def check_delays(robot: Robot, scenario: Scenario) -> None:
-    """Refuse a scenario in which a robot would obey later than it is told anew.
+    """Reject a scenario in which commands would be late by more than a control step.
 
     Raises:
-        ConfigError: Commands would be late by more than a control step.
+        ConfigError: They would.
     """
     late_s = longest_delay(robot, scenario)
     if robot.timing.is_over_within(late_s):
