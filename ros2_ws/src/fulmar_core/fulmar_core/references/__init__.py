@@ -1,4 +1,4 @@
-"""Reference paths in the plane, each told by a few sizes.
+"""Reference paths in the plane, each given by a few sizes.
 
 The explicit table of paths. A new path is one class and one line in each of the two places below.
 """
