@@ -179,5 +179,5 @@ def test_a_robot_that_stood_still_tells_nothing():
     t = np.arange(0.0, 30.0, 0.02)
     rng = np.random.default_rng(0)
     still = drive_of("still", t, 1e-3 * rng.normal(size=(len(t), 2)), 0.0 * t, t[:1], np.zeros((1, 8)))
-    with pytest.raises(ConfigError, match="do not tell every quantity apart"):
+    with pytest.raises(ConfigError, match="do not distinguish every quantity"):
         identify(PLATFORM, [still], known=[Known("mass", 5.3, 0.01)])
