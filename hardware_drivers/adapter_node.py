@@ -1,4 +1,4 @@
-"""Commands of other stacks for our robots: their messages in, our wires out."""
+"""Node that converts the commands of another stack to this robot's command topic."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.settings import ThrustTopic, ValveTopic, VelocityTopic, load_hardware
-from hardware_drivers.valve_message import from_message
+from hardware_drivers.valves import from_message
 
-NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches whatever they offer
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches every publisher
 PLANT = "plant"  # name of driver nodes
-NO_STAMP = 0  # they answer no observation of ours
+NO_STAMP = 0  # the command answers no observation of ours
 TopicDriver = ValveTopic | VelocityTopic | ThrustTopic
 
 
-def heard_class(driver: TopicDriver) -> type:
-    """Class of the messages that an adapter takes for a driver."""
+def message_class(driver: TopicDriver) -> type:
+    """Message class that an adapter subscribes to for a driver."""
     if isinstance(driver, ValveTopic):
         return VALVE_MESSAGES[driver.message]
     if isinstance(driver, ThrustTopic):
@@ -50,17 +50,17 @@ class AdapterSettings:
     hardware: str = (
         ""  # a file of configs/hardware with the driver `valve_topic`, `velocity_topic` or `thrust_topic`
     )
-    topic: str = ""  # hear this instead of the file's topic
+    topic: str = ""  # subscribe to this instead of the file's topic
 
 
 class AdapterNode(Node):
-    """Hears what a controller of another stack commands, and commands the same on our wires.
+    """Publishes each command of another stack on this robot's command topic.
 
-    It holds nothing back and repeats nothing: when they fall silent, so does it, and the watchdog acts.
+    It repeats nothing: when the other stack falls silent, the watchdog of the driver acts.
     """
 
     def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
-        """Create both ends.
+        """Create subscription and publisher.
 
         Args:
             request_exit: Ends the process.
@@ -89,8 +89,8 @@ class AdapterNode(Node):
         self._enable = self.create_client(SetBool, SERVICE) if self._order else None
         self._request_exit = request_exit
         self._take = self._taker(driver)
-        self._heard = self.create_subscription(
-            heard_class(driver), settings.topic or driver.topic, self._hear, NEWEST
+        self._subscription = self.create_subscription(
+            message_class(driver), settings.topic or driver.topic, self._receive, NEWEST
         )
 
     def _taker(self, driver: TopicDriver) -> Callable[[Any], None]:
@@ -100,11 +100,11 @@ class AdapterNode(Node):
             return lambda message: self._pass_on(np.array(message.data, dtype=float))
         return (lambda message: self._velocity(message.twist)) if driver.stamped else self._velocity
 
-    def _hear(self, message: Any) -> None:
+    def _receive(self, message: Any) -> None:
         if self._comes_from_our_plant():
             self.get_logger().error(
-                f"{self._heard.topic_name} is what this robot's own driver publishes: its commands would come back as "
-                "new ones, and the watchdog would never act. Give the topic of the other controllers, such as "
+                f"{self._subscription.topic_name} is the topic of this robot's own driver: its commands would come "
+                "back as new ones, and the watchdog would never act. Give the topic of the other controllers, such as "
                 "-p topic:=/fp_cmd_mux/autonomous_control_input."
             )
             self._request_exit(BAD_USAGE)
@@ -132,8 +132,8 @@ class AdapterNode(Node):
         self._publisher.publish(self._write.write(command, NO_STAMP))
 
     def _comes_from_our_plant(self) -> bool:
-        """Looked up for every message: a driver may start later than we do."""
-        infos = self.get_publishers_info_by_topic(self._heard.topic_name)
+        """Whether our driver publishes this topic; asked for every message, since a driver may start later."""
+        infos = self.get_publishers_info_by_topic(self._subscription.topic_name)
         ours = (PLANT, self.get_namespace())
         return any((info.node_name, info.node_namespace) == ours for info in infos)
 
@@ -142,7 +142,7 @@ class AdapterNode(Node):
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(AdapterNode))
 
 

@@ -1,13 +1,24 @@
-"""From a hardware file to the driver that it asks for; only that one's library is imported."""
+"""Driver of a hardware file, importing only its library, and what stops the device if the driver dies."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from hardware_drivers.driver_backend import DriverBackend, backend_of
-from hardware_drivers.settings import GpioValves, Hardware, KingfisherNmea, Kobuki, MavlinkBoat, OwnDriver
+from hardware_drivers.settings import (
+    Driver,
+    GpioValves,
+    Hardware,
+    KingfisherNmea,
+    Kobuki,
+    MavlinkBoat,
+    OwnDriver,
+    ThrustTopic,
+    ValveTopic,
+    VelocityTopic,
+)
 
 
 def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: float) -> DriverBackend:
@@ -15,7 +26,7 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
 
     Args:
         robot: The robot.
-        hardware: What is wired to it.
+        hardware: Its hardware file.
         port: Takes the place of the file's port; empty: the file's.
         patience_s: Wait so long for the device [s].
 
@@ -49,3 +60,47 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
 
         return make_own_driver(robot, settings, patience_s=patience_s)
     raise ConfigError(f"driver '{settings.kind}' publishes messages; it has no port of its own.")
+
+
+UNPROTECTED = "NOTHING BELOW THE DRIVER STOPS THE"  # how the warning begins, also in hardware files
+
+
+@dataclass(frozen=True)
+class OwnWatchdog:
+    """A watchdog below the driver."""
+
+    by: str  # whose it is
+    within_s: float  # after the last command or heartbeat [s]
+
+
+WATCHDOGS: dict[type, OwnWatchdog] = {
+    Kobuki: OwnWatchdog("the firmware of the base, without base control", 0.6),
+    KingfisherNmea: OwnWatchdog("the front seat of the boat, without $PYDIR", 0.5),
+    MavlinkBoat: OwnWatchdog("ArduPilot, without heartbeats: FS_GCS_ENABLE 1, FS_TIMEOUT", 1.5),
+    VelocityTopic: OwnWatchdog("kobuki_node, without a velocity; another node may have no timeout", 0.6),
+}
+# The chip's pins and the lab's node keep the valves as they are; RoboRAN's bridge to /action is not public.
+MOVES_ON: dict[type, str] = {
+    GpioValves: "VALVES",
+    ValveTopic: "VALVES",
+    ThrustTopic: "PROPELLERS",
+    OwnDriver: "ACTUATORS",
+}
+
+
+def own_watchdog(driver: Driver) -> OwnWatchdog | None:
+    """The watchdog that stops the device when the driver dies; None if none is known."""
+    if isinstance(driver, OwnDriver) and driver.device_timeout_s:
+        return OwnWatchdog("the device, says its hardware file", driver.device_timeout_s)
+    return WATCHDOGS.get(type(driver))
+
+
+def when_the_driver_dies(driver: Driver) -> str:
+    """One sentence for the user, in capitals where nothing stops the device."""
+    watchdog = own_watchdog(driver)
+    if watchdog is not None:
+        return f"if the driver dies, stopped within {watchdog.within_s:g} s by {watchdog.by}"
+    return (
+        f"{UNPROTECTED} {MOVES_ON[type(driver)]} WHEN IT DIES: build in a supply that closes without the driver "
+        "(docs/hardware.md)"
+    )

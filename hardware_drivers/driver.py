@@ -1,4 +1,4 @@
-"""The interface of a device driver: what every driver has, shipped or a user's own."""
+"""Interface of a device driver, shipped or a user's own."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class DeviceDriver(Protocol):
     after any error, it writes the safe command several times and calls `close`. So a driver needs no watchdog, no
     e-stop and no clean-up of its own.
 
-    Errors: whatever a method raises ends the node with exit code 1, after the safe command; raise `DeviceError` with
-    what a person should do. A `write` or `read` that blocks for more than 0.5 s is reported as hanging. While
+    Errors: any exception ends the node with exit code 1, after the safe command; raise `DeviceError` with what the user
+    should do. A `write` or `read` that blocks for more than 0.5 s is reported as hanging. While
     `write` blocks, only a watchdog of the device itself stops it: `device_timeout_s` in the hardware file.
     """
 
@@ -40,9 +40,9 @@ class DeviceDriver(Protocol):
         """
 
     def begin(self, x: float, y: float, heading: float) -> None:
-        """Take a pose in the frame `odom` as the place where the robot stands now.
+        """Set the robot's present pose in the frame `odom`.
 
-        Only for devices that measure where they are.
+        Only for devices that measure odometry.
 
         Args:
             x: East, or ahead at the start [m].
@@ -74,7 +74,7 @@ class DeviceDriver(Protocol):
         return None
 
     def health(self) -> dict[str, str]:
-        """What people should know, by name: battery, lost bytes; `warning` holds what is wrong, or nothing.
+        """Health by name: battery, lost bytes; `warning` holds the problem, or nothing.
 
         Published on `/diagnostics`; called ten times a second, from another thread.
         """
@@ -82,7 +82,7 @@ class DeviceDriver(Protocol):
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the device; the safe command was written before. It takes 2 s at most. Called once."""
+        """Release the device within 2 s; the safe command was written before. Called once."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""A device driver behind the backend seam: stops it in order, and never calls it twice at once."""
+"""A device driver as a `Backend`: safe stop, and no two calls at once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fulmar_core.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 
 STOPS = 5  # the safe command goes out this often: one may be lost
-# Between them, and after the last: publishers keep one message, and the process may end right after it.
+# Between them, and after the last: publishers keep one message, and the process may end right after.
 STOP_PERIOD_S = 0.02
 HANGS_S = 0.5  # a write that takes longer than this will not come back
 
@@ -24,7 +24,6 @@ class DriverBackend:
     """Drives one robot by its driver."""
 
     def __init__(self, robot: Robot, driver: DeviceDriver) -> None:
-        """Take over a driver that is connected."""
         self.robot, self._driver = robot, driver
         self._sent = robot.actuators.safe_command
         self._writing = threading.Lock()
@@ -45,10 +44,10 @@ class DriverBackend:
         return Sample(report.odometry, report.imu, None, stamp_ns=report.stamp_ns, applied=applied)
 
     def make_safe(self) -> None:
-        """Let wheels slow down, and send the safe command several times, with time for each to arrive.
+        """Slow wheels down, then send the safe command several times, with time for each to arrive.
 
         Raises:
-            Exception: None of them could be sent; what the last one raised.
+            Exception: None of them could be sent; raised by the last one.
         """
         safe = self.robot.actuators.safe_command
         for command in slowdown(self.robot.actuators, self._sent, STOP_PERIOD_S):
@@ -64,7 +63,7 @@ class DriverBackend:
             raise failure
 
     def close(self) -> None:
-        """Stop, and let go of the device; what is gone already stops by its own timeout."""
+        """Stop, and release the device; a device that is gone stops by its own timeout."""
         if self._closed:
             return
         self._closed = True
@@ -80,10 +79,10 @@ class DriverBackend:
         return self._driver.health()
 
     def _failure(self, command: np.ndarray) -> Exception | None:
-        """Send a command; what that raised, so that another try can follow.
+        """Send a command; returns what that raised, so that another attempt can follow.
 
         Raises:
-            DeviceError: The driver hangs, and no try can follow.
+            DeviceError: The driver hangs, and no attempt can follow.
         """
         try:
             self._write(command)
@@ -105,10 +104,9 @@ class DriverBackend:
 
 
 class FloatingDriverBackend(DriverBackend):
-    """The same for a driver that switches an air bearing; see `AirBearing`."""
+    """Backend of a driver that switches an air bearing; see `AirBearing`."""
 
     def __init__(self, robot: Robot, driver: DeviceDriver, bearing: AirBearing) -> None:
-        """Take over a driver that is connected, and its bearing."""
         super().__init__(robot, driver)
         self._bearing = bearing
 
@@ -122,7 +120,7 @@ class FloatingDriverBackend(DriverBackend):
         return self._bearing.set_bearing(on)
 
     def _write(self, command: np.ndarray) -> np.ndarray:
-        """Send a command, or the safe one while the bearing is off: a platform on the floor only wastes its air."""
+        """Send a command, or the safe one while the bearing is off: on the floor, open valves only waste air."""
         return super()._write(command if self.bearing_on else self.robot.actuators.safe_command)
 
 

@@ -1,4 +1,4 @@
-"""The process that moves a real robot: a device behind the plant's wires."""
+"""Node that drives a real robot: a device behind the topics of the plant node."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from hardware_drivers.settings import (
     load_hardware,
 )
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
-from hardware_drivers.valve_message import to_message
+from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channel_velocity, channels
 
 
@@ -44,28 +44,25 @@ class DriverSettings(PlantSettings):
     arm: bool = False  # arm an autopilot, as `arm: true` in the hardware file
 
     def __post_init__(self) -> None:
-        """Refuse what a real device cannot do."""
         super().__post_init__()
         if self.lockstep or self.rate != 1.0:
-            raise ValueError(
-                "a real device neither waits nor hurries: lockstep and rate have no meaning here."
-            )
+            raise ValueError("a real device runs in real time: lockstep and rate have no meaning here.")
         if not self.hardware:
             raise ValueError("'hardware' names no file: give a name of configs/hardware, or a path.")
 
     @property
     def publishes_odometry(self) -> bool:
-        """Whether the device knows where it is, and nobody else is asked for it."""
+        """Whether odometry comes from the device, not from motion capture or another node."""
         return super().publishes_odometry and load_hardware(self.hardware).measures_odometry
 
 
 class DriverNode(PlantNode):
-    """The plant node with a machine for its backend, which has a health of its own."""
+    """The plant node with a device as its backend, and the health of that device."""
 
     settings: DriverSettings
 
     def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
-        """Read the parameters and, unless told otherwise, start.
+        """Read the parameters, and start unless they say otherwise.
 
         Raises:
             FulmarError: If a parameter or a configuration file is wrong.
@@ -87,7 +84,7 @@ class DriverNode(PlantNode):
         self.health.more = dict
 
     def _motion_capture(self) -> None:
-        """The room has its own; a device stands in for none."""
+        """None: a real room has its own motion capture."""
 
     def _make_device(self, robot: Robot, settings: PlantSettings) -> Backend:
         assert isinstance(settings, DriverSettings)
@@ -99,7 +96,7 @@ class DriverNode(PlantNode):
         return by_topic or make_device(robot, hardware, port=settings.port, patience_s=settings.connect_s)
 
     def _armed(self, hardware: Hardware, settings: DriverSettings) -> Hardware:
-        """The hardware file with the parameter `arm`; logs what arming does before anything is sent."""
+        """The hardware file with the parameter `arm`; logs what arming does before the first command."""
         driver = hardware.driver
         if isinstance(driver, OwnDriver) and driver.arm is not None:
             driver = replace(driver, arm=driver.arm or settings.arm)
@@ -157,7 +154,7 @@ class DriverNode(PlantNode):
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(DriverNode))
 
 

@@ -1,4 +1,4 @@
-"""The newest that a device has said of itself, handed from the thread that reads to the one that steps."""
+"""Newest report of a device, from the reading thread to the stepping one, and its time in the host's clock."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class Report:
 
 
 class Feedback:
-    """Newest report, and how long ago it came."""
+    """Newest report of a device, and its age."""
 
     def __init__(self, device: str, silent_s: float) -> None:
         """Begin with none.
 
         Args:
-            device: What it is, for messages.
-            silent_s: A device that says nothing for so long is gone [s].
+            device: Its name, for messages.
+            silent_s: A device without a report for so long is gone [s].
         """
         self._device, self._silent_ns = device, round(silent_s * 1e9)
         self._changed = threading.Condition()
@@ -37,13 +37,13 @@ class Feedback:
         self._failure = ""
 
     def put(self, report: Report) -> None:
-        """A report has come; from the thread that reads."""
+        """Store a report; called by the reading thread."""
         with self._changed:
             self._newest, self._came_ns = report, time.monotonic_ns()
             self._changed.notify_all()
 
     def fail(self, reason: str) -> None:
-        """No report will come any more; from the thread that reads."""
+        """End the reports with a reason; called by the reading thread."""
         with self._changed:
             self._failure = reason
             self._changed.notify_all()
@@ -70,7 +70,7 @@ class Feedback:
             return self._newest
 
     def read(self) -> Report:
-        """The newest report, if it is young enough.
+        """The newest report, if it is recent.
 
         Raises:
             DeviceError: The device is gone.
@@ -85,3 +85,49 @@ class Feedback:
                 f"(limit {self._silent_ns / 1e6:.0f} ms). Is the cable in, and the device on?"
             )
         return newest
+
+
+FORGET = 512  # reports after which the least delay is looked for anew, so that a drifting clock is followed
+
+
+class DeviceTime:
+    """Maps a device's clock to the host's by the report that came with the least delay.
+
+    The error is that least delay itself: the time of the bytes on the wire, which no clock of one side can measure.
+    """
+
+    def __init__(self, wrap_ms: int = 0) -> None:
+        """Begin anew.
+
+        Args:
+            wrap_ms: The device's counter begins again after so much; 0: never [ms].
+        """
+        self._wrap, self._last, self._turns = wrap_ms, 0.0, 0
+        self._least: float | None = None
+        self._next: float | None = None
+        self._reports = 0
+
+    def stamp_ns(self, device_ms: float, now_ns: int) -> int:
+        """When a report was measured.
+
+        Args:
+            device_ms: Its time by the device's clock [ms].
+            now_ns: The host's clock when it came, since the epoch [ns].
+
+        Returns:
+            Since the epoch, never after `now_ns` [ns].
+        """
+        if self._wrap and device_ms < self._last - self._wrap / 2:
+            self._turns += 1
+        elif device_ms < self._last - 1.0 and not self._wrap:  # the device was restarted
+            self._least = self._next = None
+        self._last = device_ms
+        measured_ns = (device_ms + self._turns * self._wrap) * 1e6
+        delay = now_ns - measured_ns
+        if self._least is None or delay < self._least or abs(delay - self._least) > 1e9:
+            self._least = delay
+        self._next = delay if self._next is None else min(self._next, delay)
+        self._reports += 1
+        if self._reports % FORGET == 0:
+            self._least, self._next = self._next, None
+        return min(now_ns, round(measured_ns + self._least))

@@ -1,4 +1,4 @@
-"""Output lines of a GPIO chip, by libgpiod; or of a chip that is only a file, for work without one."""
+"""Output lines of a GPIO chip by libgpiod, or of a file that emulates a chip."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from fulmar_core.errors import DeviceError
 
 CONSUMER = "fulmar"
 RETRY_S = 0.1
-FILE_CHIP = "file://"  # an address that begins so names a file with one byte a line: the level at the pin
+FILE_CHIP = "file://"  # prefix of an address: a file with one byte a line, the level at the pin
 
 
 class LineRequest(Protocol):
-    """What libgpiod gives who has asked for lines (the part of `gpiod.LineRequest` that is used)."""
+    """Requested lines: the part of `gpiod.LineRequest` that is used."""
 
     def set_values(self, values: dict[int | str, Value]) -> None:
-        """Make lines active or inactive; what that means at the pin was settled when they were asked for."""
+        """Make lines active or inactive; the request decided which level that is."""
         ...
 
     def release(self) -> None:
-        """Give the lines back."""
+        """Release the lines."""
         ...
 
 
@@ -49,7 +49,7 @@ def output_lines(
         The lines.
 
     Raises:
-        DeviceError: There is no such chip or line, or somebody else has it.
+        DeviceError: There is no such chip or line, or another process has it.
     """
     settings = gpiod.LineSettings(
         direction=Direction.OUTPUT, active_low=active_low, output_value=Value.INACTIVE
@@ -65,26 +65,26 @@ def output_lines(
             if not isinstance(error, FileNotFoundError) or time.monotonic() > until:
                 raise DeviceError(
                     f"{address}: lines {', '.join(lines)} cannot be taken ({error}). "
-                    "`gpioinfo` shows the names and numbers of all lines, and who has them."
+                    "`gpioinfo` shows the names and numbers of all lines, and their users."
                 ) from error
         time.sleep(RETRY_S)
 
 
 def line_of(text: str) -> int | str:
-    """A line as libgpiod wants it: numbers as numbers."""
+    """A line in libgpiod's type: numbers as integers."""
     return int(text) if text.isdecimal() else text
 
 
 def request_of_file(address: str, *, consumer: str, config: Mapping[Any, gpiod.LineSettings]) -> LineRequest:
     """`gpiod.request_lines` for a chip that is a file.
 
-    Its bytes stay as they are when the process that set them dies, as the pins of many chips do; none promises it.
+    Its bytes stay when the process that set them dies, as the pins of many chips do.
     """
     return FileLines(Path(address.removeprefix(FILE_CHIP)), config)
 
 
 class FileLines:
-    """Lines of a chip that is a file: one byte for each, in the order in which they were asked for."""
+    """Lines of a chip that is a file: one byte for each, in the order of the request."""
 
     def __init__(self, path: Path, config: Mapping[Any, gpiod.LineSettings]) -> None:
         """Map the file and put every line into its first state; raises OSError where there is none."""

@@ -12,12 +12,10 @@ from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
 from hardware_drivers import kingfisher_protocol as protocol
-from hardware_drivers.attitude import attitude
-from hardware_drivers.device_time import DeviceTime
 from hardware_drivers.driver import DeviceDriver
-from hardware_drivers.feedback import Feedback, Report
-from hardware_drivers.local_frame import LocalFrame
-from hardware_drivers.nmea import Decoder
+from hardware_drivers.earth_frame import LocalFrame, attitude
+from hardware_drivers.feedback import DeviceTime, Feedback, Report
+from hardware_drivers.kingfisher_protocol import Decoder
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import KingfisherNmea
 from hardware_drivers.wiring import channels
@@ -54,7 +52,7 @@ class KingfisherDriver(DeviceDriver):
             raise
 
     def begin(self, x: float, y: float, heading: float) -> None:
-        """Without an origin, take a place for where the boat is; see `DeviceDriver`."""
+        """Without an origin, set the boat's position in `odom`; see `DeviceDriver`."""
         if self._settings.origin is None:
             here = self._feedback.newest.odometry.position_in_world - self._shift
             self._shift = np.array([x, y, 0.0]) - here
@@ -69,7 +67,7 @@ class KingfisherDriver(DeviceDriver):
         return self._feedback.read()
 
     def close(self) -> None:
-        """Let go of the port; see `DeviceDriver`."""
+        """Close the port; see `DeviceDriver`."""
         self._reader.stop()
 
     def health(self) -> dict[str, str]:
@@ -91,7 +89,7 @@ class KingfisherDriver(DeviceDriver):
 
     def _report(self, fix: protocol.Fix, now_ns: int) -> None:
         rates = self._rates
-        # Velocities come beside the fix; without fresh ones there is no state to report.
+        # Velocities come in another sentence; without recent ones there is no state to report.
         if rates is None or abs(fix.time_s - rates.time_s) > protocol.OLDEST_SPEED_S:
             return
         if self._frame is None:

@@ -11,9 +11,8 @@ import numpy as np
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
-from hardware_drivers.device_time import DeviceTime
 from hardware_drivers.driver import DeviceDriver
-from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.feedback import DeviceTime, Feedback, Report
 from hardware_drivers.kobuki_protocol import (
     COUNT,
     WHEEL_RADIUS,
@@ -25,8 +24,7 @@ from hardware_drivers.kobuki_protocol import (
 )
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import Kobuki
-from hardware_drivers.standing_wheels import StandingWheels
-from hardware_drivers.wheel_odometry import WheelOdometry
+from hardware_drivers.wheel_odometry import StalledWheels, WheelOdometry
 from hardware_drivers.wiring import channel_velocity
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous
@@ -51,7 +49,7 @@ class KobukiDriver(DeviceDriver):
         self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
-        self._standing = StandingWheels()
+        self._standing = StalledWheels()
         self._begin: tuple[float, float, float] | None = None
         self._core: CoreSensors | None = None
         self._sent = robot.actuators.safe_command
@@ -84,7 +82,7 @@ class KobukiDriver(DeviceDriver):
         return self._feedback.read()
 
     def close(self) -> None:
-        """Let go of the port; see `DeviceDriver`."""
+        """Close the port; see `DeviceDriver`."""
         self._reader.stop()
 
     def health(self) -> dict[str, str]:
@@ -135,7 +133,7 @@ class KobukiDriver(DeviceDriver):
         imu = ImuSample(ABSENT, np.array([0.0, 0.0, rate]))
         self._feedback.put(Report(state, imu, stamp_ns))
         if begin is not None:
-            self._begin = None  # only now: who waits for it shall find the new place
+            self._begin = None  # after the report, so that a waiting thread reads the new pose
 
 
 def _touched(core: CoreSensors) -> str:

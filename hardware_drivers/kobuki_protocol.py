@@ -97,14 +97,13 @@ def base_control(speed: float, turn_rate: float) -> bytes:
 
 
 class Decoder:
-    """Finds packets in a stream of bytes, however it is cut or spoilt.
+    """Finds packets in a byte stream; skips damaged ones, keeps partial ones.
 
     Attributes:
         lost: Bytes that belong to no sound packet.
     """
 
     def __init__(self) -> None:
-        """Begin with an empty stream."""
         self._pending = bytearray()
         self.lost = 0
 

@@ -22,7 +22,7 @@ from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.ports import patiently, write_at_once
 from hardware_drivers.settings import UNARMED, MavlinkBoat
-from hardware_drivers.thrust import bounded
+from hardware_drivers.wiring import bounded
 from hardware_drivers.wiring import channels as wired
 
 Address = tuple[int, int]  # system and component
@@ -44,11 +44,11 @@ class MavlinkDriver(DeviceDriver):
         """Open the link, wait for the autopilot, and ask for what is needed.
 
         Raises:
-            DeviceError: Nobody answers.
+            DeviceError: No autopilot answers.
         """
         self._safe, self._settings = robot.actuators.safe_command, settings
         self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
-        self._heard = Telemetry()
+        self._telemetry = Telemetry()
         self._sending = threading.Lock()
         self._over = threading.Event()
         self._link = _opened(settings, patience_s)
@@ -72,15 +72,15 @@ class MavlinkDriver(DeviceDriver):
             raise
 
     def begin(self, x: float, y: float, heading: float) -> None:
-        """Take a place for where the boat is, and arm if allowed; see `DeviceDriver`."""
-        here = self._feedback.newest.odometry.position_in_world - self._heard.shift
-        self._heard.shift = np.array([x, y, 0.0]) - here
+        """Set the boat's position in `odom`, and arm if allowed; see `DeviceDriver`."""
+        here = self._feedback.newest.odometry.position_in_world - self._telemetry.shift
+        self._telemetry.shift = np.array([x, y, 0.0]) - here
         if self._settings.arm:
             self._drive(0.0, 0.0)
             self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def write(self, command: np.ndarray) -> np.ndarray:
-        """Send a command, nothing if the boat must not arm; see `DeviceDriver`."""
+        """Send a command; sends nothing if the boat must not be armed. See `DeviceDriver`."""
         if not self._settings.arm:
             return self._safe
         left, right = (float(share) for share in command)
@@ -92,7 +92,7 @@ class MavlinkDriver(DeviceDriver):
         return self._feedback.read()
 
     def close(self) -> None:
-        """Disarm, and let go of the link; see `DeviceDriver`."""
+        """Disarm, and close the link; see `DeviceDriver`."""
         try:
             if self._settings.arm:
                 self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
@@ -105,11 +105,11 @@ class MavlinkDriver(DeviceDriver):
 
     def health(self) -> dict[str, str]:
         """Battery and arming; see `DeviceDriver`."""
-        heard = self._heard
-        warning = "" if heard.armed else "the autopilot is not armed: its propellers stand"
+        telemetry = self._telemetry
+        warning = "" if telemetry.armed else "the autopilot is not armed: its propellers stand"
         if not self._settings.arm:
             warning = UNARMED
-        return {"battery_v": heard.voltage, "armed": str(heard.armed).lower(), "warning": warning}
+        return {"battery_v": telemetry.voltage, "armed": str(telemetry.armed).lower(), "warning": warning}
 
     def _prepare(self) -> None:
         mavlink = mavutil.mavlink
@@ -143,7 +143,7 @@ class MavlinkDriver(DeviceDriver):
                     self._beat()
                 message = self._link.recv_match(blocking=True, timeout=0.05)
                 if message is not None and _sender(message) == self._autopilot:
-                    report = self._heard.take(message, time.time_ns())
+                    report = self._telemetry.take(message, time.time_ns())
                     if report is not None:
                         self._feedback.put(report)
             except Exception as error:  # noqa: BLE001 - a thread that died in silence would look like a silent boat
@@ -178,16 +178,16 @@ def _opened(settings: MavlinkBoat, patience_s: float) -> Any:
     except ValueError as error:
         raise DeviceError(f"{settings.port} cannot be opened: {error}.") from error
     if isinstance(link, (mavutil.mavserial, mavutil.mavtcp)):
-        # Not pymavlink's own: on a serial port it waits for ever, and it keeps every failure to itself.
+        # pymavlink's own write waits forever on a serial port, and hides every failure.
         link.write = partial(write_at_once, link.fd)
     return link
 
 
 def _wait_for_autopilot(link: Any, port: str, patience_s: float) -> Address:
-    """Who sends the first heartbeat of an autopilot; gimbals and ground stations have one, too.
+    """Address of the first autopilot that sends a heartbeat; gimbals and ground stations send some, too.
 
     Raises:
-        DeviceError: Nobody in time.
+        DeviceError: None in time.
     """
     until = time.monotonic() + patience_s
     while (left_s := until - time.monotonic()) > 0.0:

@@ -1,4 +1,4 @@
-"""What an ArduPilot boat says of itself, in ROS' frames; no link of its own."""
+"""Telemetry of an ArduPilot boat in ROS' frames; knows messages, not the link."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ import numpy as np
 
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
-from hardware_drivers.attitude import attitude
-from hardware_drivers.device_time import DeviceTime
-from hardware_drivers.feedback import Report
+from hardware_drivers.earth_frame import attitude
+from hardware_drivers.feedback import DeviceTime, Report
 
 MILLI_G = 9.80665e-3  # [m/s²]
-FRESH_MS = 200.0  # an attitude that differs more in time says nothing about a position
+FRESH_MS = 200.0  # an attitude and a position further apart in time make no report
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 
 
 class Telemetry:
-    """Puts an autopilot's messages together to reports.
+    """Assembles reports from an autopilot's messages.
 
     Attributes:
         shift: From where the autopilot's frame begins to where `odom` does, shape (3,) [m].
@@ -27,7 +26,6 @@ class Telemetry:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing heard."""
         self.shift = np.zeros(3)
         self.voltage, self.armed = "", False
         self._time = DeviceTime()

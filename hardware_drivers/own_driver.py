@@ -1,4 +1,4 @@
-"""A driver of the user's own class: loaded, wired, and kept to the interface whatever it does."""
+"""A driver of the user's own class: loading, wiring, and checks of its interface."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _driver_class(settings: OwnDriver) -> type[Any]:
 
 
 class _WiredDriver(DeviceDriver):
-    """Hands commands over in the order of the wires; whatever the user's class raises becomes one line."""
+    """Permutes commands to the order of the wires; turns exceptions of the user's class into one line."""
 
     def __init__(self, robot: Robot, settings: OwnDriver, driver: Any) -> None:
         self._name, self._module = settings.kind, type(driver).__module__
@@ -79,7 +79,7 @@ class _WiredDriver(DeviceDriver):
     def write(self, command: np.ndarray) -> np.ndarray:
         if self._unarmed:
             return self._safe
-        # A copy: what a user's class does to it must not reach the guard's own.
+        # A copy: the user's class must not change the guard's array.
         sent = command.copy() if self._as_named else self._to_wires @ command
         applied = self._call("write", lambda: self._driver.write(sent))
         if applied is None:
@@ -124,7 +124,7 @@ class _WiredDriver(DeviceDriver):
 
 
 class _FloatingDriver(_WiredDriver):
-    """The same with an air bearing, which counts as off where the class fails to say."""
+    """With an air bearing, which counts as off where the class raises."""
 
     @property
     def bearing_on(self) -> bool:

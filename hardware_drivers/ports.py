@@ -15,7 +15,7 @@ import serial
 from fulmar_core.errors import ConfigError, DeviceError
 
 T = TypeVar("T")
-READ_S = 0.05  # how soon the reading thread hears that it shall end
+READ_S = 0.05  # longest wait of the reading thread, and so of `stop`
 RETRY_S = 0.1
 CHUNK = 4096
 
@@ -24,15 +24,15 @@ class Port(Protocol):
     """A stream of bytes in both directions."""
 
     def read(self) -> bytes:
-        """What has come, nothing after a short while without; raises OSError when the other side is gone."""
+        """Read bytes; none after a short timeout. Raises OSError when the other side is gone."""
         ...
 
     def write(self, data: bytes) -> None:
-        """Send; raises OSError when that is not possible at once."""
+        """Send; raises OSError when that would block."""
         ...
 
     def close(self) -> None:
-        """Let go."""
+        """Close."""
         ...
 
 
@@ -126,14 +126,14 @@ def open_port(address: str, baud: int, patience_s: float) -> Port:
         The open port.
 
     Raises:
-        ConfigError: The address is none.
+        ConfigError: The address is malformed.
         DeviceError: It cannot be opened.
     """
     return patiently(_maker(address, baud), address, patience_s)
 
 
 def patiently(make: Callable[[], T], address: str, patience_s: float) -> T:
-    """Make a connection, and wait for its other end if that is not there yet.
+    """Open a connection, and retry while its other end is missing.
 
     Args:
         make: Opens it; raises OSError.
@@ -159,7 +159,7 @@ def patiently(make: Callable[[], T], address: str, patience_s: float) -> T:
 def write_at_once(descriptor: int, data: bytes) -> None:
     """Send through a descriptor that never blocks; raises OSError when it does not take all of the bytes at once.
 
-    Not pyserial's own write: it waits, or counts a late thread as a late device.
+    pyserial's own write waits, or takes a late thread for a late device.
     """
     if os.write(descriptor, data) < len(data):
         raise OSError("it does not take any more bytes")
@@ -181,15 +181,15 @@ SCHEMES: dict[str, type[TcpPort] | type[UdpPort]] = {"tcp": TcpPort, "udp": UdpP
 
 
 class Reader:
-    """Hands whatever comes through a port to a function, in a thread of its own."""
+    """Thread that passes the bytes of a port to a function."""
 
     def __init__(self, port: Port, take: Callable[[bytes], None], on_end: Callable[[str], None]) -> None:
         """Start.
 
         Args:
             port: Where to read.
-            take: Told the bytes; whatever it raises ends the reading, as a port that is gone does.
-            on_end: Told why nothing will be read any more, once; not at `stop`.
+            take: Receives the bytes; an exception in it ends the reading, as a lost port does.
+            on_end: Receives the reason once reading has ended; not called at `stop`.
         """
         self._port, self._take, self._on_end = port, take, on_end
         self._over = threading.Event()

@@ -1,4 +1,4 @@
-"""Whether a hardware file's device is there: its port, chip or host, looked at before anything starts."""
+"""Check before the start that a device's port, chip or host exists."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UDP = ("udpin:", "udpout:", "udp:", "udpbcast:")
 
 
 def check_presence(driver: Driver, port: str = "") -> None:
-    """Refuse a driver whose port does not exist; takes under a second.
+    """Reject a driver whose port does not exist; takes under a second.
 
     A device that exists and is silent passes: the driver waits for its first report.
 
@@ -60,7 +60,7 @@ def _check_serial(path: str) -> None:
 def _check_host(address: str) -> None:
     host, _, number = address.removeprefix("tcp:").removeprefix("//").rpartition(":")
     if not host or not number.isdecimal():
-        return  # the driver refuses the address, with what it must look like
+        return  # the driver rejects the address, and names the format
     try:
         with socket.create_connection((host, int(number)), timeout=CONNECT_S):
             pass

@@ -1,4 +1,4 @@
-"""What is wired to a robot, as read from `configs/hardware/*.yaml`."""
+"""Hardware of a robot, as read from `configs/hardware/*.yaml`."""
 
 from __future__ import annotations
 
@@ -11,21 +11,36 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.own_class import check_class_path
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Actuators, load_robot
-from hardware_drivers.valve_orders import VALVE_ORDERS
+from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
 
 ValveMessage = Literal["int16", "byte", "uint8"]
 ValveOrder = Annotated[tuple[int, ...], Named(VALVE_ORDERS)]  # a list, or the name of one
 
-# A launcher ends who has not ended within 5 s of being asked, and closing takes more than the lingering.
+# A launcher kills a process 5 s after asking it to end, and closing takes longer than the lingering.
 LONGEST_LINGER_S = 2.0
-UNARMED = "not armed: arm: true or --arm"  # what a device reports that may not be armed
+UNARMED = "not armed: arm: true or --arm"  # warning of a device that must not be armed
 
 
 def check_linger(linger_s: float) -> None:
-    """Refuse times without meaning, and those that a launcher would not wait for; raises ValueError."""
+    """Reject negative times, and those that a launcher would not wait for; raises ValueError."""
     if not 0.0 <= linger_s <= LONGEST_LINGER_S:
         raise ValueError(f"linger_s = {linger_s:g} must be from 0 to {LONGEST_LINGER_S:g} s.")
+
+
+def check_order(order: tuple[int, ...], count: int) -> None:
+    """Reject orders that do not name each of `count` thrusters once; raises ValueError."""
+    if sorted(order) != list(range(count)):
+        raise ValueError(f"'order' must hold each of 0 to {count - 1} once.")
+
+
+class _Wired:
+    """Settings with a wiring of two sides."""
+
+    wiring: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -40,7 +55,6 @@ class Bearing:
     )
 
     def __post_init__(self) -> None:
-        """Refuse times without meaning."""
         check_linger(self.linger_s)
         if not self.idle_off_s >= 0.0:
             raise ValueError("idle_off_s must not be negative.")
@@ -59,12 +73,10 @@ class GpioValves:
     min_on_s: float = 0.0  # an opened valve stays open so long, except when all must close [s]
 
     def __post_init__(self) -> None:
-        """Refuse two valves on one line, and times that would outlast a watchdog."""
         every = (*self.lines, self.bearing.line)
         if len(set(every)) != len(every):
             raise ValueError("each valve and the bearing need a line of their own.")
-        if sorted(self.order) != list(range(len(self.lines))):
-            raise ValueError(f"'order' must hold each of 0 to {len(self.lines) - 1} once.")
+        check_order(self.order, len(self.lines))
         if not 0.0 <= self.min_on_s <= 0.2:
             raise ValueError("min_on_s must be from 0 to 0.2 s.")
 
@@ -83,14 +95,12 @@ class ValveTopic:
     linger_s: float = 1.0  # it carries the platform so long after the last valve has closed for good [s]
 
     def __post_init__(self) -> None:
-        """Refuse orders that leave a valve out, and times without meaning."""
         check_linger(self.linger_s)
-        if sorted(self.order) != list(range(len(self.order))):
-            raise ValueError(f"'order' must hold each of 0 to {len(self.order) - 1} once.")
+        check_order(self.order, len(self.order))
 
 
 @dataclass(frozen=True)
-class Kobuki:
+class Kobuki(_Wired):
     """The base of a Turtlebot2, by its serial protocol."""
 
     kind: Literal["kobuki"]
@@ -99,36 +109,24 @@ class Kobuki:
     silent_s: float = 0.3  # a base that reports nothing for so long is gone [s]
     wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
 
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
-
 
 @dataclass(frozen=True)
-class VelocityTopic:
-    """A base that somebody else drives: `geometry_msgs/Twist`, or TwistStamped."""
+class VelocityTopic(_Wired):
+    """A base behind a node of another stack: `geometry_msgs/Twist`, or TwistStamped."""
 
     kind: Literal["velocity_topic"]
     topic: str
     stamped: bool
     wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
 
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
-
 
 @dataclass(frozen=True)
-class ThrustTopic:
-    """A boat that somebody else drives: `std_msgs/Float32MultiArray`, one share of full thrust a propeller."""
+class ThrustTopic(_Wired):
+    """A boat behind a node of another stack: `std_msgs/Float32MultiArray`, one share of full thrust a propeller."""
 
     kind: Literal["thrust_topic"]
     topic: str
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
-
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,6 @@ class Geodetic:
     longitude: float  # [deg]
 
     def __post_init__(self) -> None:
-        """Refuse places that are not on Earth, and the poles, where east has no meaning."""
         if not (abs(self.latitude) < 89.0 and abs(self.longitude) <= 180.0):
             raise ValueError("latitude must be within 89° and longitude within 180°.")
 
@@ -152,13 +149,12 @@ class Thrust:
     astern: float  # [N]
 
     def __post_init__(self) -> None:
-        """Refuse propellers that do not push."""
         if min(self.ahead, self.astern) <= 0.0:
             raise ValueError("'ahead' and 'astern' must be greater than 0.")
 
 
 @dataclass(frozen=True)
-class KingfisherNmea:
+class KingfisherNmea(_Wired):
     """Kingfisher, Heron or M200, by the NMEA sentences of its front seat."""
 
     kind: Literal["kingfisher_nmea"]
@@ -168,10 +164,6 @@ class KingfisherNmea:
     baud: int = 115200
     silent_s: float = 1.0  # a boat that reports nothing for so long is gone [s]
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
-
-    def __post_init__(self) -> None:
-        """Refuse a wiring that leaves a side out."""
-        check_wiring(self.wiring)
 
 
 @dataclass(frozen=True)
@@ -188,10 +180,9 @@ class MavlinkBoat:
     span_us: int = 400  # of a full deflection
     silent_s: float = 1.0
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each side of its mixer turns, `-left` where backwards
-    arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; without it, it only listens
+    arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; else it only receives
 
     def __post_init__(self) -> None:
-        """Refuse channels that MAVLink's override does not have, and pulses beyond those of servos."""
         check_wiring(self.wiring)
         channels = {self.steering_channel, self.throttle_channel}
         if len(channels) != 2 or not channels <= set(range(1, 9)):
@@ -210,23 +201,21 @@ class OwnDriver:
     baud: int = 115200  # of a serial port
     order: ValveOrder = ()  # of valves: which thruster, counted from 0, each channel opens; empty: 0, 1, 2, ...
     wiring: tuple[str, ...] = AS_NAMED  # wheel or propeller that each channel turns, `-left` where backwards
-    # Who knows where the robot is: motion capture, the device itself by `read`, or another node that publishes `odom`.
+    # Source of odometry: motion capture, the device itself by `read`, or another node that publishes `odom`.
     odometry: Literal["motion_capture", "device", "other_node"] = "motion_capture"
     air_bearing: bool = False  # the class has `bearing_on` and `set_bearing` of `AirBearing`
     # Whether the device may be armed: without it, or --arm, nothing is written. None: it has nothing to arm.
     arm: bool | None = None
     device_timeout_s: float = 0.0  # after the last command, when the device itself stops; 0: it does not [s]
-    options: dict[str, Any] = field(default_factory=dict)  # whatever else the class reads
+    options: dict[str, Any] = field(default_factory=dict)  # for the class
 
     def __post_init__(self) -> None:
-        """Refuse what is no dotted path, a wiring that leaves a side out, and times without meaning."""
         try:
             check_class_path(self.kind)
         except ConfigError as error:
             raise ValueError(str(error)) from error
         check_wiring(self.wiring)
-        if sorted(self.order) != list(range(len(self.order))):
-            raise ValueError(f"'order' must hold each of 0 to {len(self.order) - 1} once.")
+        check_order(self.order, len(self.order))
         if not self.device_timeout_s >= 0.0:
             raise ValueError("device_timeout_s must not be negative.")
         if self.baud <= 0:
@@ -243,9 +232,9 @@ NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
     MavlinkBoat: ("pymavlink",),
 }
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
-SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that motion capture alone knows the place of
+SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that only motion capture localises
 FLOATS = (GpioValves, ValveTopic)  # drivers that switch an air bearing
-MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device knows where it is
+MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device measures odometry
 FITS = {
     "thrusters": (GpioValves, ValveTopic),
     "differential_drive": (Kobuki, VelocityTopic),
@@ -263,22 +252,22 @@ class Hardware:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Modules that its driver imports, which not every machine has."""
+        """Modules that its driver imports, from the extra `hardware`."""
         return NEEDS.get(type(self.driver), ())
 
     @property
     def arms(self) -> bool:
-        """Whether the device has to be armed, which a person allows."""
+        """Whether the device has to be armed, which the user must allow."""
         return getattr(self.driver, "arm", None) is not None
 
     @property
     def opens_valves(self) -> bool:
-        """Whether its wires open valves, which can be heard without any motion."""
+        """Whether its wires open valves, which are audible without any motion."""
         return load_robot(self.robot).actuators.kind == "thrusters"
 
     @property
     def measures_odometry(self) -> bool:
-        """Whether the device knows where it is; if not, motion capture or another node says so."""
+        """Whether the device measures odometry; if not, motion capture or another node does."""
         if isinstance(self.driver, OwnDriver):
             return self.driver.odometry == "device"
         return isinstance(self.driver, MEASURES)
@@ -292,7 +281,7 @@ class Hardware:
 
     @property
     def seen_from_outside(self) -> bool:
-        """Whether motion capture alone knows where the robot is."""
+        """Whether only motion capture localises the robot."""
         if isinstance(self.driver, OwnDriver):
             return self.driver.odometry == "motion_capture"
         return isinstance(self.driver, SEEN_FROM_OUTSIDE)
@@ -308,16 +297,10 @@ def hardware_path(name: str) -> Path:
 
 
 def load_hardware(name: str) -> Hardware:
-    """Read a hardware file and check that it fits its robot.
-
-    Args:
-        name: A name of `configs/hardware`, or a path that ends in `.yaml`.
-
-    Returns:
-        What is wired to the robot.
+    """Read a hardware file and check that it fits its robot; `name` is as of `hardware_path`.
 
     Raises:
-        ConfigError: Unknown name, a mistake in the file, or a driver that the robot's actuators do not go with.
+        ConfigError: Unknown name, a mistake in the file, or a driver that does not fit the robot's actuators.
     """
     path = hardware_path(name)
     hardware = load_config(Hardware, path)

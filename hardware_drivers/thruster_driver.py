@@ -12,16 +12,16 @@ from fulmar_core.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.gpio import LineRequest, line_of, output_lines
 from hardware_drivers.settings import GpioValves
-from hardware_drivers.valve_timing import ValveTiming
+from hardware_drivers.valves import ValveTiming
 
 STATES = {False: Value.INACTIVE, True: Value.ACTIVE}
 
 
 class ThrusterDriver(DeviceDriver):
-    """Opens and closes valves by GPIO; knows nothing of where the platform is.
+    """Opens and closes valves by GPIO; measures nothing.
 
-    The bearing is a line like the others, but no command of thrust reaches it: it is switched by its service, by the
-    start and the end of the driver, and by a long idle time.
+    The bearing is a line like the others, but its service switches it, the start and end of the driver, and a long
+    idle time, never a thrust command.
     """
 
     def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
@@ -58,7 +58,7 @@ class ThrusterDriver(DeviceDriver):
         return applied
 
     def close(self) -> None:
-        """Let the platform down after a while, and give the lines back; see `DeviceDriver`."""
+        """Switch the bearing off after `linger_s`, and release the lines; see `DeviceDriver`."""
         if self._bearing_on:
             time.sleep(self._settings.bearing.linger_s)
         with self._lock:
@@ -106,7 +106,7 @@ class ThrusterDriver(DeviceDriver):
         self._bearing_on = on
 
     def _watch_idleness(self, used: bool, now_ns: int) -> None:
-        """Save air when nothing has happened for long; call with the lock held."""
+        """Switch the bearing off after a long idle time; call with the lock held."""
         if used:
             self._used_ns = now_ns
         limit_ns = self._settings.bearing.idle_off_s * 1e9

@@ -1,4 +1,4 @@
-"""Drivers of devices behind another stack's ROS node: commands go out as messages, nothing comes back."""
+"""Drivers of devices behind another stack's ROS node: they publish commands, and measure nothing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Send = Callable[[np.ndarray], None]
 
 
 class TopicDriver(DeviceDriver):
-    """Hands every command on; the watchdog before it then stops also nodes that have none."""
+    """Publishes every command; our watchdog thereby also stops nodes that have none."""
 
     def __init__(self, send: Send) -> None:
         """Prepare.
@@ -33,7 +33,7 @@ class TopicDriver(DeviceDriver):
 
 
 class ValveTopicDriver(TopicDriver):
-    """The same with an air bearing, which travels in the same message as the valves."""
+    """With an air bearing, which is in the same message as the valves."""
 
     def __init__(
         self, send: Callable[[np.ndarray, bool], None], *, count: int, bearing_on: bool, linger_s: float
@@ -44,13 +44,13 @@ class ValveTopicDriver(TopicDriver):
             send: Publishes zeros and ones, and whether the bearing shall be on.
             count: Number of valves.
             bearing_on: Whether it is, from the start on.
-            linger_s: It carries the platform so long after the last valve has closed for good [s].
+            linger_s: The bearing stays on so long after the last command [s].
         """
         super().__init__(lambda command: send(command, self._bearing))
         self._bearing, self._linger_s, self._count = bearing_on, linger_s, count
 
     def close(self) -> None:
-        """Let the platform down after a while; see `DeviceDriver`."""
+        """Switch the bearing off after `linger_s`; see `DeviceDriver`."""
         if self._bearing:
             time.sleep(self._linger_s)
             self._bearing = False

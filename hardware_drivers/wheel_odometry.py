@@ -1,4 +1,4 @@
-"""Where a base on two wheels is, told from its encoders and its gyroscope."""
+"""Odometry of a differential drive from encoders and gyroscope, and detection of stalled wheels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fulmar_core.rotation import wrap_angle
 from fulmar_core.state import RigidBodyState
 
 COUNTS = 1 << 16  # encoders count up to here and begin again
-LONGEST_GAP_S = 0.5  # over a longer one the wheels are taken to have stood still
+LONGEST_GAP_S = 0.5  # the speed after a longer gap is zero
 
 
 class WheelOdometry:
@@ -64,3 +64,36 @@ class WheelOdometry:
 def _rolled(counts: int) -> int:
     """Difference of two counts, the short way round."""
     return (counts + COUNTS // 2) % COUNTS - COUNTS // 2
+
+
+LEAST = 0.05  # friction alone may hold a wheel below this speed [m/s]
+LONGEST_S = 1.0  # our value: a free base rolls long before
+
+
+class StalledWheels:
+    """Detects commanded wheels whose encoders stand: odometry is then no measurement any more."""
+
+    def __init__(self) -> None:
+        self._counts: np.ndarray | None = None
+
+    def problem(self, commanded: np.ndarray, counts: np.ndarray, time_s: float) -> str:
+        """Take a reading.
+
+        Args:
+            commanded: Speed of each rim, shape (n,) [m/s].
+            counts: Of each encoder, shape (n,).
+            time_s: When it was read [s].
+
+        Returns:
+            The problem; empty if there is none.
+        """
+        if self._counts is None:
+            self._counts, self._moved_s = counts, np.full(len(counts), time_s)
+        well = (counts != self._counts) | (np.abs(commanded) < LEAST)
+        self._counts, self._moved_s = counts, np.where(well, time_s, self._moved_s)
+        if np.all(time_s - self._moved_s <= LONGEST_S):
+            return ""
+        return (
+            f"a wheel is commanded to turn, and its encoder has stood for {LONGEST_S:g} s. "
+            "Is the base blocked, or a cable off?"
+        )

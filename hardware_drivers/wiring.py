@@ -1,7 +1,8 @@
-"""Which wheel or propeller each channel of a device turns, and in which direction."""
+"""Wiring of wheels and propellers: the side that each channel of a device turns, and its direction."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 SIDES = ("left", "right")
@@ -9,7 +10,7 @@ AS_NAMED = SIDES
 
 
 def check_wiring(wiring: Sequence[str]) -> None:
-    """Refuse a wiring that does not name both sides once; raises ValueError."""
+    """Reject a wiring that does not name both sides once; raises ValueError."""
     if sorted(side.removeprefix("-") for side in wiring) != sorted(SIDES):
         raise ValueError(
             f"'wiring' = {list(wiring)} must name left and right once each, with a '-' where it turns backwards: "
@@ -18,7 +19,7 @@ def check_wiring(wiring: Sequence[str]) -> None:
 
 
 def channels(wiring: Sequence[str], left: float, right: float) -> tuple[float, float]:
-    """Values of a device's left and right channel that make the sides do what is commanded.
+    """Values of a device's left and right channel for commands of the sides.
 
     Args:
         wiring: Side that each channel turns, `-left` or `-right` where a positive value turns it backwards.
@@ -54,3 +55,14 @@ def channel_velocity(
     half = 0.5 * track * turn_rate
     left, right = channels(wiring, speed - half, speed + half)
     return 0.5 * (left + right), (right - left) / track
+
+
+def bounded(left: float, right: float) -> tuple[float, float]:
+    """Shares of full thrust within -1 to 1.
+
+    If one is not finite, both propellers stop: `min` and `max` would turn it into full thrust, and one propeller alone
+    would turn the boat.
+    """
+    if not (math.isfinite(left) and math.isfinite(right)):
+        return 0.0, 0.0
+    return max(-1.0, min(1.0, left)), max(-1.0, min(1.0, right))

@@ -16,10 +16,10 @@ from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.own_class import is_own, load_class
+from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from policy_server.own_controller import MEMBERS, OwnController
-from policy_server.shipped import shipped_policy
 
 EXTERNAL = "external"  # any node that publishes the robot's commands
 
@@ -150,3 +150,19 @@ def load_controller(name: str, robot: Robot, task: Task, choice: Choice) -> Cont
         FulmarError: There is none of this name, or it cannot control this robot at this task.
     """
     return controller_entry(name).load(robot, task, choice)
+
+
+def policies_directory() -> Path:
+    """Folder of the shipped bundles."""
+    return Path(__file__).resolve().parent / "policies"
+
+
+def shipped_policies() -> list[Path]:
+    """Every shipped bundle, sorted by name."""
+    return sorted(path.parent for path in policies_directory().glob(f"*/{PASSPORT}"))
+
+
+def shipped_policy(robot: str, task: str) -> Path | None:
+    """The shipped bundle for a robot and a task, or None."""
+    folder = policies_directory() / f"{robot}_{task}"
+    return folder if (folder / PASSPORT).is_file() else None

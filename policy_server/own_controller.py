@@ -59,11 +59,11 @@ class OwnController:
         self.estimator: HealthSettings | None = estimator
 
     def reset(self) -> None:
-        """Let it forget the past."""
+        """Reset the user's controller; see `Controller.reset`."""
         self._own.reset()
 
     def act(self, inputs: Inputs) -> np.ndarray:
-        """Let it choose a command; see `Controller.act`."""
+        """Command of the user's controller; see `Controller.act`."""
         return np.asarray(self._own.act(inputs), dtype=float)
 
     def metadata(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A policy bundle as a controller: ONNX, without ROS and without torch; refused unless everything fits."""
+"""A policy bundle as a controller: ONNX, without ROS and without torch; rejected unless everything fits."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ from fulmar_core.policy_bundle import (
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
-GOLDEN_TOLERANCE = (
-    1e-4  # of the logits: float32 sums in another order on another processor differ by about 1e-6
-)
+# Of the logits: float32 sums in another order on another processor differ by about 1e-6.
+GOLDEN_TOLERANCE = 1e-4
 
 
 class Policy:
@@ -53,7 +52,7 @@ class Policy:
             robot: The robot it shall drive.
             task: The task it shall do.
             control_hz: The rate it shall run at; the robot's own by default [Hz].
-            trusted: File or folder of public keys, one of which must have signed it; None: nobody needs to.
+            trusted: File or folder of public keys, one of which must have signed it; None: any bundle.
 
         Raises:
             BundleError: Anything is missing, damaged, not signed, of other shape, made for something else, or does not
@@ -74,7 +73,7 @@ class Policy:
         _check_golden(self._session, bundle)
 
     def reset(self) -> None:
-        """Forget what was seen, if the network remembers anything."""
+        """Clear the memory, if the network has one."""
         self._memory = None
 
     def act(self, inputs: Inputs) -> np.ndarray:
@@ -154,7 +153,7 @@ def _check_golden(session: onnxruntime.InferenceSession, bundle: Bundle) -> None
     if not worst <= GOLDEN_TOLERANCE:
         raise BundleError(
             f"policy '{folder}' differs from its golden vectors by {worst:.2g} (at most {GOLDEN_TOLERANCE:g}). "
-            "This machine computes something else than the one that exported it."
+            "This computer computes something else than the one that exported it."
         )
     if passport.action == "on_off":
         clear = np.abs(golden.logits) > GOLDEN_TOLERANCE  # a logit of nearly zero may round either way

@@ -1,4 +1,4 @@
-"""The process that stands in for a robot's machine: a device that speaks its protocol, and MuJoCo behind it."""
+"""Node that emulates a robot's hardware: a device that speaks its protocol, and MuJoCo behind it."""
 
 from __future__ import annotations
 
@@ -32,19 +32,17 @@ from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node, settle_memory
-from sim_nodes.emulators.device import EmulatedDevice
+from sim_nodes.emulators.device import EmulatedDevice, Link, PtyLink, TcpLink
 from sim_nodes.emulators.kingfisher import KingfisherEmulator
 from sim_nodes.emulators.kobuki import KobukiEmulator
-from sim_nodes.emulators.links import Link, PtyLink, TcpLink
-from sim_nodes.emulators.topics import BASE_TIMEOUT_S, FOR_EVER_S, TopicDevice, ValveNode
-from sim_nodes.emulators.valves import ValveBank
+from sim_nodes.emulators.outputs import BASE_TIMEOUT_S, NO_TIMEOUT_S, TopicDevice, ValveBank, ValveNode
 from sim_nodes.emulators.wiring import STRAIGHT, Wiring
 from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.on_air import OnAir
 
 DEVICES = ("valves", "kobuki", "kingfisher", "ardupilot", "valve_topic", "velocity_topic", "thrust_topic")
 NONE = -1  # an empty list has no type in ROS
-CATCH_UP = 25  # ticks at most: what a process misses beyond that is gone, as if the world had stood still
+CATCH_UP = 25  # ticks at most after a pause of the process; simulated time loses the rest
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,6 @@ class EmulatorSettings(PlantSettings):
     dead: tuple[int, ...] = (NONE,)  # wires that are cut
 
     def __post_init__(self) -> None:
-        """Refuse devices that do not exist."""
         super().__post_init__()
         if self.device not in DEVICES:
             raise ValueError(str(UnknownNameError("device", self.device, DEVICES)))
@@ -73,13 +70,13 @@ class EmulatorSettings(PlantSettings):
 
 
 class EmulatorNode(Node):
-    """Runs device and physics in real time, and publishes what no device could know: the truth.
+    """Runs device and physics in real time; publishes the true state, and what the device does by itself.
 
-    It publishes also what the device does by itself. That is what counts when the driver is dead.
+    The latter shows how the robot behaves when its driver is dead.
     """
 
     def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
-        """Make physics and device, and start.
+        """Build physics and device, and start.
 
         Raises:
             FulmarError: A parameter or a file is wrong.
@@ -104,7 +101,7 @@ class EmulatorNode(Node):
         self._frames = own_frames(self, robot)
         self._odometry: Publisher | None = None
         if isinstance(self.device, TopicDevice):
-            self._listen(self.device)
+            self._subscribe(self.device)
         self._truth = self.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH))
         self._state = self.create_publisher(JointState, DEVICE_STATE.name, publisher_qos(DEVICE_STATE))
         self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
@@ -119,7 +116,7 @@ class EmulatorNode(Node):
         self._thread.start()
 
     def stop(self) -> None:
-        """Take the device away."""
+        """Stop, and close the device."""
         self._stop.set()
         self._thread.join(2.0)
         self._room.close()
@@ -152,8 +149,8 @@ class EmulatorNode(Node):
             self._publish(self._sample, stamp_ns)
             self._state.publish(self._write_state.write(command, stamp_ns))
 
-    def _listen(self, device: TopicDevice) -> None:
-        """Take commands from the device's topic, and publish odometry as the node of such a base or boat does."""
+    def _subscribe(self, device: TopicDevice) -> None:
+        """Subscribe to the device's topic, and publish odometry as the node of such a base or boat does."""
         kind: type = {
             "valve_topic": VALVE_MESSAGES[self.settings.message],
             "thrust_topic": Float32MultiArray,
@@ -191,7 +188,7 @@ def values_of(message: Any) -> list[float]:
 
 
 def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettings) -> EmulatedDevice:
-    """The device that the parameters name.
+    """The emulated device of the parameters.
 
     Raises:
         ConfigError: The link is of another kind than the device has.
@@ -203,7 +200,7 @@ def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettin
     if settings.device == "velocity_topic":
         return TopicDevice(settings.link, 2, timeout_s=BASE_TIMEOUT_S)
     if settings.device == "thrust_topic":
-        return TopicDevice(settings.link, 2, timeout_s=FOR_EVER_S)
+        return TopicDevice(settings.link, 2, timeout_s=NO_TIMEOUT_S)
     if settings.device == "ardupilot":
         from sim_nodes.emulators.ardupilot import ArdupilotEmulator
 
@@ -231,7 +228,7 @@ def _number(link: str, kind: str) -> int:
 
 
 def main() -> None:
-    """Run until told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(EmulatorNode))
 
 

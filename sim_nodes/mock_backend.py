@@ -1,4 +1,4 @@
-"""The core's own dynamics as a backend: every launch works without a simulator installed."""
+"""The core's dynamics as a backend, for machines without MuJoCo."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class MockBackend:
 
         Args:
             robot: The robot.
-            things: What stands or moves about.
+            things: Objects in the world.
         """
         self.robot, self._things = robot, things
         self._world = OneWorld(robot, noisy=False)
@@ -57,9 +57,9 @@ class MockBackend:
 
     def stand(self, ticks: int = 1) -> Sample:
         """Let time pass for a body that nothing moves; see `CanStand.stand`."""
-        still = np.zeros(1)
+        zero = np.zeros(1)
         self._world.begin(np.array(self.robot.actuators.safe_command), ticks, rigid_of(self._state[0]))
-        self._state = PlanarState(self._state.x, self._state.y, self._state.yaw, still, still, still)
+        self._state = PlanarState(self._state.x, self._state.y, self._state.yaw, zero, zero, zero)
         return self._sample()
 
     def make_safe(self) -> None:

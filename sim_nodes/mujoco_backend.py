@@ -1,4 +1,4 @@
-"""MuJoCo as a backend: it integrates the bodies, the core supplies commands, pushes, noise and names."""
+"""MuJoCo as a backend: it integrates the bodies; the core supplies actuators, disturbances and sensors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_core.things import Thing
 from sim_nodes.mujoco_model import Scene
-from sim_nodes.mujoco_model.obstacles import radii_for
+from sim_nodes.mujoco_model.objects import radii_for
 from sim_nodes.one_world import OneWorld
 
 SENSORS = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), ("accelerometer", 3))
@@ -30,13 +30,13 @@ class MujocoBackend:
         Args:
             robot: The robot.
             sensor_noise: Whether odometry and inertial unit have the noise of the robot's YAML.
-            things: What stands or moves about.
+            things: Objects in the world.
         """
         self.robot = robot
         self._noisy, self._things = sensor_noise, things
         self._unit = InertialUnit(robot.sensors.imu)
         self._world = OneWorld(robot, noisy=sensor_noise)
-        self._enter(Scene(robot, things=things))
+        self._use(Scene(robot, things=things))
 
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> MujocoBackend:
@@ -57,7 +57,7 @@ class MujocoBackend:
         """Begin anew; see `Backend.reset`."""
         obstacles = np.asarray(episode.goal.obstacles, dtype=float)
         if not self._scene.has_room_for(obstacles):
-            self._enter(Scene(self.robot, radii_for(obstacles), self._things))
+            self._use(Scene(self.robot, radii_for(obstacles), self._things))
         self._scene.begin(episode)
         self._unit.reset(seed, number)
         truth, imu = self._read()
@@ -67,19 +67,19 @@ class MujocoBackend:
         """Apply a command; see `Backend.step`.
 
         Raises:
-            SafetyError: If the simulation left the finite numbers, with the state it had.
+            SafetyError: The state is not finite; the message has it.
         """
-        model, data, machine, world = self.model, self.data, self._scene.machine, self._world
+        model, data, robot_model, world = self.model, self.data, self._scene.robot_model, self._world
         world.begin(np.asarray(command, dtype=float), ticks, self._truth)
         fx, fy, torque = (float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
-        doing = None
+        last = None
         for _ in range(ticks):
             applied = world.actuation.advance(dt, latest_s=world.latest_s)
-            if applied is not doing or not machine.steady:
-                machine.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], (fx, fy, torque))
-                doing = applied
-            mujoco.mj_step(model, data, machine.steps_per_tick)
+            if applied is not last or not robot_model.steady:
+                robot_model.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], (fx, fy, torque))
+                last = applied
+            mujoco.mj_step(model, data, robot_model.steps_per_tick)
         if not np.isfinite(data.qpos).all():
             raise SafetyError(f"MuJoCo's state is not finite at t = {data.time:.2f} s: {data.qpos}.")
         truth, imu = self._read()
@@ -92,7 +92,7 @@ class MujocoBackend:
         dt = self.robot.timing.physics_dt
         for _ in range(ticks):
             world.actuation.advance(dt, latest_s=world.latest_s)
-        self._scene.machine.drive(self.model, data, rest, world.actuation.gain[:, 0], (0.0, 0.0, 0.0))
+        self._scene.robot_model.drive(self.model, data, rest, world.actuation.gain[:, 0], (0.0, 0.0, 0.0))
         data.qvel[:] = 0.0
         data.time += ticks * dt
         truth, imu = self._read()
@@ -106,7 +106,7 @@ class MujocoBackend:
         """Bring the actuators to rest; MuJoCo itself needs no closing."""
         self.make_safe()
 
-    def _enter(self, scene: Scene) -> None:
+    def _use(self, scene: Scene) -> None:
         self._scene = scene
         self._at = {
             name: slice(int(scene.model.sensor(name).adr[0]), int(scene.model.sensor(name).adr[0]) + width)
@@ -120,7 +120,7 @@ class MujocoBackend:
         every = np.array(self.data.sensordata)
         read = {name: every[at] for name, at in self._at.items()}
         position = read["position"]
-        position[2] -= self._scene.machine.rest_height
+        position[2] -= self._scene.robot_model.rest_height
         w, x, y, z = read["attitude"]
         truth = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
         return truth, ImuSample(read["accelerometer"], read["gyroscope"])

@@ -1,4 +1,4 @@
-"""A simulated platform on its air bearing: it stands where it is without air, or while a hand holds it."""
+"""A simulated platform on its air bearing: without air, or while a hand holds it, it does not move."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""One episode between command and actuator, and between truth and measurement: the core's code on a batch of one.
+"""Actuators, disturbances and sensors of one episode: the core's code on a batch of one.
 
-Whoever integrates the bodies, failures, noise, delays, pushes and sensors are those of the core's batch.
+Every simulator thus has the failures, noise, delays, pushes and sensors of the core's batch.
 """
 
 from __future__ import annotations

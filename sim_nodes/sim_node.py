@@ -38,7 +38,7 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
+    """Run the node until it is stopped."""
     sys.exit(run_node(lambda request_exit: PlantNode(make_backend, request_exit)))
 
 

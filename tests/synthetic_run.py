@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,9 @@ from fulmar_core.planar import PlanarState, at_rest, rigid_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rotation import from_yaw, rotate_inverse
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import VELOCITY_COMMAND, WIRES, command_wire
+from fulmar_core.topics import VELOCITY_COMMAND, WIRES, Wire, command_wire
 from policy_server.controllers import EXTERNAL
 
 ROBOT = "floating_platform"
@@ -84,7 +86,7 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
         simulation.measured.write(0, _start(plan.start))
     if plan.goal:
         simulation.goal.write(0, _goal(plan.goal, simulation.goal[0]))
-    bag = _Messages(folder, plan, robot)
+    bag = RunMessages(folder, robot, _info(plan))
     bag.goal(task.goal_topic, simulation.goal[0], EPOCH_NS)
     bag.obstacles(simulation.goal[0].obstacles)
     external = plan.controller == EXTERNAL
@@ -102,8 +104,8 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
         if task.goal_topic == "goal_velocity" and simulation.goal.done[0] != given:
             given = float(simulation.goal.done[0])
             bag.goal(task.goal_topic, simulation.goal[0], now_ns)
-        bag.odometry("ground_truth/odom", simulation.truth, time_s, now_ns)
-        bag.odometry("odom", simulation.measured, time_s, now_ns)
+        bag.odometry("ground_truth/odom", rigid_of(simulation.truth[0]), time_s, now_ns)
+        bag.odometry("odom", rigid_of(simulation.measured[0]), time_s, now_ns)
         for name, pose in simulation.things.items():
             bag.thing(name, pose[0], time_s, now_ns)
         if tick % substeps == 0 and not plan.silence_s[0] <= time_s < plan.silence_s[1]:
@@ -151,31 +153,37 @@ def _plant_values(ticks: int, trips: int) -> dict[str, str]:
     return {"mode": "running", "ticks": str(ticks), "watchdog_trips": str(trips), "overruns": "2"}
 
 
-class _Messages:
-    """Builds and writes messages by the names of the wires."""
+def _info(plan: Plan) -> dict[str, Any]:
+    return {
+        "robot": plan.robot,
+        "task": plan.task,
+        "controller": plan.controller,
+        "backend": "mujoco",
+        "seed": plan.seed,
+        "lockstep": False,
+        "rate": 1.0,
+        "control_hz": plan.control_hz,
+        "start": list(plan.start) if plan.start else None,
+        "goal": list(plan.goal) if plan.goal else None,
+        "scenario": "nominal",
+        "fulmar_version": "0.0.0",
+        "git_revision": "0123456",
+        "command": "fulmar run floating_platform",
+    }
 
-    def __init__(self, folder: Path, plan: Plan, robot: Robot) -> None:
-        info = {
-            "robot": plan.robot,
-            "task": plan.task,
-            "controller": plan.controller,
-            "backend": "mujoco",
-            "seed": plan.seed,
-            "lockstep": False,
-            "rate": 1.0,
-            "control_hz": plan.control_hz,
-            "start": list(plan.start) if plan.start else None,
-            "goal": list(plan.goal) if plan.goal else None,
-            "scenario": "nominal",
-            "fulmar_version": "0.0.0",
-            "git_revision": "0123456",
-            "command": "fulmar run floating_platform",
-        }
-        self._robot, self._command_wire = plan.robot, command_wire(robot)
+
+class RunMessages:
+    """Builds the messages of a run and writes them into a bag, by the names of the wires."""
+
+    def __init__(
+        self, folder: Path, robot: Robot, info: dict[str, Any], wires: Sequence[Wire] = WIRES
+    ) -> None:
+        """Create the bag, with the topics of some wires."""
+        self._robot, self._command_wire = robot.name, command_wire(robot)
         self._store, self._names = type_store(), np.array(robot.actuators.names)
         self._types = {wire.name: wire.type for wire in WIRES}
         self.writer = BagWriter(folder, run_info=info)
-        for wire in WIRES:
+        for wire in wires:
             self.writer.add_topic(self._topic(wire.name), wire.type, wire.delivery)
 
     def _topic(self, name: str) -> str:
@@ -271,8 +279,7 @@ class _Messages:
             angular=self._vector("Vector3", angular),
         )
 
-    def odometry(self, name: str, states: PlanarState, time_s: float, log_ns: int) -> None:
-        state = rigid_of(states[0])
+    def odometry(self, name: str, state: RigidBodyState, time_s: float, log_ns: int) -> None:
         velocity = rotate_inverse(state.quat_xyzw, state.velocity_in_world)
         twist = self._twist(velocity, state.angular_velocity_in_body)
         pose = self._pose(state.position_in_world, state.quat_xyzw)

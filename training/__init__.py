@@ -1,4 +1,4 @@
-"""Learning, judging and exporting policies.
+"""Training, evaluation and export of policies.
 
 Runs on a workstation, never on a robot, and knows no ROS.
 """

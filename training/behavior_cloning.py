@@ -1,66 +1,72 @@
-"""PPO that begins as the apprentice of a classical law.
+"""PPO that begins by cloning a classical law.
 
-For its first updates the policy moves towards what the law would do in the situations that the policy itself gets into
+For its first updates the policy moves towards the actions of the law in the states that the policy itself visits
 (DAgger without a mixture, Ross, Gordon and Bagnell 2011, arXiv 1011.0686), while the value learns from returns as
-always. What follows is PPO, from a policy that knows its trade already.
+always. PPO follows.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, Protocol
 
+import gymnasium
 import numpy as np
 import torch
 from torch.nn.utils import clip_grad_norm_
 
-from training.expert import Teacher, teacher_of
+from fulmar_core.controllers.classical import load_classical
+from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS
+from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.lqr import Lqr
+from fulmar_core.controllers.wrench_choice import WrenchChoice
+from fulmar_core.errors import ConfigError
 from training.fast_ppo import FastPPO, rows
 from training.vec_env import BatchVecEnv
 
-RATE = (1e-3, 1e-4)  # learning rate of the first and of the last lesson
-PASSES = 6.0  # through the samples, in each lesson
-WEIGHT = 10.0  # of the squared error beside that of the value
+RATE = (1e-3, 1e-4)  # learning rate of the first and of the last cloning update
+PASSES = 6.0  # through the samples, in each cloning update
+WEIGHT = 10.0  # of the squared error of the actions beside that of the value
 
 
-class Apprentice(FastPPO):
-    """`FastPPO` with a number of lessons before it, of which `training.expert` says where there are any."""
+class BehaviorCloningPPO(FastPPO):
+    """`FastPPO` whose first updates clone the law of the robot's family."""
 
-    def __init__(self, *args: Any, lessons: int = 0, **more: Any) -> None:
-        """Build it; see `PPO` for everything but the number of lessons."""
-        self.lessons = lessons
-        self._teacher: Teacher | None = None
+    def __init__(self, *args: Any, cloning_updates: int = 0, **more: Any) -> None:
+        self.cloning_updates = cloning_updates
+        self._expert: Expert | None = None
         self._examples: list[np.ndarray] = []
         super().__init__(*args, **more)
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "_teacher", "_examples"]
+        return [*super()._excluded_save_params(), "_expert", "_examples"]
 
     @property
-    def lesson(self) -> int:
-        """How many lessons there have been."""
-        return min(self._n_updates // self.n_epochs, self.lessons)
+    def cloned(self) -> int:
+        """Number of cloning updates that are done."""
+        return min(self._n_updates // self.n_epochs, self.cloning_updates)
 
     def _look(self) -> None:
-        if self.lesson == self.lessons:
+        if self.cloned == self.cloning_updates:
             return
         normaliser = self.get_vec_normalize_env()
         assert normaliser is not None
-        if getattr(self, "_teacher", None) is None:
+        if getattr(self, "_expert", None) is None:
             worlds = normaliser.unwrapped
             assert isinstance(worlds, BatchVecEnv)
-            self._teacher, self._examples = teacher_of(worlds), []
-        assert self._teacher is not None
-        self._examples.append(self._teacher.actions(np.asarray(normaliser.get_original_obs())))
+            self._expert, self._examples = expert_of(worlds), []
+        assert self._expert is not None
+        self._examples.append(self._expert.actions(np.asarray(normaliser.get_original_obs())))
 
     @torch.no_grad()
     def train(self) -> None:
-        """A lesson, or an update of PPO."""
-        if self.lesson == self.lessons:
+        """Do a cloning update, or an update of PPO."""
+        if self.cloned == self.cloning_updates:
             super().train()
             return
         self.policy.set_training_mode(True)
         first, last = RATE
-        rate = first + (last - first) * self.lesson / max(1, self.lessons - 1)
+        rate = first + (last - first) * self.cloned / max(1, self.cloning_updates - 1)
         for group in self.policy.optimizer.param_groups:
             group["lr"] = rate
         samples = rows(self.rollout_buffer.observations), rows(self.rollout_buffer.returns)
@@ -85,3 +91,67 @@ class Apprentice(FastPPO):
         self.policy.optimizer.step()
         self._refresh()
         return float(away.square().mean())
+
+
+class Expert(Protocol):
+    """A classical law with its shipped gains, in the terms of a network's actions."""
+
+    def actions(self, observations: np.ndarray) -> np.ndarray:
+        """Actions of the law.
+
+        Args:
+            observations: From the worlds, not normalised, shape (worlds, n).
+
+        Returns:
+            Actions, each value within [-1, 1], shape (worlds, m).
+        """
+        ...
+
+
+def expert_of(worlds: BatchVecEnv) -> Expert:
+    """The law of the robot's family, for the worlds' robot and task.
+
+    Raises:
+        ConfigError: No law does the task, or the actions are single valves that open and close.
+    """
+    robot, task = worlds.robot, worlds.task
+    law = load_classical(robot, task)
+    if isinstance(law, Lqr):  # its observer remembers its own commands, but here the policy commands
+        law = Lqr(robot, task, replace(law.gains, observer=None), control_hz=robot.timing.control_hz)
+    if worlds.choice is not None and isinstance(law, Lqr):
+        return WrenchExpert(law, worlds.choice, worlds)
+    if isinstance(worlds.action_space, gymnasium.spaces.Box) and worlds.choice is None:
+        return CommandExpert(law, worlds)
+    raise ConfigError(
+        f"'cloning_updates': no law can be cloned where a network opens single valves, as for '{robot.name}' at "
+        f"'{task.name}'. Set 'action_space: wrench', or leave 'cloning_updates' out."
+    )
+
+
+class WrenchExpert:
+    """The LQR; it takes pushes from the network's disturbance inputs, where it has them, instead of an estimate."""
+
+    def __init__(self, law: Lqr, choice: WrenchChoice, worlds: BatchVecEnv) -> None:
+        self._law, self._choice, self._worlds = law, choice, worlds
+
+    def actions(self, observations: np.ndarray) -> np.ndarray:
+        """Shares of the wanted wrench; see `Expert`."""
+        inputs = self._worlds.inputs()
+        now = self._law.frame.body_state(inputs)
+        if self._worlds.takes_disturbances:
+            terms = inputs.observation.shape[1]
+            now = replace(now, push=np.asarray(observations[:, terms : terms + len(PUSH_TERMS)], dtype=float))
+        return np.asarray(self._choice.shares_of(self._law.wanted(inputs, now)), dtype=np.float32)
+
+
+class CommandExpert:
+    """A law whose commands, as shares of full command, are the network's actions."""
+
+    def __init__(self, law: Law, worlds: BatchVecEnv) -> None:
+        self._law, self._worlds = law, worlds
+        self._scale = np.asarray(worlds.robot.actuators.scale, dtype=float)
+
+    def actions(self, observations: np.ndarray) -> np.ndarray:
+        """Shares of full command; see `Expert`."""
+        shares = np.clip(self._law.act(self._worlds.inputs()) / self._scale, -1.0, 1.0)
+        return self._worlds.answered(shares.astype(np.float32))

@@ -70,3 +70,26 @@ def _line(outcome: Outcome) -> dict[str, Any]:
 def _rank(outcome: Outcome) -> tuple[float, float]:
     assert outcome.record is not None
     return outcome.success, outcome.record["best"]["score"]
+
+
+def campaign_text(result: dict[str, Any], out: Path) -> str:
+    """A table of `run_campaign`'s result for people.
+
+    Args:
+        result: Result.
+        out: Folder of the campaign.
+    """
+    lines = [f"{'seed':>6}  {'held out':>8}  {'MuJoCo':>7}  {'steps':>12}"]
+    for each in result["seeds"]:
+        if "error" in each:
+            lines.append(f"{each['seed']:>6}  failed: {each['error']}")
+            continue
+        mujoco = "-" if each["success_mujoco"] is None else f"{each['success_mujoco']:.3f}"
+        lines.append(
+            f"{each['seed']:>6}  {each['success_held_out']:>8.3f}  {mujoco:>7}  {each['steps']:>12,}"
+        )
+    if result["best_run"] is None:
+        return "\n".join([*lines, f"no run of {out} succeeded"])
+    mean, spread = result["success_mean"], result["success_std"]
+    lines.append(f"success {mean:.3f} ± {spread:.3f}; best: seed {result['best_seed']}")
+    return "\n".join([*lines, f"next: fulmar export {result['best_run']} --out DIR"])

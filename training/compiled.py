@@ -17,8 +17,18 @@ import torch
 from fulmar_core.learning_step import observed_step
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
-from training.kernel import ASKED, EFFORT, TOLD, Kernel, check_compiler, kernel_of
-from training.pytree import leaves, moving_of, parts_of, rebuilt
+from training.kernel import (
+    ASKED,
+    EFFORT,
+    TOLD,
+    Kernel,
+    check_compiler,
+    kernel_of,
+    leaves,
+    moving_of,
+    parts_of,
+    rebuilt,
+)
 
 ObservedStep = Callable[..., tuple[Array, Array, Array]]  # `observed_step` of one batch
 Form = tuple[Any, ...]  # type, shape and strides of each leaf of a part

@@ -15,7 +15,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
-from training.fallback_policy import Specialist
+from training.fallback_policy import FallbackPolicy
 from training.network import Decision, DeployedNetwork, NetworkPlan
 from training.vec_env import BatchVecEnv
 
@@ -37,7 +37,7 @@ def deployed_network(
     learner: BaseAlgorithm,
     normaliser: VecNormalize,
     command_scale: Iterable[float],
-    specialist: Specialist | None = None,
+    fallback: FallbackPolicy | None = None,
 ) -> DeployedNetwork:
     """Copy a learner's present weights and statistics.
 
@@ -45,7 +45,7 @@ def deployed_network(
         learner: PPO, recurrent PPO, SAC or TD3 with an MLP policy.
         normaliser: Holds the running mean and variance of the observations.
         command_scale: Full command of each actuator, in its own unit.
-        specialist: Who takes over where too many valves are dead.
+        fallback: Who takes over where too many valves are dead.
 
     Returns:
         A network that shares nothing with the learner.
@@ -66,11 +66,11 @@ def deployed_network(
         limit=float(normaliser.clip_obs),
         memory=2 * trained.lstm.hidden_size if trained.lstm else 0,
         combinations=len(choice.commands) if choice else 0,
-        disturbances=isinstance(worlds, BatchVecEnv) and worlds.told,
-        knows_dead=choice is not None and worlds.told,
+        disturbances=isinstance(worlds, BatchVecEnv) and worlds.takes_disturbances,
+        knows_dead=choice is not None and worlds.takes_disturbances,
         side=mirror.side if mirror else None,
-        specialist=specialist.network.plan if specialist else None,
-        losses=len(specialist.losses) if specialist else 0,
+        fallback=fallback.network.plan if fallback else None,
+        losses=len(fallback.losses) if fallback else 0,
     )
     with torch.random.fork_rng(devices=[]):  # whoever looks at a learner must not change what it draws next
         network = DeployedNetwork(plan)
@@ -85,8 +85,8 @@ def deployed_network(
             network.take_choice(choice)
         if mirror is not None:
             network.take_mirror(mirror)
-        if specialist is not None:
-            network.take_specialist(specialist.network, specialist.losses)
+        if fallback is not None:
+            network.take_fallback(fallback.network, fallback.losses)
         if trained.lstm is not None:
             _copy_memory(trained.lstm, network)
     return network
@@ -102,7 +102,7 @@ def _trained(learner: BaseAlgorithm, *, wrench: bool) -> _Trained:
     layers = [*policy.mlp_extractor.policy_net, policy.action_net]
     on_off = isinstance(learner.action_space, spaces.MultiBinary)
     orders = isinstance(learner.action_space, spaces.MultiDiscrete)
-    decision: Decision = "choose" if wrench else "threshold" if on_off else "order" if orders else "clamp"
+    decision: Decision = "choose" if wrench else "threshold" if on_off else "increment" if orders else "clamp"
     return _Trained(layers, decision, getattr(policy, "lstm_actor", None))
 
 

@@ -1,4 +1,4 @@
-"""What a learner is told beside its observations: the truth, as late as an estimator would know it.
+"""Pushes and dead valves as network inputs in training: the truth, as late as the estimator would report it.
 
 The estimator itself (`fulmar_core.health.actuator_estimator`) costs as much as the physics; it is used wherever a
 network is evaluated or deployed.
@@ -13,31 +13,28 @@ import numpy as np
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 
-LEARNED = (
-    0.35  # share of what is unknown of a push that one control step reveals, as the estimator on average [-]
-)
+LEARNED = 0.35  # share of the unknown part of a push that one step reveals, the estimator's average [-]
 ERROR = np.array([0.01, 0.01, 0.002])  # standard deviation of a known push [N, N, N·m]
 
 
-class ToldTruth:
-    """Pushes and dead valves of the worlds that a learner is in, shape (worlds, 3 + valves)."""
+class DisturbanceInputs:
+    """Estimates of pushes and dead valves in a batch of worlds, shape (worlds, 3 + valves)."""
 
     def __init__(self, robot: Robot, *, worlds: int, seed: int) -> None:
-        """Know nothing yet."""
         self._push = np.zeros((worlds, 3))  # in the world's frame
         self._dead = np.zeros((worlds, len(robot.actuators.names)), dtype=bool)
         self._rng = np.random.Generator(np.random.Philox(seed))
 
     def state(self) -> dict[str, Any]:
-        """Everything that changes, as values that pickle; for an exact resume."""
+        """The mutable state, as values that pickle; for an exact resume."""
         return {"push": self._push.copy(), "dead": self._dead.copy(), "rng": self._rng.bit_generator.state}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` returned."""
+        """Restore what `state` returned."""
         self._push, self._dead = state["push"].copy(), state["dead"].copy()
         self._rng.bit_generator.state = state["rng"]
 
-    def forget(self, worlds: Any = slice(None)) -> None:
+    def reset(self, worlds: Any = slice(None)) -> None:
         """Begin anew in some worlds."""
         self._push[worlds], self._dead[worlds] = 0.0, False
 
@@ -47,14 +44,14 @@ class ToldTruth:
         return self._dead
 
     def learn(self, simulation: BatchSimulation) -> None:
-        """Look at a control step that was done: a dead valve is noticed once it was told to open."""
+        """Take a finished control step; a dead valve is noticed once it was commanded to open."""
         world = simulation.world
         push = np.stack((world.force_x, world.force_y, world.torque), axis=-1)
         self._push += LEARNED * (push - self._push)
         self._dead |= (simulation.command > 0.5) & (world.alive.T < 0.5)
 
-    def told(self, simulation: BatchSimulation) -> np.ndarray:
-        """What is told beside the next observation."""
+    def inputs(self, simulation: BatchSimulation) -> np.ndarray:
+        """Values to append to the next observation, shape (worlds, 3 + valves)."""
         push = self._push + ERROR * self._rng.standard_normal(self._push.shape)
         cos, sin = np.cos(simulation.measured.yaw), np.sin(simulation.measured.yaw)
         ahead = cos * push[:, 0] + sin * push[:, 1]

@@ -1,23 +1,72 @@
-"""Judging a training run in MuJoCo: another integrator, another model, episodes it has not seen."""
+"""Evaluation of a network: on held-out episodes while it learns, and in MuJoCo at the end."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import EVALUATION_SEED
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.metrics import summary
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import roll_out_in_backends
-from fulmar_core.tasks import load_task
-from sim_nodes.mujoco_backend import MujocoBackend
-from training.network import NetworkController, load_network
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.seeds import EVALUATION_SEED, HELD_OUT_SEED
+from fulmar_core.tasks import Task, load_task
+from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
 
+EPISODES = 256  # of each scenario
+Evaluator = Callable[[DeployedNetwork], tuple[float, float]]  # success rate and score
 
-def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> dict[str, Any]:
-    """Judge the best network of a run, and write the figures into its record.
+# Weights of further metrics in the score, where a task has them: precision, then economy.
+_WEIGHTS = {
+    "PT2_percent": 0.005,
+    "OT2_percent": 0.001,
+    "goals_reached": 0.05,
+    "velocity_error_m_s": -1.0,
+    "yaw_rate_error_deg_s": -0.02,
+    "effort": -0.5,
+    "control_variation": -0.05,
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """Result of a learner on held-out episodes, in the batch."""
+
+    wall_s: float
+    steps: int
+    success_rate: float  # mean of the training scenario and the nominal one
+    score: float  # ranks checks: success first, then precision, then economy
+
+
+def held_out_evaluator(robot: Robot, task: Task, scenario: Scenario) -> Evaluator:
+    """Evaluator in the training scenario and in the nominal one: a network may be good at either alone."""
+    worlds = (scenario, load_scenario("nominal"))
+
+    def evaluate(network: DeployedNetwork) -> tuple[float, float]:
+        controller = NetworkController(network, robot, task, robot.timing.control_hz)
+        figures = [
+            summary(
+                roll_out_in_batch(controller, robot, task, world, episodes=EPISODES, seed=HELD_OUT_SEED), task
+            )
+            for world in worlds
+        ]
+        success = _mean(figures, "success_rate")
+        more = (weight * _mean(figures, name) for name, weight in _WEIGHTS.items() if name in figures[0])
+        return success, success + sum(more)
+
+    return evaluate
+
+
+def _mean(figures: list[dict[str, Any]], name: str) -> float:
+    values = [each[name]["mean"] if isinstance(each[name], dict) else each[name] for each in figures]
+    return float(sum(value or 0.0 for value in values)) / len(values)
+
+
+def evaluate_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> dict[str, Any]:
+    """Evaluator the best network of a run, and write the figures into its record.
 
     Args:
         run: Run folder.
@@ -27,6 +76,8 @@ def judge_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> d
     Returns:
         Success rate and every metric.
     """
+    from sim_nodes.mujoco_backend import MujocoBackend  # only here: learning itself needs no MuJoCo
+
     record = read_run_record(run)
     robot, task, world = load_robot(record["robot"]), load_task(record["task"]), load_scenario(scenario)
     controller = NetworkController(load_network(run / NETWORK_FILE), robot, task, record["control_hz"])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from fulmar_core.errors import ConfigError
-from training.jobs import Job, Outcome, read_progress
+from fulmar_core.errors import ConfigError, FulmarError
+from training.jobs import Job, Outcome, read_progress, run_job
 from training.run_folder import read_run_record
 
 LOG_FILE = "log.txt"  # what a job has to say, in its run folder
@@ -80,7 +82,7 @@ def _start(job: Job) -> subprocess.Popen[bytes]:
     limits = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "MKL", "OPENBLAS")}
     with (job.out / LOG_FILE).open("ab") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "training.worker"],
+            [sys.executable, "-c", "from training.executors import work; raise SystemExit(work())"],
             stdin=subprocess.PIPE,
             stdout=log,
             stderr=log,
@@ -105,3 +107,27 @@ def _outcome(job: Job, code: int) -> Outcome:
 def _last_words(log: Path) -> str:
     lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+
+def work() -> int:
+    """Do the job; 0 when it is done, else the last line of standard error says why not."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    source = sys.stdin.buffer
+    job = pickle.load(source)  # from our own parent, over a pipe
+    threading.Thread(target=_follow, args=(source.fileno(),), daemon=True).start()
+    try:
+        run_job(job)
+    except FulmarError as error:
+        print(error, file=sys.stderr)  # noqa: T201 - it is all that the parent reads
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)  # noqa: T201
+        return 130
+    return 0
+
+
+def _follow(pipe: int) -> None:
+    """Do as a person with Ctrl-C would once the parent closes the pipe, or dies."""
+    while os.read(pipe, 1):
+        pass
+    os.kill(os.getpid(), signal.SIGINT)

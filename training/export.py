@@ -14,18 +14,18 @@ import torch
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms, with_disturbances
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import FORMAT, Golden, Passport, action_of, write_bundle
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.seeds import HELD_OUT_SEED
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from training.golden_limits import with_limits
-from training.interrupt import polite_interrupt
 from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record
+from training.session import polite_interrupt
 
 GOLDEN_VECTORS = 64
 GOLDEN_STEPS = 5  # commands between the two moments that golden vectors are taken at
@@ -73,7 +73,7 @@ def export(run: Path, out: Path) -> Passport:
             key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
         }
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
-        | {key: record[key] for key in ("recipe", "specialist") if key in record}
+        | {key: record[key] for key in ("recipe", "fallback_policy") if key in record}
         | {"curve": _curve(record)}
         | _verdict(record),
     )
@@ -149,7 +149,7 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
 def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
     """What the network makes of held-out episodes at their start, a few commands later, and at limits.
 
-    Where it hands over to a specialist, every other robot is told of a loss that strands it.
+    Where it hands over to a fallback, every other robot is told of a loss that strands it.
     """
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
@@ -167,7 +167,7 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
         inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
         seen = with_disturbances(loop.observer, inputs) if network.plan.disturbances else inputs.observation
         seen = seen.astype(np.float32)
-        if network.specialist is not None:
+        if network.fallback is not None:
             losses = network.losses.numpy()
             stranded = seen[::2, -losses.shape[1] :]
             stranded[:] = 1.0 - np.resize(losses, stranded.shape)

@@ -1,8 +1,8 @@
-"""A second network for what the first is better not taught: coming to rest where dead valves leave no pose to hold.
+"""A second network that takes over when dead valves leave no pose that the robot can hold.
 
-One network that learns both loses the rarer: how much it tries out is one standard deviation for all situations, and
-those with a full set of valves want it small. So the specialist learns alone, among stranded robots only, and the
-network that is deployed hands over to it as soon as it is told of such a loss.
+One network that learns both cases loses the rarer one: it explores with one standard deviation for all states, and
+states with a full set of valves want a small one. The fallback policy therefore learns alone, among uncontrollable
+robots only, and the deployed network hands over to it as soon as its disturbance inputs report such a loss.
 """
 
 from __future__ import annotations
@@ -23,54 +23,52 @@ from training.settings import TrainingSettings, load_training_settings
 
 
 @dataclass(frozen=True)
-class Specialist:
-    """Who takes over, and when."""
+class FallbackPolicy:
+    """Network of a fallback policy, and the failures at which it takes over."""
 
     network: DeployedNetwork
-    losses: np.ndarray  # 1 for each valve that is dead, of all sets that it takes over at, shape (k, valves)
+    losses: np.ndarray  # 1 for each dead valve, one row for each set of dead valves, shape (k, valves)
 
 
-def specialist_settings(settings: TrainingSettings, robot: Robot, task: Task) -> TrainingSettings | None:
-    """How a run's specialist learns; None if it has none.
+def fallback_settings(settings: TrainingSettings, robot: Robot, task: Task) -> TrainingSettings | None:
+    """Training settings of a run's fallback policy; None if it has none.
 
     Raises:
-        ConfigError: No such settings, or the two could not act as one.
+        ConfigError: No such settings, or the two networks could not act as one.
     """
-    if settings.specialist is None:
+    if settings.fallback_policy is None:
         return None
-    name = settings.specialist.training
+    name = settings.fallback_policy.settings
     own = load_training_settings(robot, task, name)
-    stranded = load_scenario(own.scenario).actuation
-    if not stranded.stranding or not uncontrollable_losses(robot, stranded.failures):
+    actuation = load_scenario(own.scenario).actuation
+    if not actuation.stranding or not uncontrollable_losses(robot, actuation.failures):
         raise ConfigError(
-            f"'specialist': '{own.scenario}', the scenario of '{name}', must have 'stranding: true', and "
-            f"'{robot.name}' thrusters that strand it when they are lost."
+            f"'fallback_policy': '{own.scenario}', the scenario of '{name}', must have 'stranding: true', and "
+            f"'{robot.name}' thrusters whose loss makes it uncontrollable."
         )
-    if own.specialist is not None or (own.told, own.wrench) != (settings.told, settings.wrench):
+    same = ("disturbance_inputs", "action_space")
+    if own.fallback_policy is not None or any(getattr(own, key) != getattr(settings, key) for key in same):
         raise ConfigError(
-            f"'specialist': '{name}' must have the 'told' and 'wrench' of who hands over to it, and no specialist."
+            f"'fallback_policy': '{name}' must have the 'disturbance_inputs' and 'action_space' of the policy that "
+            "hands over to it, and no fallback policy of its own."
         )
     return own
 
 
-def load_specialist(run: Path, robot: Robot, settings: TrainingSettings) -> Specialist:
-    """The specialist that a finished run left.
+def load_fallback(run: Path, robot: Robot, settings: TrainingSettings) -> FallbackPolicy:
+    """Load the fallback policy that a finished run left.
 
     Args:
         run: Its own run folder.
         robot: The robot.
-        settings: How it learned.
-
-    Returns:
-        Its network, and every set of dead valves that it takes over at.
+        settings: Its training settings.
 
     Raises:
-        ConfigError: Its scenario is not there.
+        ConfigError: Its scenario is missing.
         FileNotFoundError: The run has left no network.
     """
-    valves = len(robot.actuators.names)
     lost = uncontrollable_losses(robot, load_scenario(settings.scenario).actuation.failures)
-    losses = np.zeros((len(lost), valves), dtype=np.float32)
+    losses = np.zeros((len(lost), len(robot.actuators.names)), dtype=np.float32)
     for row, which in zip(losses, lost, strict=True):
         row[list(which)] = 1.0
-    return Specialist(load_network(run / NETWORK_FILE), losses)
+    return FallbackPolicy(load_network(run / NETWORK_FILE), losses)

@@ -70,7 +70,6 @@ class FeedForward(nn.Module):
     scale: torch.Tensor
 
     def __init__(self, checkpoint: Checkpoint, activations: Activations) -> None:
-        """Copy weights and statistics."""
         super().__init__()
         self.inputs, self.outputs = checkpoint.inputs, checkpoint.outputs
         self.register_buffer("mean", checkpoint.mean.clone())

@@ -13,77 +13,13 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import episode_steps
 from fulmar_core.errors import ConfigError
-from fulmar_core.learning_step import observed_step
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
-from training.spaces import action_space, observation_space
-from training.uncontrollable import asked_for
+from training.worlds import Worlds, actuator_space, observation_space
 
 Infos = dict[str, Any]
-# Observations, rewards, terminated and truncated of each world.
-Outcome = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-
-class Worlds:
-    """Worlds of one robot at one task, and how long their episodes have lasted.
-
-    An episode is terminated when the robot leaves the geofence or touches an obstacle, and truncated when its time
-    (`episode_s` of the task) is up.
-
-    Attributes:
-        simulation: The worlds; built anew by `begin`.
-    """
-
-    def __init__(
-        self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, seed: int, training: bool
-    ) -> None:
-        """Build the worlds; arguments as of `TaskVectorEnv`.
-
-        Raises:
-            ConfigError: There are no worlds, or the seed is negative.
-        """
-        if worlds < 1:
-            raise ConfigError(f"num_envs: found {worlds}, need at least 1.")
-        if seed < 0:
-            raise ConfigError(f"seed: found {seed}, need 0 or more.")
-        self._robot, self._task, self._scenario = robot, asked_for(task, scenario), scenario
-        self._worlds, self._training = worlds, training
-        self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
-        self.begin(seed)
-        self._horizon = episode_steps(task, self.simulation.control_dt)
-
-    @property
-    def terms(self) -> int:
-        """Number of observation terms."""
-        return len(self.simulation.observer.names)
-
-    def begin(self, seed: int) -> None:
-        """Begin the first episode of a seed (>= 0) in every world."""
-        self.simulation = BatchSimulation(
-            self._robot, self._task, self._scenario, worlds=self._worlds, seed=seed, training=self._training
-        )
-        self._age = np.zeros(self._worlds, dtype=int)
-
-    def begin_next(self, worlds: np.ndarray) -> None:
-        """Begin the next episode in some worlds, by their numbers."""
-        self.simulation.reset(worlds)
-        self._age[worlds] = 0
-
-    def observe(self, worlds: np.ndarray | None = None) -> np.ndarray:
-        """Observations of some worlds, of all by default, shape (worlds, terms)."""
-        return np.asarray(self.simulation.observe(worlds))
-
-    def step(self, actions: np.ndarray) -> Outcome:
-        """Move one control step; actions of shape (worlds, actuators) are elements of `action_space`."""
-        command = np.asarray(actions, dtype=np.float32) * self._scale
-        reward, over, seen = observed_step(self.simulation, command, effort=self._robot.costs.effort)
-        self._age += 1
-        terminated = np.asarray(over)
-        truncated = (self._age >= self._horizon) & ~terminated
-        return np.asarray(seen), np.asarray(reward), terminated, truncated
 
 
 class TaskEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -105,7 +41,7 @@ class TaskEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         self._world = Worlds(robot, task, scenario, worlds=1, seed=seed, training=training)
         self.observation_space = observation_space(self._world.terms)
-        self.action_space = action_space(robot)
+        self.action_space = actuator_space(robot)
         self._fresh = True  # the first episode has not been handed out yet
 
     @property
@@ -178,7 +114,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarra
         self.num_envs = num_envs
         self._worlds = Worlds(robot, task, scenario, worlds=num_envs, seed=seed, training=training)
         self.single_observation_space = observation_space(self._worlds.terms)
-        self.single_action_space = action_space(robot)
+        self.single_action_space = actuator_space(robot)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._fresh = True  # the first episodes have not been handed out yet

@@ -11,11 +11,11 @@ import onnx
 import torch
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.observation import Observer
 from fulmar_core.policy_bundle import FORMAT, PASSPORT, Golden, Passport, action_of, write_bundle
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.seeds import HELD_OUT_SEED
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from training.agent_config import Activations, find_activations
@@ -115,7 +115,6 @@ class _Adapter:
     """What stands before and after a network of RoboRAN."""
 
     def __init__(self, robot: Robot, names: tuple[str, ...], layout: Layout) -> None:
-        """Prepare for a robot, the names of our terms, and what the network takes instead of them."""
         self.memory = len(robot.actuators.names)  # the last actions
         self._actuators, self._names, self._layout = robot.actuators, names, layout
 

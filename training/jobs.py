@@ -1,4 +1,4 @@
-"""One training run as a unit of work: learn, judge in MuJoCo, export."""
+"""One training run as a job: learn, evaluate in MuJoCo, export."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from fulmar_core.calibration import calibration_path
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
-from training.fallback_policy import Specialist, load_specialist, specialist_settings
+from training.fallback_policy import FallbackPolicy, fallback_settings, load_fallback
 from training.progress import ProgressFile, Watcher
 from training.run_folder import (
     CALIBRATION_FILE,
     CHECKPOINT_FILE,
+    FALLBACK_FOLDER,
     PROGRESS_FILE,
-    SPECIALIST_FOLDER,
     read_run_record,
     write_run_record,
 )
@@ -29,7 +29,7 @@ from training.train import begin_run, check_seed, train
 
 @dataclass(frozen=True)
 class Job:
-    """What to learn, and what to do with it."""
+    """Description of a training run and of what follows it."""
 
     name: str  # for tables
     robot: str
@@ -39,7 +39,7 @@ class Job:
     out: Path  # run folder; an unfinished run in it is resumed
     time_limit_s: float | None = None  # the settings' by default [s]
     updates: int | None = None
-    episodes: int = 0  # of the judgement in MuJoCo; 0: none
+    episodes: int = 0  # of the evaluation in MuJoCo; 0: none
     bundle: Path | None = None  # folder to export to
     wandb: str = ""  # project on Weights & Biases that curves go to; empty: none
     recipe: str = ""  # hash of what it is made from, for the record
@@ -49,7 +49,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a job ended."""
+    """Result of a job."""
 
     job: Job
     record: dict[str, Any] | None  # None if it failed
@@ -57,28 +57,23 @@ class Outcome:
 
     @property
     def success(self) -> float:
-        """Success rate in MuJoCo if it was judged there, else of the best check; -1 if it failed."""
+        """Success rate in MuJoCo if it was evaluated there, else of the best check; -1 if the job failed."""
         if self.record is None:
             return -1.0
-        judged = self.record.get("mujoco")
-        return float(judged["success_rate"] if judged else self.record["best"]["success_rate"])
+        mujoco = self.record.get("mujoco")
+        return float(mujoco["success_rate"] if mujoco else self.record["best"]["success_rate"])
 
 
 def run_job(job: Job, watcher: Watcher | None = None) -> dict[str, Any]:
-    """Do everything a job asks for that has not been done yet.
+    """Do what a job asks for and its folder does not have yet; returns the run's record.
 
-    Args:
-        job: The job.
-        watcher: Whom to tell; `progress.json` in its folder by default.
-
-    Returns:
-        The run's record.
+    Progress goes to `watcher`, by default to `progress.json` in the job's folder.
     """
     record = _finished(job) or learn(job, watcher or ProgressFile(job.out / PROGRESS_FILE))
     if job.episodes and record.get("mujoco", {}).get("episodes") != job.episodes:
-        from training.evaluator import judge_in_mujoco
+        from training.evaluator import evaluate_in_mujoco
 
-        judge_in_mujoco(job.out, episodes=job.episodes)
+        evaluate_in_mujoco(job.out, episodes=job.episodes)
     if job.bundle is not None:
         from training.export import export
 
@@ -87,30 +82,22 @@ def run_job(job: Job, watcher: Watcher | None = None) -> dict[str, Any]:
 
 
 def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
-    """Only the learning; goes on where its folder has a checkpoint.
-
-    Args:
-        job: The job.
-        watcher: Whom to tell.
-
-    Returns:
-        The run's record.
-    """
+    """Learn only, from the checkpoint of the job's folder if there is one; returns the run's record."""
     check_seed(job.seed)  # before anything is written
     job.out.mkdir(parents=True, exist_ok=True)
     calibration = calibration_path()
     if calibration is not None and calibration != (job.out / CALIBRATION_FILE).absolute():
         (job.out / CALIBRATION_FILE).write_bytes(calibration.read_bytes())
     robot, task = job.settings.learner_of(load_robot(job.robot)), load_task(job.task)
-    settings = specialist_settings(job.settings, robot, task)
+    settings = fallback_settings(job.settings, robot, task)
     if settings is None:
         record = _train(job, robot, task, watcher)
     else:
-        begin_run(robot, task, job.settings, **_asked_for(job))
+        begin_run(robot, task, job.settings, **_limits(job))
         first, rest = _shared(job, settings)
         learned = _finished(first) or _train(first, robot, task, watcher)
-        record = _train(rest, robot, task, watcher, load_specialist(first.out, robot, settings))
-        record["specialist"] = {
+        record = _train(rest, robot, task, watcher, load_fallback(first.out, robot, settings))
+        record["fallback_policy"] = {
             key: learned[key] for key in ("steps", "updates", "wall_s", "best", "settings")
         }
     if job.recipe:
@@ -120,31 +107,31 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
 
 
 def _train(
-    job: Job, robot: Robot, task: Task, watcher: Watcher, specialist: Specialist | None = None
+    job: Job, robot: Robot, task: Task, watcher: Watcher, fallback: FallbackPolicy | None = None
 ) -> dict[str, Any]:
     return train(
         robot,
         task,
         job.settings,
-        **_asked_for(job),
+        **_limits(job),
         resume=(job.out / CHECKPOINT_FILE).is_file(),
         command=job.command,
         git_revision=job.git_revision,
-        specialist=specialist,
+        fallback=fallback,
         watcher=watcher,
         curves=_curves(job),
     )
 
 
-def _asked_for(job: Job) -> dict[str, Any]:
+def _limits(job: Job) -> dict[str, Any]:
     return {"seed": job.seed, "out": job.out, "time_limit_s": job.time_limit_s, "updates": job.updates}
 
 
 def _shared(job: Job, settings: TrainingSettings) -> tuple[Job, Job]:
-    """The specialist's part of a job, and the rest."""
-    assert job.settings.specialist is not None
-    share = job.settings.specialist.share
-    first = replace(job, settings=settings, out=job.out / SPECIALIST_FOLDER, wandb="", recipe="")
+    """The part of a job that trains the fallback policy, and the rest."""
+    assert job.settings.fallback_policy is not None
+    share = job.settings.fallback_policy.share
+    first = replace(job, settings=settings, out=job.out / FALLBACK_FOLDER, wandb="", recipe="")
     if job.updates is not None:
         updates = max(1, round(share * job.updates))
         first, job = replace(first, updates=updates), replace(job, updates=max(1, job.updates - updates))
@@ -160,13 +147,13 @@ def _shared(job: Job, settings: TrainingSettings) -> tuple[Job, Job]:
 def _curves(job: Job) -> KVWriter | None:
     if not job.wandb:
         return None
-    from training.wandb_curves import WandbCurves
+    from training.progress import WandbCurves
 
     return WandbCurves(job.out, project=job.wandb, name=job.name, settings=asdict(job.settings))
 
 
 def _finished(job: Job) -> dict[str, Any] | None:
-    """The record of a run that needs no more learning; None if there is none."""
+    """The record of a finished run; None if it is unfinished or missing."""
     try:
         record = read_run_record(job.out)
     except ConfigError:
@@ -175,7 +162,7 @@ def _finished(job: Job) -> dict[str, Any] | None:
 
 
 def read_progress(job: Job) -> dict[str, Any]:
-    """How far a job is: `share`, `steps`, `rate` and `success`; empty before it begins."""
+    """Progress of a job: `share`, `steps`, `rate` and `success`; empty before it begins."""
     try:
         return dict(json.loads((job.out / PROGRESS_FILE).read_text(encoding="utf-8")))
     except (OSError, ValueError):

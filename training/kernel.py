@@ -5,16 +5,21 @@ from __future__ import annotations
 import os
 import shutil
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from operator import attrgetter
+from typing import Any
 
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
+from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.errors import ConfigError
+from fulmar_core.goal import Goal
 from fulmar_core.learning_step import observed_step
+from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.simulation import BatchSimulation
-from training.pytree import Parts, leaves, moving_of, parts_of, rebuilt
 
 # Parts beside those that move: the command, and what the actuators' effort costs.
 ASKED, EFFORT = "asked", "effort"
@@ -142,3 +147,54 @@ def _laid_as(tensor: torch.Tensor, like: torch.Tensor) -> torch.Tensor:
     if tensor.stride() == like.stride():
         return tensor
     return torch.empty_strided(like.shape, like.stride(), dtype=like.dtype, device=like.device).copy_(tensor)
+
+
+Moving = dict[str, Any]  # as of `Moves.moving`, with dictionaries in it
+Parts = dict[str, Any]  # the same without; what was in a dictionary has a name of two words
+
+_RECORDS = {PlanarState: COLUMNS, World: FIELDS}
+_LEAVES_OF = {Goal: Goal.arrays, **{kind: attrgetter(*names) for kind, names in _RECORDS.items()}}
+
+
+def parts_of(moving: Moving) -> Parts:
+    """Everything by itself."""
+    parts: Parts = {}
+    for name, value in moving.items():
+        if isinstance(value, dict):
+            parts |= {f"{name} {inner}": part for inner, part in value.items()}
+        else:
+            parts[name] = value
+    return parts
+
+
+def moving_of(parts: Parts) -> Moving:
+    """The inverse of `parts_of`."""
+    moving: Moving = {}
+    for name, part in parts.items():
+        outer, _, inner = name.partition(" ")
+        if inner:
+            moving.setdefault(outer, {})[inner] = part
+        else:
+            moving[name] = part
+    return moving
+
+
+def leaves(part: Any) -> tuple[Any, ...]:
+    """Arrays and numbers of a part; nothing has none."""
+    if type(part) in _LEAVES_OF:
+        found: tuple[Any, ...] = _LEAVES_OF[type(part)](part)
+        return found
+    if isinstance(part, (tuple, list)):
+        return tuple(chain.from_iterable(leaves(inner) for inner in part))
+    return () if part is None else (part,)
+
+
+def rebuilt(part: Any, new: Iterator[Any]) -> Any:
+    """A part of the same kind with other leaves, as many as `leaves` finds, in its order."""
+    if isinstance(part, Goal):
+        return part.mapped(lambda _: next(new))
+    if type(part) in _RECORDS:
+        return type(part)(*(next(new) for _ in _RECORDS[type(part)]))
+    if isinstance(part, (tuple, list)):
+        return type(part)(rebuilt(inner, new) for inner in part)
+    return None if part is None else next(new)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import torch
+from gymnasium import spaces
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -10,17 +14,16 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
-from training.behavior_cloning import Apprentice
+from training.behavior_cloning import BehaviorCloningPPO
 from training.fast_ppo import FastPPO
-from training.ppo import KlAdaptiveRate, KlFeedback, build_ppo
 from training.settings import Algorithm, OnPolicy, Ppo, RecurrentPpo, Td3
 
 
 def learner_class(settings: Algorithm) -> type[BaseAlgorithm]:
     """The class that settings build, which also loads what it has saved."""
     if isinstance(settings, Ppo):
-        if settings.lessons:
-            return Apprentice
+        if settings.cloning_updates:
+            return BehaviorCloningPPO
         return FastPPO if settings.fast else PPO
     if isinstance(settings, RecurrentPpo):
         return RecurrentPPO
@@ -73,3 +76,86 @@ def callbacks_of(learner: BaseAlgorithm) -> list[BaseCallback]:
     """Callbacks that a learner needs, whatever else it learns with."""
     rate = learner.learning_rate
     return [KlFeedback(rate)] if isinstance(rate, KlAdaptiveRate) else []
+
+
+class KlAdaptiveRate:
+    """Learning rate that falls when updates go too far and rises when they do too little."""
+
+    def __init__(self, settings: OnPolicy) -> None:
+        self.rate = settings.learning_rate
+        self._low, self._high = settings.learning_rate_range
+        self.target = settings.target_kl  # divergence of an update
+
+    def __call__(self, progress_remaining: float) -> float:
+        """Current rate; how much of the run remains does not matter."""
+        return self.rate
+
+    def update(self, kl: float) -> None:
+        """Move the rate by half again when the divergence is off by a factor of two."""
+        if kl > 2.0 * self.target:
+            self.rate = max(self.rate / 1.5, self._low)
+        elif kl < 0.5 * self.target:
+            self.rate = min(self.rate * 1.5, self._high)
+
+
+class KlFeedback(BaseCallback):
+    """Hands the divergence of the last update to the learning rate."""
+
+    def __init__(self, rate: KlAdaptiveRate) -> None:
+        super().__init__()
+        self._rate = rate
+
+    def _on_rollout_start(self) -> None:
+        kl = self.logger.name_to_value.get("train/approx_kl")
+        if kl is not None:
+            self._rate.update(float(kl))
+
+    def _on_step(self) -> bool:
+        return True
+
+
+def build_ppo(
+    settings: Ppo | RecurrentPpo, env: VecEnv, *, seed: int, tensorboard: str | None = None
+) -> PPO | RecurrentPPO:
+    """PPO over an environment; it must learn with `KlFeedback(learner.learning_rate)`.
+
+    Args:
+        settings: Hyper-parameters.
+        env: Environment, usually normalised.
+        seed: Seed of weights and action sampling.
+        tensorboard: Folder for TensorBoard, or None.
+
+    Returns:
+        The learner.
+    """
+    sizes = list(settings.hidden)
+    policy: dict[str, Any] = {"net_arch": {"pi": sizes, "vf": sizes}, "activation_fn": torch.nn.Tanh}
+    if isinstance(env.action_space, spaces.Box):
+        policy["log_std_init"] = settings.log_std
+    kind: type[PPO | RecurrentPPO] = PPO
+    more: dict[str, Any] = {}
+    if isinstance(settings, RecurrentPpo):
+        kind = RecurrentPPO
+        policy["lstm_hidden_size"] = settings.memory
+    elif settings.fast:
+        kind, more = FastPPO, {"precision": settings.precision}
+        if settings.cloning_updates:
+            kind, more = BehaviorCloningPPO, more | {"cloning_updates": settings.cloning_updates}
+    return kind(
+        "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy",
+        env,
+        learning_rate=KlAdaptiveRate(settings),
+        n_steps=settings.steps,
+        batch_size=settings.minibatch,
+        n_epochs=settings.epochs,
+        gamma=settings.gamma,
+        gae_lambda=settings.gae_lambda,
+        clip_range=settings.clip_range,
+        max_grad_norm=settings.max_grad_norm,
+        ent_coef=settings.entropy,
+        policy_kwargs=policy,
+        tensorboard_log=tensorboard,
+        seed=seed,
+        device="cpu",
+        **more,
+    )

@@ -1,4 +1,4 @@
-"""The deployed half of a learner: normalisation and policy network, without anything that only training needs."""
+"""The deployed network of a learner: normalisation and policy, without what only training needs."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.symmetry import Mirror
 from fulmar_core.tasks import Task
-from training.incremental_actions import KINDS, shares_asked
+from training.incremental_actions import KINDS, incremental_shares
 
-Decision = Literal["threshold", "clamp", "squash", "choose", "order"]
+Decision = Literal["threshold", "clamp", "squash", "choose", "increment"]
 
 
 @dataclass(frozen=True)
 class NetworkPlan:
-    """Everything about a deployed network but its numbers."""
+    """Structure of a deployed network: everything but its numbers."""
 
     inputs: int  # observation terms
     hidden: tuple[int, ...]  # sizes of the hidden layers
-    outputs: int  # of the last layer: actuators, the terms of a wrench, or chances of each actuator's orders
+    outputs: int  # of the last layer: actuators, the terms of a wrench, or logits of each actuator's actions
     activation: Literal["tanh", "relu"]
     decision: Decision  # how raw outputs become shares of full command
     command_scale: tuple[float, ...]  # full command of each actuator, in its own unit
@@ -41,14 +41,14 @@ class NetworkPlan:
     combinations: int = 0  # of valves, to choose from for a wrench
     disturbances: bool = False  # its last inputs are `disturbance_terms`
     knows_dead: bool = False  # its last inputs are 1 for each valve, or 0 where it is dead
-    side: int | None = None  # where this input is negative, it sees and answers the mirror image
-    specialist: NetworkPlan | None = None  # of the network that takes over where too many valves are dead
+    side: int | None = None  # where this input is negative, input and output are mirrored
+    fallback: NetworkPlan | None = None  # of the network that takes over where too many valves are dead
     losses: int = 0  # sets of dead valves of which one is enough for that
 
     @property
     def answers(self) -> int:
-        """What becomes of the outputs: shares of full command, or the terms of a wrench."""
-        return self.outputs // KINDS if self.decision == "order" else self.outputs
+        """Number of shares of full command, or of terms of a wrench, that the outputs become."""
+        return self.outputs // KINDS if self.decision == "increment" else self.outputs
 
     @property
     def on_off(self) -> bool:
@@ -65,13 +65,12 @@ class DeployedNetwork(nn.Module):
     choice_commands: torch.Tensor
     choice_slope: torch.Tensor
     choice_offset: torch.Tensor
-    choice_gas: torch.Tensor
+    choice_cost: torch.Tensor
     mirror_seen: torch.Tensor
     mirror_done: torch.Tensor
     losses: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
-        """Build an untrained network."""
         super().__init__()
         self.plan = plan
         self.register_buffer("mean", torch.zeros(plan.inputs))
@@ -82,13 +81,13 @@ class DeployedNetwork(nn.Module):
             self.register_buffer("choice_commands", torch.zeros(count, valves))
             self.register_buffer("choice_slope", torch.zeros(WRENCH, count))
             self.register_buffer("choice_offset", torch.zeros(count))
-            self.register_buffer("choice_gas", torch.zeros(count))
+            self.register_buffer("choice_cost", torch.zeros(count))
         if plan.side is not None:
             self.register_buffer("mirror_seen", torch.eye(plan.inputs))
             self.register_buffer("mirror_done", torch.eye(plan.answers))
         if plan.losses:
             self.register_buffer("losses", torch.ones(plan.losses, valves))
-        self.specialist = DeployedNetwork(plan.specialist) if plan.specialist else None
+        self.fallback = DeployedNetwork(plan.fallback) if plan.fallback else None
         units = plan.memory // 2
         self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
         self.from_memory = nn.Linear(units, 4 * units) if units else None
@@ -116,11 +115,11 @@ class DeployedNetwork(nn.Module):
         seen = self._mirrored(observation, observation, "seen")
         features = torch.clamp((seen - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
         if memory is None:
-            raw = self._mirrored(self._ordered(self.layers(features), seen), observation, "done")
-            raw = self._handed_over(self._appraised(raw, observation), observation)
+            raw = self._mirrored(self._incremental(self.layers(features), seen), observation, "done")
+            raw = self._handed_over(self._valve_margins(raw, observation), observation)
             return self._decide(raw), raw
         memory = self._remember(features, memory)
-        raw = self._appraised(self.layers(memory[:, : self.plan.memory // 2]), observation)
+        raw = self._valve_margins(self.layers(memory[:, : self.plan.memory // 2]), observation)
         return self._decide(raw), raw, memory
 
     def _remember(self, features: torch.Tensor, memory: torch.Tensor) -> torch.Tensor:
@@ -136,7 +135,7 @@ class DeployedNetwork(nn.Module):
     def _mirrored(
         self, rows: torch.Tensor, observation: torch.Tensor, kind: Literal["seen", "done"]
     ) -> torch.Tensor:
-        """Rows of what is seen or done, in the mirror image where the goal asks for it."""
+        """Rows of observations or actions, mirrored where the goal asks for it."""
         if self.plan.side is None:
             return rows
         matrix = self.mirror_seen if kind == "seen" else self.mirror_done
@@ -144,44 +143,44 @@ class DeployedNetwork(nn.Module):
         return torch.where(mirrored, rows @ matrix, rows)
 
     def take_mirror(self, mirror: Mirror) -> None:
-        """Take over what the mirror image is."""
+        """Copy the mirror matrices."""
         self.mirror_seen.copy_(torch.as_tensor(mirror.seen))
         self.mirror_done.copy_(torch.as_tensor(mirror.done))
 
     def take_choice(self, choice: WrenchChoice) -> None:
-        """Take over the table that valves are chosen from."""
+        """Copy the table that valves are chosen from."""
         self.choice_commands.copy_(torch.as_tensor(choice.commands))
         self.choice_slope.copy_(torch.as_tensor(choice.slope))
         self.choice_offset.copy_(torch.as_tensor(choice.offset))
-        self.choice_gas.copy_(torch.as_tensor(choice.valve_costs))
+        self.choice_cost.copy_(torch.as_tensor(choice.valve_costs))
 
-    def take_specialist(self, specialist: DeployedNetwork, losses: np.ndarray) -> None:
-        """Take over who acts where all valves of a row of `losses` are dead (1), shape (k, valves)."""
-        assert self.specialist is not None
-        self.specialist.load_state_dict(specialist.state_dict())
+    def take_fallback(self, fallback: DeployedNetwork, losses: np.ndarray) -> None:
+        """Copy the policy that acts where all valves of a row of `losses` are dead (1), shape (k, valves)."""
+        assert self.fallback is not None
+        self.fallback.load_state_dict(fallback.state_dict())
         self.losses.copy_(torch.as_tensor(losses))
 
     def _handed_over(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
-        """The specialist's outputs where it takes over."""
-        if self.specialist is None:
+        """Outputs, of the fallback policy where it takes over."""
+        if self.fallback is None:
             return raw
         dead = 1.0 - observation[:, -self.losses.shape[1] :]
         missing = self.losses.sum(dim=1) - dead @ self.losses.t()
-        return torch.where(missing.amin(dim=1, keepdim=True) < 0.5, self.specialist(observation)[1], raw)
+        return torch.where(missing.amin(dim=1, keepdim=True) < 0.5, self.fallback(observation)[1], raw)
 
-    def _ordered(self, raw: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
-        """Shares of full command that the likeliest orders ask for, where the last layer chooses orders."""
-        if self.plan.decision != "order":
+    def _incremental(self, raw: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
+        """Shares of full command of the likeliest incremental actions; other outputs as they are."""
+        if self.plan.decision != "increment":
             return raw
-        orders = raw.unflatten(1, (self.plan.answers, KINDS)).argmax(2).to(raw.dtype) - 1.0
-        return torch.as_tensor(shares_asked(orders, seen[:, -self.plan.answers :]))
+        actions = raw.unflatten(1, (self.plan.answers, KINDS)).argmax(2).to(raw.dtype) - 1.0
+        return torch.as_tensor(incremental_shares(actions, seen[:, -self.plan.answers :]))
 
-    def _appraised(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
-        """How much opening each valve is worth, where the last layer asks for a wrench; else what it put out."""
+    def _valve_margins(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
+        """Margin for opening each valve, where the last layer gives a wrench; other outputs as they are."""
         if self.plan.decision != "choose":
             return raw
         choice = WrenchChoice(
-            self.choice_commands, self.choice_slope, self.choice_offset, self.choice_gas, torch.ones(WRENCH)
+            self.choice_commands, self.choice_slope, self.choice_offset, self.choice_cost, torch.ones(WRENCH)
         )
         valves = len(self.plan.command_scale)
         dead = 1.0 - observation[:, -valves:] if self.plan.knows_dead else None
@@ -237,14 +236,14 @@ def load_network(path: Path) -> DeployedNetwork:
         AttributeError,
     ) as error:
         raise ConfigError(
-            f"{path}: holds no weights that `fulmar train` wrote ({type(error).__name__})."
+            f"{path}: holds no weights that this version of `fulmar train` wrote ({type(error).__name__})."
         ) from error
     return network
 
 
 def _plan_of(plain: dict[str, Any]) -> NetworkPlan:
-    within = plain.get("specialist")
-    return NetworkPlan(**plain | {"specialist": _plan_of(within) if within else None})
+    within = plain.get("fallback")
+    return NetworkPlan(**plain | {"fallback": _plan_of(within) if within else None})
 
 
 class NetworkController:
@@ -261,7 +260,7 @@ class NetworkController:
         self.estimator = ESTIMATOR if network.plan.disturbances else None
 
     def reset(self) -> None:
-        """Forget what was seen."""
+        """Clear the memory."""
         self._memory = None
 
     def act(self, inputs: Inputs) -> np.ndarray:
@@ -273,5 +272,5 @@ class NetworkController:
         return np.asarray(command)
 
     def metadata(self) -> dict[str, Any]:
-        """Its kind; an unfinished network has no identity worth recording."""
+        """Its kind; an unfinished network has no identity to record."""
         return {"controller": self.name}

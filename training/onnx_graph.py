@@ -20,7 +20,6 @@ class Tensor:
     """A named value of a graph; arithmetic adds nodes."""
 
     def __init__(self, graph: Graph, name: str) -> None:
-        """Name a value."""
         self.graph, self.name = graph, name
 
     def __add__(self, other: Tensor) -> Tensor:
@@ -47,7 +46,6 @@ class Graph:
     """Nodes in the order of their writing, with their constants."""
 
     def __init__(self) -> None:
-        """Begin empty."""
         self.nodes: list[onnx.NodeProto] = []
         self.constants: list[onnx.TensorProto] = []
         self._inputs: list[onnx.ValueInfoProto] = []

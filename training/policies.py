@@ -19,7 +19,7 @@ from fulmar_core.policy_bundle import FORMAT, read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.executors import Executor, Watch
-from training.fallback_policy import specialist_settings
+from training.fallback_policy import fallback_settings
 from training.jobs import Job, Outcome
 from training.settings import TrainingSettings, load_training_settings
 
@@ -51,7 +51,6 @@ class PolicyTable:
     policies: tuple[ShippedPolicy, ...]
 
     def __post_init__(self) -> None:
-        """Refuse two lines for one bundle."""
         names = [policy.name for policy in self.policies]
         if len(set(names)) != len(names):
             raise ValueError("'policies' has two lines for one robot and task.")
@@ -82,8 +81,8 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
         "policy": asdict(policy) | {"success": None},
         "format": FORMAT,
     }
-    if own := specialist_settings(settings, load_robot(policy.robot), load_task(policy.task)):
-        ingredients["specialist"] = [_chosen(own), _chosen(load_scenario(own.scenario))]
+    if own := fallback_settings(settings, load_robot(policy.robot), load_task(policy.task)):
+        ingredients["fallback_policy"] = [_chosen(own), _chosen(load_scenario(own.scenario))]
     return hashlib.sha256(json.dumps(ingredients, sort_keys=True, default=str).encode()).hexdigest()[:16]
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from types import TracebackType
+from typing import Any, Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from stable_baselines3.common.logger import KVWriter
 
 
 class Watcher(Protocol):
@@ -20,7 +23,7 @@ class Watcher(Protocol):
     def advance(self, share: float, elapsed_s: float, steps: int) -> None:
         """An update is done: share of the run that is over [-], its wall-clock [s], control steps so far."""
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """A check is done: wall-clock [s] and success rate [-]."""
 
     def end(self) -> None:
@@ -31,7 +34,6 @@ class Speed:
     """Control steps per second, lately."""
 
     def __init__(self) -> None:
-        """Begin without knowing."""
         self._last: tuple[float, int] | None = None
         self.rate = 0.0
 
@@ -76,7 +78,7 @@ class LearningBar:
         rate = self._speed.update(elapsed_s, steps)
         self._bar.update(self._task, completed=share, steps=steps, rate=rate)
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """Show the latest check; also as a line where there is no terminal."""
         self._bar.update(self._task, verdict=f"success {success:.3f}")
         if not self._console.is_terminal:
@@ -96,7 +98,6 @@ class ProgressFile:
     EVERY_S = 0.5
 
     def __init__(self, path: Path) -> None:
-        """Write to this file."""
         self._path, self._speed, self._next = path, Speed(), 0.0
         self._told: dict[str, float | int | None] = {"share": 0.0, "steps": 0, "rate": 0.0, "success": None}
 
@@ -111,7 +112,7 @@ class ProgressFile:
         if time.monotonic() >= self._next:
             self._write()
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """Note the latest check."""
         self._told["success"] = success
         self._write()
@@ -125,3 +126,77 @@ class ProgressFile:
         new = self._path.with_suffix(".new")
         new.write_text(json.dumps(self._told), encoding="utf-8")
         new.replace(self._path)
+
+
+class JobBars:
+    """Is a `Watch` while its context is open."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._console = Console(stderr=True, highlight=False)
+        self._bars = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            TextColumn("{task.fields[text]}"),
+            TimeRemainingColumn(elapsed_when_finished=True),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
+        self._names = names
+        self._tasks = [
+            self._bars.add_task(name, total=1.0, text="waiting", start=False) for name in self._names
+        ]
+
+    def __enter__(self) -> JobBars:
+        self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bars.stop()
+
+    def __call__(self, number: int, state: str, progress: dict[str, Any]) -> None:
+        """Show the state of one job: its number, `waiting`, `learning`, `done` or `failed`, and its newest figures."""
+        task = self._tasks[number]
+        success = progress.get("success")
+        known = "" if success is None else f"  success {success:.3f}"
+        share = progress.get("share", 0.0)
+        running = "judging" if share >= 1.0 else f"{progress.get('rate', 0.0):,.0f} steps/s"
+        text = (running if state == "running" else state) + known
+        if state == "running":
+            self._bars.start_task(task)
+            self._bars.update(task, completed=share, text=text)
+            return
+        self._bars.update(task, completed=1.0, text=text)
+        self._bars.stop_task(task)
+        if not self._console.is_terminal:
+            self._console.print(f"{self._names[number]}: {text}")
+
+
+class WandbCurves(KVWriter):
+    """Sends every number that is logged; WANDB_MODE=offline keeps them in the run folder."""
+
+    def __init__(self, folder: Path, *, project: str, name: str, settings: dict[str, Any]) -> None:
+        """Begin a run there.
+
+        Args:
+            folder: Run folder, where wandb keeps its files.
+            project: Name of the project.
+            name: Name of the run.
+            settings: What it is made with.
+        """
+        import wandb
+
+        folder.mkdir(parents=True, exist_ok=True)
+        self._run = wandb.init(project=project, name=name, dir=str(folder), config=settings)
+
+    def write(
+        self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0
+    ) -> None:
+        """Send what was logged since the last time."""
+        numbers = {key: value for key, value in key_values.items() if isinstance(value, int | float)}
+        self._run.log(numbers, step=step)
+
+    def close(self) -> None:
+        """Send the rest, and end the run there."""
+        self._run.finish()

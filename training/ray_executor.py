@@ -98,7 +98,7 @@ class _BoardWatcher:
             self._next = time.monotonic() + self.EVERY_S
             self._board.write.remote(self._number, self._told)
 
-    def verdict(self, elapsed_s: float, success: float) -> None:
+    def evaluated(self, elapsed_s: float, success: float) -> None:
         """Note the latest check."""
         self._told["success"] = success
 

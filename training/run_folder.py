@@ -7,13 +7,16 @@ network.pt      the best weights, as a robot would run them
 checkpoint.pkl  everything a run needs to go on exactly where it was
 tensorboard/    curves
 calibration.yaml what was measured on the robot it learns for, where that was given
-specialist/     the run folder of the network that takes over from this one, where it has such
+fallback/     the run folder of the network that takes over from this one, where it has such
 progress.json   how far it is, for whoever watches from outside
 """
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +31,7 @@ CHECKPOINT_FILE = "checkpoint.pkl"
 TENSORBOARD_FOLDER = "tensorboard"
 CALIBRATION_FILE = "calibration.yaml"
 PROGRESS_FILE = "progress.json"
-SPECIALIST_FOLDER = "specialist"
+FALLBACK_FOLDER = "fallback_policy"
 
 _NEEDED = (
     "robot",
@@ -89,3 +92,31 @@ def write_start(run: Path, start: dict[str, Any]) -> None:
 def write_run_record(run: Path, record: dict[str, Any]) -> None:
     """Write what `read_run_record` reads."""
     write_whole({run / RUN_FILE: (json.dumps(record, indent=2) + "\n").encode()})
+
+
+LOCK_FILE = "learning.lock"
+
+
+@contextlib.contextmanager
+def learning_in(run: Path) -> Iterator[None]:
+    """Keep others out of a run folder until the context ends; the lock goes with the process, however that ends.
+
+    Args:
+        run: Made if need be.
+
+    Raises:
+        ConfigError: Somebody else learns there.
+    """
+    run.mkdir(parents=True, exist_ok=True)
+    path = run / LOCK_FILE
+    with path.open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ConfigError(
+                f"{run}: another `fulmar train` is learning there. Give --out another folder."
+            ) from None
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)

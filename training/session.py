@@ -1,10 +1,14 @@
-"""What happens between two updates of a run: checks, checkpoints, refinement, and its end."""
+"""A training run between two updates: checks on held-out episodes, checkpoints, annealing, and its end."""
 
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
-from collections.abc import Callable
+import types
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,11 +17,11 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from training.checkpoint import save_checkpoint
-from training.checks import Check, Judge
 from training.deploy import deployed_network
-from training.fallback_policy import Specialist
+from training.evaluator import Check, Evaluator
+from training.fallback_policy import FallbackPolicy
+from training.learners import KlAdaptiveRate
 from training.network import DeployedNetwork
-from training.ppo import KlAdaptiveRate
 from training.progress import Watcher
 from training.settings import TrainingSettings
 from training.vec_env import BatchVecEnv
@@ -25,7 +29,7 @@ from training.vec_env import BatchVecEnv
 
 @dataclass(frozen=True)
 class Limits:
-    """When a run ends; whichever comes first."""
+    """Limits of a run; the first one reached ends it."""
 
     time_s: float | None = None  # wall-clock [s]
     updates: int | None = None
@@ -41,8 +45,8 @@ class Limits:
 
 
 @dataclass
-class Story:
-    """What a run remembers of itself, also across an interruption."""
+class RunHistory:
+    """History of a run, also across an interruption."""
 
     elapsed_s: float = 0.0  # wall-clock that earlier parts took [s]
     updates: int = 0
@@ -50,23 +54,23 @@ class Story:
     best: tuple[Check, DeployedNetwork] | None = None
 
 
-class RunIsOver(Exception):  # noqa: N818 - it is the planned end, no error
+class RunIsOver(Exception):  # noqa: N818 - it is the planned end, not an error
     """Ends learning between two updates."""
 
 
 class Session(BaseCallback):
-    """Looks after a run between two updates."""
+    """Callback that checks, saves, anneals and ends a run between two updates."""
 
     def __init__(
         self,
-        story: Story,
+        history: RunHistory,
         *,
-        judge: Judge,
+        evaluator: Evaluator,
         settings: TrainingSettings,
         limits: Limits,
         worlds: BatchVecEnv,
         command_scale: np.ndarray,
-        specialist: Specialist | None,
+        fallback: FallbackPolicy | None,
         watcher: Watcher,
         checkpoint: Path,
         asked_to_stop: Callable[[], bool],
@@ -74,29 +78,29 @@ class Session(BaseCallback):
         """Begin, or go on.
 
         Args:
-            story: The run so far.
-            judge: Says how good a network is.
-            settings: How to learn.
-            limits: When to end.
-            worlds: Where it learns.
+            history: The run so far.
+            evaluator: Evaluates a network on held-out episodes.
+            settings: Of the run.
+            limits: Of the run.
+            worlds: That it learns in.
             command_scale: Full command of each actuator, in its own unit.
-            specialist: Who takes over where too many valves are dead.
-            watcher: Whom to tell.
+            fallback: Policy that takes over when the robot is uncontrollable.
+            watcher: Receives the progress.
             checkpoint: File to resume from later.
-            asked_to_stop: Whether a person wants it to end.
+            asked_to_stop: Whether the user asked for the end.
         """
         super().__init__()
-        self.story, self._judge, self._settings, self._limits = story, judge, settings, limits
+        self.history, self._evaluator, self._settings, self._limits = history, evaluator, settings, limits
         self._worlds, self._command_scale, self._watcher = worlds, command_scale, watcher
-        self._specialist = specialist
+        self._fallback = fallback
         self._checkpoint, self._asked_to_stop = checkpoint, asked_to_stop
-        self._before_s = story.elapsed_s
+        self._before_s = history.elapsed_s
         self._began = time.monotonic()
-        # Of the run, not of the clock: which network is the best one must not hang on how fast the machine is.
+        # A share of the run, not a time: which network is best must not depend on the speed of the machine.
         self._check_every = settings.evaluate_every_s / (limits.time_s or settings.time_limit_s)
-        self._plan_check(limits.progress(story.elapsed_s, story.updates))
+        self._plan_check(limits.progress(history.elapsed_s, history.updates))
         self._next_checkpoint = self.elapsed_s + settings.checkpoint_every_s
-        self._first = True  # what comes first is no update yet
+        self._first = True  # no update is done before the first rollout
         self._speeds: list[float] = []  # of each update [steps/s]
         self._since = (time.monotonic(), 0)
 
@@ -132,13 +136,13 @@ class Session(BaseCallback):
         self._since = time.monotonic(), self._steps
 
     def _between_updates(self) -> None:
-        story = self.story
-        story.updates += not self._first
+        history = self.history
+        history.updates += not self._first
         self._first = False
-        story.elapsed_s = self.elapsed_s
-        progress = self._limits.progress(story.elapsed_s, story.updates)
-        self._watcher.advance(progress, story.elapsed_s, self._steps)
-        if self._settings.refinement:
+        history.elapsed_s = self.elapsed_s
+        progress = self._limits.progress(history.elapsed_s, history.updates)
+        self._watcher.advance(progress, history.elapsed_s, self._steps)
+        if self._settings.annealing:
             self._worlds.set_effort(self._settings.effort(progress))
             self.model.ent_coef = self._settings.entropy(progress)  # type: ignore[attr-defined]
             rate = self.model.learning_rate
@@ -154,7 +158,7 @@ class Session(BaseCallback):
             self.save()
             self._next_checkpoint = self.elapsed_s + self._settings.checkpoint_every_s
         if stopped and not due:
-            self._check()  # of what is kept now; after the checkpoint, as who goes on from there is not to know of it
+            self._check()  # after the checkpoint: a resumed run must be as if it had not been interrupted
         if over or stopped:
             raise RunIsOver
 
@@ -163,30 +167,50 @@ class Session(BaseCallback):
         self._next_check = (math.floor(progress / self._check_every + 1e-9) + 1) * self._check_every
 
     def _check(self) -> None:
-        story = self.story
+        history = self.history
         normaliser = self.model.get_vec_normalize_env()
         assert normaliser is not None
-        network = deployed_network(self.model, normaliser, self._command_scale, self._specialist)
-        success, score = self._judge(network)
-        check = Check(story.elapsed_s, self._steps, success, score)
+        network = deployed_network(self.model, normaliser, self._command_scale, self._fallback)
+        success, score = self._evaluator(network)
+        check = Check(history.elapsed_s, self._steps, success, score)
         # A refined run is meant to end otherwise than it was in between, so its last network is the one to keep.
-        if story.best is None or score > story.best[0].score or self._settings.refinement:
-            story.best = check, network  # at once, since a person may interrupt anywhere
-        story.checks.append(check)
-        self._watcher.verdict(story.elapsed_s, success)
+        if history.best is None or score > history.best[0].score or self._settings.annealing:
+            history.best = check, network  # at once: an interrupt may come anywhere
+        history.checks.append(check)
+        self._watcher.evaluated(history.elapsed_s, success)
         self.logger.record("held_out/success_rate", success)
         self.logger.record("held_out/score", score)
 
     def _learned(self) -> bool:
-        """Whether the last checks in a row were all good enough."""
+        """Whether the last checks all reached the success rate."""
         enough = self._settings.stop_at_success
         if enough is None:
             return False
-        last = self.story.checks[-enough.checks :]
+        last = self.history.checks[-enough.checks :]
         return len(last) == enough.checks and all(check.success_rate >= enough.rate for check in last)
 
     def save(self) -> None:
         """Write a checkpoint."""
-        self.story.elapsed_s = self.elapsed_s
-        more: dict[str, Any] = {"story": self.story}
+        self.history.elapsed_s = self.elapsed_s
+        more: dict[str, Any] = {"history": self.history}
         save_checkpoint(self._checkpoint, self.model, more)
+
+
+@contextmanager
+def polite_interrupt() -> Iterator[threading.Event]:
+    """Turn the first Ctrl-C into a request to stop; the second one interrupts at once."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked
+        return
+
+    def ask(number: int, frame: types.FrameType | None) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)

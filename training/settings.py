@@ -1,8 +1,9 @@
-"""What a training run is made with, as read from `configs/training/<robot>_<task>.yaml` or `<family>.yaml`."""
+"""Settings of a training run, as read from `configs/training/<robot>_<task>.yaml` or `<family>.yaml`."""
 
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -17,11 +18,25 @@ from fulmar_core.symmetry import Symmetry
 from fulmar_core.tasks import Task
 
 Precision = Literal["float32", "bfloat16"]
+ActionSpace = Literal["actuators", "wrench"]
+
+# Keys of earlier versions, and what to write today.
+RENAMED = {
+    "lessons": "'cloning_updates'",
+    "told": "'disturbance_inputs'",
+    "wrench": "'action_space: wrench'",
+    "gas": "'valve_cost'",
+    "orders": "'incremental_actions'",
+    "refinement": "'annealing'",
+    "updates": "'target_kl' in 'annealing'",
+    "specialist": "'fallback_policy'",
+    "training": "'settings' in 'fallback_policy'",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class OnPolicy:
-    """Hyper-parameters of PPO (Schulman et al., arXiv 1707.06347), in its own terms."""
+    """Hyper-parameters of PPO (Schulman et al., arXiv 1707.06347)."""
 
     steps: int  # actions of each world between updates
     minibatch: int
@@ -38,7 +53,6 @@ class OnPolicy:
     log_std: float = 0.0  # logarithm of the first standard deviation of continuous actions
 
     def __post_init__(self) -> None:
-        """Refuse what no learner can do."""
         at_least_1(steps=self.steps, minibatch=self.minibatch, epochs=self.epochs, hidden=self.hidden)
         low, high = self.learning_rate_range
         if not 0.0 < low <= high:
@@ -58,9 +72,9 @@ class Ppo(OnPolicy):
 
     kind: Literal["ppo"] = "ppo"
     fast: bool = True  # our faster computation of it instead of the one of Stable-Baselines3
-    lessons: int = 0  # updates in which it first imitates the classical law of the robot's family
+    cloning_updates: int = 0  # first updates, which clone the classical law of the robot's family
     # Of hidden layers while they learn: bfloat16 takes half the time where the processor multiplies it (avx512_bf16 or
-    # amx_bf16 in /proc/cpuinfo), and more elsewhere. No processor chooses by itself: a seed asks for one policy.
+    # amx_bf16 in /proc/cpuinfo), and more elsewhere. It is never chosen by the processor: one seed, one policy.
     precision: Precision = "float32"
 
 
@@ -72,14 +86,13 @@ class RecurrentPpo(OnPolicy):
     memory: int  # units of the LSTM
 
     def __post_init__(self) -> None:
-        """The same, and memories of nothing."""
         super().__post_init__()
         at_least_1(memory=self.memory)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OffPolicy:
-    """What SAC and TD3 have in common; every step of the batch of worlds is followed by `gradient_steps`."""
+    """Hyper-parameters that SAC and TD3 share; `gradient_steps` follow every step of the batch of worlds."""
 
     learning_rate: float
     buffer: int  # transitions remembered
@@ -91,7 +104,6 @@ class OffPolicy:
     hidden: tuple[int, ...]  # sizes of the hidden layers
 
     def __post_init__(self) -> None:
-        """Refuse what no learner can do."""
         at_least_1(
             buffer=self.buffer,
             minibatch=self.minibatch,
@@ -123,61 +135,57 @@ Algorithm = Ppo | RecurrentPpo | Sac | Td3
 
 
 @dataclass(frozen=True)
-class Refinement:
-    """Economy and precision, later in a run: dearer commands, less exploring and smaller updates, all linearly."""
+class Annealing:
+    """Linear schedule of effort, entropy and update size, for economy and precision late in a run."""
 
-    begin: float  # share of the run after which it begins [-]
-    end: float  # same of where it is whole [-]
-    effort: float  # factor on what using the actuators costs, in the end [-]
-    entropy: float  # weight of the entropy in the loss, in the end; less than 0 makes a policy sure of itself
-    updates: float = 1.0  # factor on `target_kl`, in the end
+    begin: float  # share of the run at which it begins [-]
+    end: float  # share of the run at which it ends [-]
+    effort: float  # final factor on the cost of using the actuators [-]
+    entropy: float  # final weight of the entropy in the loss; below 0 it makes the policy deterministic
+    target_kl: float = 1.0  # final factor on the algorithm's `target_kl`
 
     def __post_init__(self) -> None:
-        """Refuse shares that are none."""
-        if not 0.0 <= self.begin < self.end <= 1.0 or min(self.effort, self.updates) <= 0.0:
+        if not 0.0 <= self.begin < self.end <= 1.0 or min(self.effort, self.target_kl) <= 0.0:
             raise ValueError(
-                "'begin' must lie in [0, 1), 'end' beyond it in (0, 1], 'effort' and 'updates' be greater than 0."
+                "'begin' must lie in [0, 1), 'end' beyond it in (0, 1], 'effort' and 'target_kl' be greater than 0."
             )
 
     def share(self, progress: float) -> float:
-        """How much of it holds, where `progress` is the share of the run that is over [-]."""
+        """Position in the schedule [-], where `progress` is the share of the run that is over [-]."""
         return min(1.0, max(0.0, (progress - self.begin) / (self.end - self.begin)))
 
 
 @dataclass(frozen=True)
-class Orders:
-    """Incremental actions (`training.incremental_actions`): astern, hold, or ahead, for actuators that slew."""
+class IncrementalActions:
+    """Actions astern, hold or ahead for actuators with slew (`training.incremental_actions`)."""
 
-    hold: int  # control steps that an order stands for while it learns; deployed, orders come at every step
+    hold: int  # control steps for which an action is held in training; a deployed policy acts at every step
 
     def __post_init__(self) -> None:
-        """Refuse to hold nothing."""
         if self.hold < 1:
             raise ValueError("'hold' must be at least 1.")
 
 
 @dataclass(frozen=True)
-class SpecialistPlan:
-    """A second network, which takes over where dead valves leave no pose to hold (`training.fallback_policy`)."""
+class FallbackPlan:
+    """A second policy for robots that dead valves make uncontrollable (`training.fallback_policy`)."""
 
-    training: str  # its own settings: a file of `configs/training`
-    share: float  # of the run that it learns for, before the other begins [-]
+    settings: str  # its own settings: a file of `configs/training`
+    share: float  # of the run, for which it learns before the main policy begins [-]
 
     def __post_init__(self) -> None:
-        """Refuse to leave nothing to one of them."""
         if not 0.0 < self.share < 1.0:
             raise ValueError("'share' must lie between 0 and 1.")
 
 
 @dataclass(frozen=True)
 class StopAtSuccess:
-    """Ends a run early, once it has learned its task."""
+    """Early end of a run that has learned its task."""
 
     rate: float  # success rate that is enough [-]
     checks: int = 2  # in a row
 
     def __post_init__(self) -> None:
-        """Refuse what would always or never stop."""
         if not 0.0 < self.rate <= 1.0 or self.checks < 1:
             raise ValueError("'rate' must lie in (0, 1] and 'checks' be at least 1.")
 
@@ -191,56 +199,61 @@ class TrainingSettings:
     worlds: int  # simulated in one batch
     reward_scale: float
     time_limit_s: float  # wall-clock of the learning itself [s]
-    # Between checks on held-out episodes, in runs of `time_limit_s`; in runs of so many updates the same share of the
-    # run, so that the same seed keeps the same network on any machine.
+    # Between evaluations on held-out episodes, in runs of `time_limit_s`. In runs of a number of updates it is the same
+    # share of the run, so that a seed gives the same best network on any machine.
     evaluate_every_s: float  # [s]
     checkpoint_every_s: float = 30.0  # wall-clock between checkpoints to resume from [s]
-    refinement: Refinement | None = None  # of ppo and recurrent_ppo
+    annealing: Annealing | None = None  # of ppo and recurrent_ppo
     stop_at_success: StopAtSuccess | None = None
-    specialist: SpecialistPlan | None = None
-    told: bool = False  # whether the network is told pushes and dead valves, of robots with on/off valves
-    wrench: bool = (
-        False  # whether it asks for a wrench that on/off valves are then chosen for, not for single valves
-    )
-    # Goals on the right are shown, and answered, as on the left; or, by `ends`, those behind as those ahead.
+    fallback_policy: FallbackPlan | None = None
+    disturbance_inputs: bool = False  # pushes and dead valves are network inputs; for on/off valves
+    action_space: ActionSpace = "actuators"  # or a wrench, for which on/off valves are then chosen
+    # The policy sees goals on the right mirrored to the left, or with `ends` goals behind mirrored to the front.
     mirror: Symmetry | None = None
-    gas: float = 1.0  # what a valve costs in that choice, as a multiple; less is more exact, and uses more
+    valve_cost: float = 1.0  # of an open valve in the choice for a wrench, as a multiple; less is more exact
     compiled: bool = False  # whether steps of the worlds are compiled first
-    orders: Orders | None = None  # shares of full command without it
+    incremental_actions: IncrementalActions | None = None  # without: shares of full command
     control_hz: float | None = None  # rate of the commands; the robot's own by default [Hz]
 
     def __post_init__(self) -> None:
-        """Refuse sizes that do not divide."""
         algorithm = self.algorithm
-        if isinstance(algorithm, Ppo) and algorithm.lessons and not algorithm.fast:
-            raise ValueError("'lessons' are for the fast PPO.")
+        wrench = self.action_space == "wrench"
+        cloning = isinstance(algorithm, Ppo) and algorithm.cloning_updates > 0
+        if isinstance(algorithm, Ppo) and cloning and not algorithm.fast:
+            raise ValueError("'cloning_updates' are for the fast PPO.")
         if isinstance(algorithm, Ppo) and algorithm.precision != "float32" and not algorithm.fast:
             raise ValueError(f"'precision: {algorithm.precision}' is for the fast PPO.")
-        if self.specialist and (not self.told or isinstance(algorithm, RecurrentPpo)):
+        if self.fallback_policy and (not self.disturbance_inputs or isinstance(algorithm, RecurrentPpo)):
             raise ValueError(
-                "'specialist' needs 'told', to know when its time has come, and a network without memory."
+                "'fallback_policy' needs 'disturbance_inputs', which say when it takes over, and a network without "
+                "memory."
             )
         if self.mirror and isinstance(algorithm, RecurrentPpo):
-            raise ValueError("'mirror' is for networks without memory: what they remember has a side, too.")
-        if self.orders and (not isinstance(algorithm, Ppo) or algorithm.lessons or self.told or self.wrench):
-            raise ValueError("'orders' are for ppo, without 'lessons', 'told' and 'wrench'.")
+            raise ValueError("'mirror' is for networks without memory: a memory has a side, too.")
+        if self.incremental_actions and (
+            not isinstance(algorithm, Ppo) or cloning or self.disturbance_inputs or wrench
+        ):
+            raise ValueError(
+                "'incremental_actions' are for ppo, without 'cloning_updates', 'disturbance_inputs' and "
+                "'action_space: wrench'."
+            )
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
             raise ValueError(
                 f"worlds · steps = {self.worlds * algorithm.steps} must be a multiple of 'minibatch'."
             )
-        if self.refinement and not isinstance(algorithm, OnPolicy):
+        if self.annealing and not isinstance(algorithm, OnPolicy):
             raise ValueError(
-                f"'refinement' is for ppo and recurrent_ppo; {algorithm.kind} weighs entropy by itself."
+                f"'annealing' is for ppo and recurrent_ppo; {algorithm.kind} weighs entropy by itself."
             )
         if self.worlds < 1 or self.time_limit_s <= 0.0:
             raise ValueError("'worlds' must be at least 1, 'time_limit_s' greater than 0.")
         positive(evaluate_every_s=self.evaluate_every_s, checkpoint_every_s=self.checkpoint_every_s)
 
     def learner_of(self, robot: Robot) -> Robot:
-        """The robot as it learns: with the rate of the commands that is asked for.
+        """The robot with the control rate of these settings.
 
         Raises:
-            ConfigError: The rate does not divide that of the robot's physics.
+            ConfigError: The rate does not divide the rate of the robot's physics.
         """
         if self.control_hz is None:
             return robot
@@ -250,24 +263,24 @@ class TrainingSettings:
             raise ConfigError(f"'{robot.name}' cannot be commanded at this rate: {error}") from error
 
     def effort(self, progress: float) -> float:
-        """Factor on what using the actuators costs when this share of the run is over [-]."""
-        return self._refined(progress, 1.0, self.refinement.effort) if self.refinement else 1.0
+        """Factor on the cost of using the actuators when this share of the run is over [-]."""
+        return self._annealed(progress, 1.0, self.annealing.effort) if self.annealing else 1.0
 
     def target_kl(self, progress: float) -> float:
-        """How far an update of an on-policy learner goes then."""
+        """KL divergence at which an on-policy update aims then."""
         assert isinstance(self.algorithm, OnPolicy)
         first = self.algorithm.target_kl
-        return first * self._refined(progress, 1.0, self.refinement.updates) if self.refinement else first
+        return first * self._annealed(progress, 1.0, self.annealing.target_kl) if self.annealing else first
 
     def entropy(self, progress: float) -> float:
         """Weight of the entropy in the loss of an on-policy learner then."""
         assert isinstance(self.algorithm, OnPolicy)
         first = self.algorithm.entropy
-        return self._refined(progress, first, self.refinement.entropy) if self.refinement else first
+        return self._annealed(progress, first, self.annealing.entropy) if self.annealing else first
 
-    def _refined(self, progress: float, first: float, last: float) -> float:
-        assert self.refinement is not None
-        return first + (last - first) * self.refinement.share(progress)
+    def _annealed(self, progress: float, first: float, last: float) -> float:
+        assert self.annealing is not None
+        return first + (last - first) * self.annealing.share(progress)
 
 
 def load_training_settings(robot: Robot, task: Task, name: str | None = None) -> TrainingSettings:
@@ -288,7 +301,15 @@ def load_training_settings(robot: Robot, task: Task, name: str | None = None) ->
     own = f"{robot.name}_{task.name}"
     name = name or (own if own in config_names("training") else robot.actuators.kind)
     path = Path(name) if name.endswith((".yaml", ".yml")) else config_path("training", name)
-    settings = load_config(TrainingSettings, path)
+    try:
+        settings = load_config(TrainingSettings, path)
+    except ConfigError as error:
+        unknown = re.match(r"(.*): unknown key '(\w+)'", str(error))
+        if unknown is None or unknown[2] not in RENAMED:
+            raise
+        raise ConfigError(
+            f"{unknown[1]}: '{unknown[2]}' has a new name: write {RENAMED[unknown[2]]}."
+        ) from error
     if robot.actuators.binary and isinstance(settings.algorithm, OffPolicy):
         raise ConfigError(
             f"{path}: {settings.algorithm.kind} needs actuators that move by degrees, those of '{robot.name}' are "

@@ -23,16 +23,16 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task
 from training.compiled import step_of
-from training.disturbance_inputs import ToldTruth
-from training.incremental_actions import KINDS, check_orders, shares_asked
-from training.spaces import action_space, observation_space, shares_space
-from training.uncontrollable import asked_for
+from training.disturbance_inputs import DisturbanceInputs
+from training.incremental_actions import KINDS, check_incremental, incremental_shares
+from training.settings import ActionSpace
+from training.worlds import actuator_space, observation_space, shares_space, training_task
 
 
 class BatchVecEnv(VecEnv):
-    """Worlds that learn together; each begins again by itself when its episode is over.
+    """Worlds that learn together; each begins the next episode by itself when its episode is over.
 
-    Actions are on/off for valves that know only these, or the wrench that they should bring up, or numbers of orders,
+    Actions are on/off for on/off valves, or the wrench that valves are chosen for, or numbers of incremental actions,
     else shares of full command in [-1, 1]. An episode ends when the robot leaves the geofence or touches an obstacle
     (terminated), or its time is up (truncated: the value of the last state still counts). First episodes have random
     lengths, so that resets spread out over time.
@@ -52,11 +52,11 @@ class BatchVecEnv(VecEnv):
         reward_scale: float = 1.0,
         training: bool = True,
         staggered: bool = True,
-        told: bool = False,
-        wrench: bool = False,
-        gas: float = 1.0,
+        disturbance_inputs: bool = False,
+        action_space: ActionSpace = "actuators",
+        valve_cost: float = 1.0,
         mirror: Symmetry | None = None,
-        orders_held: int = 0,
+        action_hold: int = 0,
         compiled: bool = False,
     ) -> None:
         """Build the worlds.
@@ -70,28 +70,31 @@ class BatchVecEnv(VecEnv):
             reward_scale: Factor on the rewards.
             training: Start episodes where learning starts.
             staggered: First episodes have random lengths.
-            told: Observations also tell pushes and dead valves (`fulmar_core.controllers.disturbance_inputs`).
-            wrench: Actions are wanted wrenches, as shares of the strongest, for which valves are chosen.
-            gas: What a valve costs in that choice, as a multiple.
-            mirror: Goals on the right are shown, and answered, as on the left, or those behind as those ahead
+            disturbance_inputs: Observations include pushes and dead valves
+                (`fulmar_core.controllers.disturbance_inputs`).
+            action_space: "wrench": actions are shares of the strongest wrench, for which valves are chosen.
+            valve_cost: Of an open valve in that choice, as a multiple.
+            mirror: Goals on the right are mirrored to the left, or those behind to the front
                 (`fulmar_core.symmetry`).
-            orders_held: Control steps that an incremental action is held (`training.incremental_actions`); 0: direct.
+            action_hold: Control steps of an incremental action (`training.incremental_actions`); 0: shares of command.
             compiled: Steps are compiled (`training.compiled`).
 
         Raises:
-            ConfigError: The robot cannot be mirrored so, or takes no orders, or there is no compiler.
+            ConfigError: The robot has no such symmetry, or no slew for incremental actions, or there is no compiler.
         """
-        task = asked_for(task, scenario).fitted(robot)
+        task = training_task(task, scenario).fitted(robot)
         self.robot, self.task, self._reward_scale = robot, task, reward_scale
         self._scenario, self._worlds, self._training, self._seed = scenario, worlds, training, seed
         self._staggered = staggered
         self._effort = robot.costs.effort
-        self._told = ToldTruth(robot, worlds=worlds, seed=seed) if told else None
-        self.choice = WrenchChoice.of(robot, gas) if wrench else None
+        self._disturbances = (
+            DisturbanceInputs(robot, worlds=worlds, seed=seed) if disturbance_inputs else None
+        )
+        self.choice = WrenchChoice.of(robot, valve_cost) if action_space == "wrench" else None
         self.mirror = Mirror.of(robot, task, mirror) if mirror else None
-        if orders_held:
-            check_orders(robot)
-        self.takes_orders, self.hold = orders_held > 0, max(orders_held, 1)
+        if action_hold:
+            check_incremental(robot)
+        self.incremental, self.hold = action_hold > 0, max(action_hold, 1)
         self._mirrored = np.zeros(worlds, dtype=bool)  # where the last observation was mirrored
         self._compiled = compiled
         self._begin()
@@ -99,9 +102,9 @@ class BatchVecEnv(VecEnv):
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
         names = self.simulation.observer.names
-        more = len(disturbance_terms(robot)) if told else 0
-        actions = shares_space(WRENCH) if wrench else action_space(robot)
-        if self.takes_orders:
+        more = len(disturbance_terms(robot)) if disturbance_inputs else 0
+        actions = shares_space(WRENCH) if self.choice else actuator_space(robot)
+        if self.incremental:
             actions = gymnasium.spaces.MultiDiscrete([KINDS] * count)
         super().__init__(worlds, observation_space(len(names) + more), actions)
         self._age = np.zeros(worlds, dtype=int)
@@ -120,25 +123,25 @@ class BatchVecEnv(VecEnv):
         self._observed_step = step_of(self.simulation, compiled=self._compiled)
 
     @property
-    def told(self) -> bool:
-        """Whether observations also tell pushes and dead valves."""
-        return self._told is not None
+    def takes_disturbances(self) -> bool:
+        """Whether observations include pushes and dead valves."""
+        return self._disturbances is not None
 
     def state(self) -> dict[str, Any]:
-        """Everything that a step changes, as values that pickle; for an exact resume."""
+        """The mutable state, as values that pickle; for an exact resume."""
         state = {"simulation": self.simulation.snapshot(), "age": self._age.copy()}
         state["mirrored"] = self._mirrored.copy()
-        return state | ({"told": self._told.state()} if self._told else {})
+        return state | ({"disturbances": self._disturbances.state()} if self._disturbances else {})
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` returned."""
+        """Restore what `state` returned."""
         self.simulation.restore(state["simulation"])
         self._age, self._mirrored = state["age"].copy(), state["mirrored"].copy()
-        if self._told:
-            self._told.set_state(state["told"])
+        if self._disturbances:
+            self._disturbances.set_state(state["disturbances"])
 
     def set_effort(self, factor: float) -> None:
-        """What using the actuators costs from now on, as a multiple of the robot's own costs [-]."""
+        """Set the cost of using the actuators, as a multiple of the robot's own [-]."""
         self._effort = factor * self.robot.costs.effort
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
@@ -152,24 +155,24 @@ class BatchVecEnv(VecEnv):
         rng = np.random.Generator(np.random.Philox(self._seed))
         self._age = rng.integers(0, self._horizon if self._staggered else 1, self.num_envs)
         self.reset_infos = [{} for _ in range(self.num_envs)]
-        if self._told:
-            self._told.forget()
+        if self._disturbances:
+            self._disturbances.reset()
         return self._completed(np.asarray(self.simulation.observe()))
 
     def begin_anew(self, worlds: Sequence[int] | np.ndarray) -> None:
-        """Begin the next episode in some worlds, whatever has become of the last one."""
+        """Begin the next episode in some worlds."""
         self.simulation.reset(worlds)
         self._age[np.asarray(worlds)] = 0
-        if self._told:
-            self._told.forget(worlds)
+        if self._disturbances:
+            self._disturbances.reset(worlds)
 
     def _completed(self, observations: np.ndarray) -> np.ndarray:
-        if self._told:
-            observations = np.hstack((observations, self._told.told(self.simulation)))
+        if self._disturbances:
+            observations = np.hstack((observations, self._disturbances.inputs(self.simulation)))
         return self._shown(observations, np.arange(self.num_envs))
 
     def _shown(self, observations: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """The mirror image of some goals, where it was asked for; of which, is remembered."""
+        """Observations, mirrored where the goal asks for it; remembers where."""
         if self.mirror is not None:
             mirrored = observations[:, self.mirror.side] < 0.0
             self._mirrored[worlds] = mirrored
@@ -179,13 +182,13 @@ class BatchVecEnv(VecEnv):
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions of the coming step, shape (worlds, n)."""
         actions = np.asarray(actions, dtype=np.float32)
-        if self.takes_orders:
+        if self.incremental:
             actions = actions - 1.0
         actions = self.answered(actions)
         self._actions = self._valves(self.choice, actions) if self.choice else actions
 
     def answered(self, shares: np.ndarray) -> np.ndarray:
-        """Shares of full command, mirrored where the last observation was; twice is not at all."""
+        """Shares of full command, mirrored where the last observation was; its own inverse."""
         if self.mirror is None:
             return shares
         return np.where(self._mirrored[:, None], shares @ self.mirror.done, shares)
@@ -200,13 +203,13 @@ class BatchVecEnv(VecEnv):
         return Inputs(state, goal, observation, previous, None, 0, simulation.control_dt)
 
     def _valves(self, choice: WrenchChoice, shares: np.ndarray) -> np.ndarray:
-        # By PyTorch, which keeps to the threads it was given; NumPy's would be in the way of another run's.
-        dead = torch.from_numpy(self._told.dead.astype(np.float32)) if self._told else None
+        # By PyTorch, which keeps to the threads it was given; NumPy's would disturb another run.
+        dead = torch.from_numpy(self._disturbances.dead.astype(np.float32)) if self._disturbances else None
         chosen: np.ndarray = choice.best(torch.from_numpy(shares), dead).numpy()
         return chosen
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Move while the actions stand, usually one control step; returns observations, rewards, dones and infos."""
+        """Move `hold` control steps; returns observations, rewards, dones and infos."""
         simulation = self.simulation
         reward, ended_early, seen = self._step()
         for _ in range(self.hold - 1):
@@ -215,11 +218,11 @@ class BatchVecEnv(VecEnv):
         self._age += self.hold
         timed_out = (self._age >= self._horizon) & ~ended_early
         done = ended_early | timed_out
-        if self._told:
-            self._told.learn(simulation)
+        if self._disturbances:
+            self._disturbances.learn(simulation)
         observations = self._completed(seen)
         # One shared dictionary where nothing ended: a thousand empty ones a step would cost more than the physics.
-        infos: list[dict[str, Any]] = [_NOTHING_TO_SAY] * self.num_envs
+        infos: list[dict[str, Any]] = [_EMPTY] * self.num_envs
         ended = np.flatnonzero(done)
         if ended.size:
             for world in ended:
@@ -233,17 +236,17 @@ class BatchVecEnv(VecEnv):
         return observations, np.asarray(reward * self._reward_scale, dtype=np.float32), done, infos
 
     def _step(self) -> tuple[np.ndarray, ...]:
-        """One control step; returns rewards, whether episodes ended before their time, and observations."""
-        asked = self._actions
-        if self.takes_orders:
-            asked = shares_asked(asked, shares(self.simulation.command, self._scale))
-        told = self._observed_step(asked * self._scale, effort=self._effort)
-        return tuple(np.asarray(part) for part in told)
+        """One control step; returns rewards, terminations and observations."""
+        wanted = self._actions
+        if self.incremental:
+            wanted = incremental_shares(wanted, shares(self.simulation.command, self._scale))
+        result = self._observed_step(wanted * self._scale, effort=self._effort)
+        return tuple(np.asarray(part) for part in result)
 
     def _observed(self, worlds: np.ndarray) -> np.ndarray:
         observations = np.asarray(self.simulation.observe(worlds))
-        if self._told:
-            observations = np.hstack((observations, self._told.told(self.simulation)[worlds]))
+        if self._disturbances:
+            observations = np.hstack((observations, self._disturbances.inputs(self.simulation)[worlds]))
         return self._shown(observations, worlds)
 
     def close(self) -> None:
@@ -266,4 +269,4 @@ class BatchVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
 
-_NOTHING_TO_SAY: dict[str, Any] = {}
+_EMPTY: dict[str, Any] = {}

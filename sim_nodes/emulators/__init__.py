@@ -1,5 +1,4 @@
-"""Devices that are not there: they speak a real device's protocol, and a simulator stands behind them.
+"""Emulated devices: they speak a real device's protocol, with a simulator behind them.
 
-Each is written from the protocol and shares no code with the driver that it is to prove: one mistake cannot hide
-another.
+Each is written from the protocol and shares no code with its driver, so that one mistake cannot hide another.
 """

@@ -12,7 +12,7 @@ import numpy as np
 from fulmar_core.backend import Sample
 from fulmar_core.rotation import rotate_inverse
 from fulmar_core.state import RigidBodyState
-from sim_nodes.emulators.links import Link
+from sim_nodes.emulators.device import Link
 
 TIMEOUT_S = 0.5  # without $PYDIR for so long the propellers stand (heron_controller)
 NAVIGATION_S, INERTIAL_S, BATTERY_S = 0.1, 0.05, 1.0  # periods of the sentences; our values
@@ -29,7 +29,6 @@ class KingfisherEmulator:
     """
 
     def __init__(self, link: Link) -> None:
-        """Switch it on."""
         self._link, self.address = link, link.address
         self._pending = b""
         self._command, self._commanded_s = np.zeros(2), -math.inf
@@ -90,7 +89,7 @@ class KingfisherEmulator:
 
 
 def _shares(line: bytes) -> np.ndarray | None:
-    """What a `$PYDIR` asks for, -1 to 1 a side; None where it is none, or spoilt."""
+    """Shares of a `$PYDIR`, -1 to 1 a side; None for other or damaged sentences."""
     body, _, total = line.removeprefix(b"$").partition(b"*")
     name, *values = body.split(b",")
     try:

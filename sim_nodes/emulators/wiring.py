@@ -1,4 +1,4 @@
-"""What an emulated robot's actuators do when its wiring is not as the driver believes."""
+"""Wiring of an emulated robot, with swapped, reversed and cut wires."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STRAIGHT = ("left", "right")
 
 
 class Wiring:
-    """From what a device's channels command to what the actuators behind them do."""
+    """Maps the commands of a device's channels to the actuators behind them."""
 
     def __init__(
         self, robot: Robot, *, order: Sequence[int], sides: Sequence[str], dead: Sequence[int]
@@ -34,10 +34,10 @@ class Wiring:
         ]
 
     def applied(self, command: np.ndarray) -> np.ndarray:
-        """What the actuators do.
+        """Commands of the actuators.
 
         Args:
-            command: What the device commands, shape (n,).
+            command: Of the device, shape (n,).
 
         Returns:
             Same shape and unit.

@@ -1,8 +1,7 @@
 """MuJoCo's models of robots, built from their YAML so that no number is written twice."""
 
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from sim_nodes.mujoco_model.machine import Machine, machine_of
-from sim_nodes.mujoco_model.scene import Scene, build_model
+from sim_nodes.mujoco_model.scene import RobotModel, Scene, build_model, robot_model_of
 from sim_nodes.mujoco_model.surroundings import BODY, IMU_SITE
 
-__all__ = ["BODY", "GRAVITY", "IMU_SITE", "Machine", "Scene", "build_model", "machine_of"]
+__all__ = ["BODY", "GRAVITY", "IMU_SITE", "RobotModel", "Scene", "build_model", "robot_model_of"]

@@ -8,10 +8,9 @@ import mujoco
 import numpy as np
 
 from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from sim_nodes.mujoco_model.wheels import STEP_S, Chassis, add_wheel_servo
+from sim_nodes.mujoco_model.wheels import Chassis
 
 STEERING_HZ = 25.0  # bandwidth of the steering servos [Hz]
 STEERING_DAMPING = 0.7  # of critical [-]
@@ -19,18 +18,16 @@ KNUCKLE_INERTIA = 2e-3  # of what turns with a steered wheel, and of its servo's
 SIDES = (("left", 0.5), ("right", -0.5))
 
 
-class Car:
-    """Every wheel has a motor that turns it as fast as rolling without slip asks for; all push alike hard at most."""
+class Car(Chassis):
+    """Every wheel has a motor that turns it at the speed of rolling without slip, all with the same largest force."""
 
     def __init__(self, robot: Robot) -> None:
-        """Prepare for `add`."""
         assert isinstance(robot.actuators, Ackermann)
-        self._robot, self._car = robot, robot.actuators
-        self.steps_per_tick = max(1, round(robot.timing.physics_dt / STEP_S))
+        self._car = robot.actuators
         length, track = self._car.wheelbase, self._car.track
         places = {f"rear_{side}": (0.0, share * track) for side, share in SIDES}
         places |= {f"front_{side}": (length, share * track) for side, share in SIDES}
-        self._chassis = Chassis(
+        super().__init__(
             robot,
             wheel_radius=self._car.wheel_radius,
             friction=self._car.friction,
@@ -38,49 +35,29 @@ class Car:
             weight_x=0.5 * length,
         )
 
-    @property
-    def steady(self) -> bool:
-        """The floor's forces are MuJoCo's own."""
-        return True
-
-    @property
-    def rest_height(self) -> float:
-        """Height of the axles [m]."""
-        return self._chassis.rest_height
-
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
-        """Add chassis, steering, wheels and servos; see `Machine.add`."""
-        chassis = self._chassis
-        body = chassis.add(spec)
-        for name, (x, y) in chassis.places.items():
+        """Add chassis, steering, wheels and servos; see `RobotModel.add`."""
+        body = super().add(spec)
+        for name, (x, y) in self.places.items():
             carrier, place = body, (x, y, 0.0)
             if name.startswith("front"):
                 carrier, place = self._add_knuckle(spec, body, name, place), (0.0, 0.0, 0.0)
-            chassis.add_wheel(carrier, name, place)
-        for name in chassis.places:
-            add_wheel_servo(
-                spec,
-                name,
-                chassis,
-                force=self._car.wheel_force / len(chassis.places),
-                response=self._car.response,
-            )
+            self.add_wheel(carrier, name, place)
+        force = self._car.wheel_force / len(self.places)
+        for name in self.places:
+            self.add_wheel_servo(spec, name, force=force, response=self._car.response)
         return body
 
     def bind(self, model: mujoco.MjModel) -> None:
-        """See `Machine.bind`."""
-        self._chassis.bind(model)
-        names = [*(f"front_{side}_steering" for side, _ in SIDES), *self._chassis.places]
+        """See `RobotModel.bind`."""
+        super().bind(model)
+        names = [*(f"front_{side}_steering" for side, _ in SIDES), *self.places]
         self._dofs = np.array([model.joint(name).dofadr[0] for name in names])
         self._controls = np.array([model.actuator(name).id for name in names])
 
-    def take_world(self, model: mujoco.MjModel, world: World) -> None:
-        """See `Machine.take_world`."""
-        self._chassis.take_world(model, world)
-
     def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
-        """See `Machine.place`; the wheels start straight."""
-        self._chassis.place(model, data, start)
+        """See `RobotModel.place`; the wheels start straight."""
+        super().place(model, data, start)
         ahead, _ = start.velocity_in_body
         data.qvel[self._dofs[2:]] = data.act[:] = float(ahead) / self._car.wheel_radius
 
@@ -92,10 +69,10 @@ class Car:
         gain: np.ndarray,
         outside: tuple[float, float, float],
     ) -> None:
-        """Set steering angles and wheel speeds; see `Machine.drive`."""
+        """Set steering angles and wheel speeds; see `RobotModel.drive`."""
         speed, steering = applied * gain
         data.ctrl[self._controls] = self.wheel_targets(float(speed), float(steering))
-        self._chassis.push(data, outside)
+        self.push(data, outside)
 
     def wheel_targets(self, speed: float, steering: float) -> list[float]:
         """Steering angles and wheel speeds of a car that rolls without slip (Ackermann).

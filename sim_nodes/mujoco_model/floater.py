@@ -1,4 +1,4 @@
-"""Bodies that float on air, in space or on water, pushed at some places: thrusters and propellers."""
+"""Robots with thrusters or propellers in MuJoCo: on air, in space or on water."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.surroundings import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
 
-# MuJoCo compiles a body whose centre of mass is its origin in a way that lets nobody move it later [m].
+# MuJoCo compiles a body whose centre of mass is its origin in a way that keeps it there [m].
 OFF_CENTRE = 1e-5
 
 
@@ -37,8 +37,7 @@ class Floater:
         return self.water is None
 
     def __init__(self, robot: Robot) -> None:
-        """Prepare for `add`."""
-        assert isinstance(robot.actuators, Thrusters | Propellers)  # `machine_of` has others for wheels
+        assert isinstance(robot.actuators, Thrusters | Propellers)  # `robot_model_of` has others for wheels
         self._robot, self._actuators = robot, robot.actuators
         self._body = 0
         self._planar, self._swims = robot.body.planar, robot.hydrodynamics is not None
@@ -55,7 +54,7 @@ class Floater:
         return 0.5 * self._robot.body.height if self._planar and not self._swims else 0.0
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
-        """Add the body; see `Machine.add`."""
+        """Add the body; see `RobotModel.add`."""
         robot = self._robot
         spec.option.gravity = [0.0, 0.0, -GRAVITY if self._planar or self._swims else 0.0]
         body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, self.rest_height])
@@ -114,7 +113,7 @@ class Floater:
         gain: np.ndarray,
         outside: tuple[float, float, float],
     ) -> None:
-        """Set thrusts, the push of the surroundings and the forces of the water; see `Machine.drive`."""
+        """Set thrusts, the push of the surroundings and the forces of the water; see `RobotModel.drive`."""
         actuators = self._actuators
         if isinstance(actuators, Thrusters):
             data.ctrl[:] = actuators.thrusts(applied) * gain

@@ -1,17 +1,30 @@
-"""One compiled model: a robot and what stands about it."""
+"""Compiled MuJoCo model of a robot, obstacles and objects, and the interface of robot families."""
 
 from __future__ import annotations
+
+from typing import Protocol
 
 import mujoco
 import numpy as np
 
+from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.disturbances.world import World
 from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.things import Thing
-from sim_nodes.mujoco_model.block import add_block, place_block
-from sim_nodes.mujoco_model.machine import Machine, machine_of
-from sim_nodes.mujoco_model.obstacles import add_obstacles, place_obstacles, there_is_room
+from sim_nodes.mujoco_model.car import Car
+from sim_nodes.mujoco_model.differential_base import DifferentialBase
+from sim_nodes.mujoco_model.floater import Floater
+from sim_nodes.mujoco_model.objects import (
+    add_block,
+    add_obstacles,
+    has_room,
+    place_block,
+    place_obstacles,
+)
 from sim_nodes.mujoco_model.surroundings import add_sensors, add_surroundings
 
 PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
@@ -26,34 +39,34 @@ class Scene:
         Args:
             robot: The robot.
             radii: Of the obstacles that there is room for [m].
-            things: Those with a body have one in the model; the others stay where they are put.
+            things: Those with a body have one in the model; the others do not move.
 
         Raises:
-            ConfigError: MuJoCo finds that there can be no such robot.
+            ConfigError: MuJoCo rejects the robot.
         """
         self._radii, self._things = radii, things
         self._poses: dict[str, np.ndarray] = {}
-        self.machine: Machine = machine_of(robot)
+        self.robot_model: RobotModel = robot_model_of(robot)
         try:
-            self.model = _spec(robot, self.machine, radii, things).compile()
+            self.model = _spec(robot, self.robot_model, radii, things).compile()
         except ValueError as error:
             raise ConfigError(
                 f"robot '{robot.name}': MuJoCo cannot build it: {' '.join(str(error).split())}. "
                 "Mass and inertia of the body less those of its wheels have to be those of a body that can exist."
             ) from error
-        self.machine.bind(self.model)
+        self.robot_model.bind(self.model)
         self.data = mujoco.MjData(self.model)
 
     def has_room_for(self, obstacles: np.ndarray) -> bool:
         """Whether these obstacles can be shown, shape (m, 3); if not, another scene has to be compiled."""
-        return there_is_room(self._radii, obstacles)
+        return has_room(self._radii, obstacles)
 
     def begin(self, episode: Episode) -> None:
-        """Put everything as an episode begins: bodies, the robot at its start, obstacles and things."""
-        self.machine.take_world(self.model, episode.world)
+        """Set the start of an episode: bodies, robot, obstacles and things."""
+        self.robot_model.take_world(self.model, episode.world)
         mujoco.mj_setConst(self.model, self.data)
         mujoco.mj_resetData(self.model, self.data)
-        self.machine.place(self.model, self.data, episode.start)
+        self.robot_model.place(self.model, self.data, episode.start)
         place_obstacles(self.model, self.data, np.asarray(episode.goal.obstacles))
         for thing in self._things:
             pose = np.array(episode.goal.things[thing.name], dtype=float)
@@ -63,7 +76,7 @@ class Scene:
 
     @property
     def things(self) -> dict[str, np.ndarray]:
-        """Where the things are, each (3,) [m, m, rad]; what is pushed is round and keeps its heading."""
+        """Poses of the things, each (3,) [m, m, rad]; pushed things are round and keep their heading."""
         return {thing.name: self._pose_of(thing) for thing in self._things}
 
     def _pose_of(self, thing: Thing) -> np.ndarray:
@@ -75,30 +88,90 @@ class Scene:
 
 
 def build_model(robot: Robot) -> mujoco.MjModel:
-    """Compile a robot alone.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        The compiled model.
-    """
+    """The compiled model of a robot alone."""
     return Scene(robot).model
 
 
 def _spec(
-    robot: Robot, machine: Machine, radii: tuple[float, ...], things: tuple[Thing, ...]
+    robot: Robot, robot_model: RobotModel, radii: tuple[float, ...], things: tuple[Thing, ...]
 ) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
-    spec.option.timestep = robot.timing.physics_dt / machine.steps_per_tick
+    spec.option.timestep = robot.timing.physics_dt / robot_model.steps_per_tick
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    # A state that blew up has to stay so that the backend sees it; MuJoCo would quietly begin anew at the origin.
+    # A diverged state has to stay, so that the backend sees it; MuJoCo would silently reset it.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     add_surroundings(spec, PALE if robot.hydrodynamics is None else WATER)
-    add_sensors(spec, machine.add(spec))
+    add_sensors(spec, robot_model.add(spec))
     add_obstacles(spec, radii)
     for thing in things:
         if thing.body is not None:
             add_block(spec, thing.name, thing.body)
     return spec
+
+
+PlanarWrench = tuple[float, float, float]  # force along the world's x and y [N], yaw moment [N·m]
+
+
+class RobotModel(Protocol):
+    """One family of robots in MuJoCo.
+
+    Attributes:
+        steps_per_tick: MuJoCo steps in one physics tick of the robot.
+    """
+
+    steps_per_tick: int
+
+    @property
+    def steady(self) -> bool:
+        """Whether the forces of one tick hold for the next one where the actuators do the same."""
+        ...
+
+    def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
+        """Add bodies, joints and actuators to a model; returns the body that carries the sensors."""
+        ...
+
+    def bind(self, model: mujoco.MjModel) -> None:
+        """Look up in a compiled model what the other methods need."""
+        ...
+
+    def take_world(self, model: mujoco.MjModel, world: World) -> None:
+        """Take mass, inertia and centre of mass of an episode, without a batch axis."""
+        ...
+
+    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
+        """Put the robot where an episode starts, without a batch axis."""
+        ...
+
+    def drive(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        applied: np.ndarray,
+        gain: np.ndarray,
+        outside: PlanarWrench,
+    ) -> None:
+        """Set every force of the coming tick.
+
+        Args:
+            model: The model.
+            data: Its state.
+            applied: What each actuator does, shape (n,).
+            gain: Factor on it, shape (n,).
+            outside: Push of the surroundings.
+        """
+        ...
+
+    @property
+    def rest_height(self) -> float:
+        """Height of the body's origin at rest above z = 0 [m]."""
+        ...
+
+
+def robot_model_of(robot: Robot) -> RobotModel:
+    """The MuJoCo model of a robot's family."""
+    if isinstance(robot.actuators, DifferentialDrive):
+        return DifferentialBase(robot)
+    if isinstance(robot.actuators, Ackermann):
+        return Car(robot)
+    return Floater(robot)

@@ -1,4 +1,4 @@
-"""What every model has: the floor, light, a camera, and the sensors on the body."""
+"""Parts of every model: floor, light, camera, hull, and the sensors on the body."""
 
 from __future__ import annotations
 

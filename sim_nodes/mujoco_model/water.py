@@ -12,7 +12,7 @@ from fulmar_core.rotation import cross
 class Water:
     """Buoyancy, righting moments, drag and added mass.
 
-    Still water is at z = 0, where the hull floats at rest whatever it weighs in an episode. One hull or many at once.
+    The surface is at z = 0, where the hull floats at rest at any mass. For one hull or many at once.
     """
 
     def __init__(self, hydrodynamics: Hydrodynamics, places: np.ndarray, directions: np.ndarray) -> None:

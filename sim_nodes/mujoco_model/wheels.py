@@ -29,7 +29,14 @@ SETTLE_S = 1.0  # time in which a model comes to rest after its compilation [s]
 
 
 class Chassis:
-    """A body on wheels: mass, outline, place, and the speeds its wheels begin with."""
+    """A body on wheels; a family of robots on wheels adds its wheels and drives them (see `RobotModel`).
+
+    Attributes:
+        steady: The floor's forces are MuJoCo's own.
+        rest_height: Height of the axles [m].
+    """
+
+    steady = True
 
     def __init__(
         self,
@@ -50,6 +57,7 @@ class Chassis:
             weight_x: Of the centre of mass, ahead of the origin [m].
         """
         self.robot, self.radius, self.friction, self.places = robot, wheel_radius, friction, wheels
+        self.steps_per_tick = max(1, round(robot.timing.physics_dt / STEP_S))
         self.rest_height = wheel_radius
         height = max(wheel_radius, WEIGHT_HEIGHT * robot.body.height)
         self._weight = np.array([weight_x, 0.0, height - wheel_radius])
@@ -116,6 +124,34 @@ class Chassis:
             conaffinity=0,
         )
 
+    def add_wheel_servo(self, spec: mujoco.MjSpec, wheel: str, *, force: float, response: Response) -> None:
+        """Add the motor of one wheel and the servo that makes it turn at a speed [rad/s].
+
+        Args:
+            spec: Model under construction.
+            wheel: Name of the wheel and of its joint; the servo is called alike.
+            force: The most that it pushes the robot [N]; what turns the wheel itself comes on top.
+            response: How fast the wheel follows.
+        """
+        radius, mass = self.radius, self.robot.body.mass
+        stiffness = mass / len(self.places) * radius**2 / TIGHT_S
+        most = force * radius * (1.0 + 0.5 * WHEEL_SHARE * len(self.places))
+        # The core's model moves a whole tick with the speed of its end, which makes it half a tick faster than its lag.
+        lag = max(response.lag_s, SERVO_S) - 0.5 * self.robot.timing.physics_dt - TIGHT_S
+        spec.add_actuator(
+            name=wheel,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target=wheel,
+            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+            gainprm=[stiffness] + [0.0] * 9,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=[0.0, 0.0, -stiffness] + [0.0] * 7,
+            dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
+            dynprm=[max(lag, STEP_S)] + [0.0] * 9,
+            forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            forcerange=[-most, most],
+        )
+
     def bind(self, model: mujoco.MjModel) -> None:
         """Let the compiled model come to rest, and remember how it stands."""
         self._body = model.body(BODY).id
@@ -172,35 +208,3 @@ def _about_axes(offset: np.ndarray) -> np.ndarray:
     """Moments of 1 kg about axes through a point at some offset, shape (3,) [m²]."""
     square = offset * offset
     return square.sum() - square
-
-
-def add_wheel_servo(
-    spec: mujoco.MjSpec, wheel: str, chassis: Chassis, *, force: float, response: Response
-) -> None:
-    """Add the motor of one wheel and the servo that makes it turn at a speed [rad/s].
-
-    Args:
-        spec: Model under construction.
-        wheel: Name of the wheel and of its joint; the servo is called alike.
-        chassis: What it moves.
-        force: The most that it pushes the robot [N]; what turns the wheel itself comes on top.
-        response: How fast the wheel follows.
-    """
-    radius, mass = chassis.radius, chassis.robot.body.mass
-    stiffness = mass / len(chassis.places) * radius**2 / TIGHT_S
-    most = force * radius * (1.0 + 0.5 * WHEEL_SHARE * len(chassis.places))
-    # The core's model moves a whole tick with the speed of its end, which makes it half a tick faster than its lag.
-    lag = max(response.lag_s, SERVO_S) - 0.5 * chassis.robot.timing.physics_dt - TIGHT_S
-    spec.add_actuator(
-        name=wheel,
-        trntype=mujoco.mjtTrn.mjTRN_JOINT,
-        target=wheel,
-        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
-        gainprm=[stiffness] + [0.0] * 9,
-        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-        biasprm=[0.0, 0.0, -stiffness] + [0.0] * 7,
-        dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
-        dynprm=[max(lag, STEP_S)] + [0.0] * 9,
-        forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-        forcerange=[-most, most],
-    )

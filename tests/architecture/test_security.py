@@ -20,8 +20,8 @@ from fulmar_core.policy_bundle import GOLDEN, NETWORK, PASSPORT, read_passport, 
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import WIRES
+from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
-from policy_server.shipped import policies_directory
 
 ON_THE_ROBOT = (
     "ros2_ws/src/fulmar_core/fulmar_core",

@@ -21,7 +21,6 @@ from typing import Any, Protocol
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_core.atomic_write import write_whole
-from fulmar_core.tasks import load_task
 
 REQUIRED = 0.95  # share of episodes that reach their goal
 SLACK_S = 120.0  # what starting and stopping may take on a busy machine
@@ -43,25 +42,20 @@ class Case(Protocol):
     @property
     def name(self) -> str:
         """Of the files in which its episodes are kept."""
-        ...
 
     @property
     def robot(self) -> str:
         """Which robot."""
-        ...
 
     @property
     def task(self) -> str:
         """What it is to do."""
-        ...
 
     def prepared(self, seed: int) -> contextlib.AbstractContextManager[Command]:
         """What an episode needs around it."""
-        ...
 
     def about(self) -> dict[str, Any]:
-        """What is told about it beside its figures."""
-        ...
+        """What is reported about it beside its figures."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +81,8 @@ class Campaign:
 
     def seconds_of(self, case: Case) -> float:
         """Length of a case's episodes [s]."""
+        from fulmar_core.tasks import load_task  # here, so that `fulmar --help` needs no NumPy
+
         return self.seconds or load_task(case.task).episode_s
 
 
@@ -98,7 +94,7 @@ def measure(
     Args:
         cases: What to run.
         campaign: How.
-        progress: Told how many episodes are over.
+        progress: Called with how many episodes are over.
 
     Returns:
         Figures of each case, ready for JSON.

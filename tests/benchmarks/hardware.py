@@ -16,7 +16,7 @@ from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.errors import FAILED, UnknownNameError
 from hardware_drivers.settings import MavlinkBoat, load_hardware
-from tests.benchmarks.closed_loops import Command
+from tests.benchmarks.closed_loops import Campaign, Command, measure
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,7 @@ def hardware(
         typer.Option(metavar="S", min=5.0, help="Length of an episode; the task's own by default."),
     ] = None,
     jobs: Annotated[
-        int,
-        typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each."),
+        int, typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each.")
     ] = 3,
     out: Annotated[
         Path | None,
@@ -92,7 +91,7 @@ def hardware(
     """Drive emulated devices to their goals, through driver and wire protocol, in real time, with the shipped policies.
 
     Each episode is `fulmar run --backend hardware --emulate` with a seed of its own. Success is that of `fulmar run`,
-    judged by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
+    by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
     With --out, a campaign that was broken off goes on where it was. The exit code is 1 where a device reaches its goal
     too rarely.
 
@@ -102,7 +101,6 @@ def hardware(
     """
     from fulmar_bringup.system import modules_of
     from fulmar_cli.extras import require
-    from tests.benchmarks.closed_loops import Campaign, measure
 
     cases = cases_of([name.strip() for name in only.split(",")] if only else None)
     for case in cases:

@@ -15,8 +15,8 @@ from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import FAILED, ConfigError
-from fulmar_evaluation.faults.two_hosts import ACROSS, Quality, two_hosts
-from tests.benchmarks.closed_loops import Command
+from fulmar_evaluation.faults.two_hosts import ACROSS, Quality, two_hosts, why_not
+from tests.benchmarks.closed_loops import Campaign, Command, measure
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,6 @@ def network(
     """
     from fulmar_bringup.system import modules_of
     from fulmar_cli.extras import require
-    from fulmar_evaluation.faults.two_hosts import Quality, why_not
-    from tests.benchmarks.closed_loops import Campaign, measure
 
     if why_not():
         raise ConfigError(f"{why_not()}.")

@@ -23,9 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 WARM_UP_STEPS = 300  # not counted: discovery, first calls, caches
-BLOCK_STEPS = (
-    25  # timed together; of all blocks the median counts, so that one in which a pair was held does not
-)
+# Steps that are timed together; of all blocks the median counts, so that one in which a pair was held does not.
+BLOCK_STEPS = 25
 TURN_S = 0.5
 CONTROLLERS = ("lqr", "policy")
 ROOT = Path(__file__).resolve().parents[2]
@@ -102,7 +101,7 @@ def serve(arguments: argparse.Namespace) -> None:
     from fulmar_ros.controller_node import ControllerNode
     from fulmar_ros.controller_wires import ControllerWires
     from fulmar_ros.goal_messages import goal_message
-    from policy_server.shipped import policies_directory
+    from policy_server.controllers import policies_directory
 
     policy = policies_directory() / f"{arguments.robot}_{arguments.task}"
     plan = RunPlan(
@@ -172,15 +171,8 @@ class Pair:
         self, root: Path, controller: str, mode: str, domain: int, arguments: argparse.Namespace
     ) -> None:
         steps = arguments.steps if mode == "profile" else arguments.rate_steps
-        command = [
-            root / ".venv" / "bin" / "python",
-            __file__,
-            "--serve",
-            "--mode",
-            mode,
-            "--steps",
-            str(steps),
-        ]
+        command = [root / ".venv" / "bin" / "python", __file__, "--serve", "--mode", mode]
+        command += ["--steps", str(steps)]
         command += ["--controller", controller, "--robot", arguments.robot, "--task", arguments.task]
         own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         self.root = root

@@ -21,8 +21,7 @@ from fulmar_core.policy_bundle import read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
-from policy_server.controllers import CONTROLLERS, Choice, load_controller
-from policy_server.shipped import shipped_policies
+from policy_server.controllers import CONTROLLERS, Choice, load_controller, shipped_policies
 from tests.inputs import some_of
 from tests.pairs import covering
 

@@ -12,7 +12,7 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.control_steps import answers_within, control_steps_of
 from fulmar_bags.wire_reader import ABSENT
 from fulmar_cli.main import app
-from fulmar_evaluation.report.bag_plots import write_pictures
+from fulmar_evaluation.report.bag_report import write_bag_report
 from tests.foreign_bag import write_foreign
 
 
@@ -34,7 +34,7 @@ def test_rerun_compares_them(tmp_path):
 
 def test_a_plot_shows_them_under_their_topic(tmp_path):
     bag = open_bag(write_foreign(tmp_path / "bag", StoragePlugin.MCAP, commands=True))
-    page = write_pictures(bag, tmp_path / "plot.html").read_text()
+    page = write_bag_report(bag, tmp_path / "plot.html").read_text()
     assert "What the actuators did: /cmd_vel" in page
 
 

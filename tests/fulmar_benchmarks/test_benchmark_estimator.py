@@ -12,15 +12,16 @@ from fulmar_core.robot import load_robot
 from tests.benchmarks.estimator.comparison import (
     DELAY_LIMIT_S,
     MEAN,
+    POSES,
     RATES_HZ,
     RMSE_SHARE_LIMIT,
     WITH_IMU,
+    ThirtyPoses,
     compare,
-    tell_by_mean,
-    verdict,
+    estimate_by_mean,
+    requirements_met,
 )
 from tests.benchmarks.estimator.drive import TICK_S, Drive, drives
-from tests.benchmarks.estimator.thirty_poses import POSES, ThirtyPoses
 
 pytest.importorskip("filterpy")
 ROBOT = load_robot("floating_platform")
@@ -43,9 +44,9 @@ def test_the_mean_of_thirty_poses_is_a_thirtieth_too_fast_as_published():
 
 
 def test_the_mean_tells_nothing_before_its_buffer_is_full():
-    told = tell_by_mean(steady_drive(2.0), 8, 0.0)
-    assert np.isnan(told[8 * 28]).all()
-    assert np.isfinite(told[8 * 30]).all()
+    reported = estimate_by_mean(steady_drive(2.0), 8, 0.0)
+    assert np.isnan(reported[8 * 28]).all()
+    assert np.isfinite(reported[8 * 30]).all()
 
 
 @pytest.mark.slow
@@ -61,11 +62,11 @@ def test_the_estimator_is_at_least_twice_as_good_and_less_than_20_ms_late_at_bot
     # And the mean is as late as its window says: half of 29 differences, and the latency.
     assert by[MEAN, 200.0].delay_ms == pytest.approx(72.5 + 10.0, abs=10.0)
     assert by[MEAN, 25.0].delay_ms == pytest.approx(580.0 + 20.0 + 10.0, abs=90.0)
-    assert all(line["passed"] for line in verdict(found))
+    assert all(line["passed"] for line in requirements_met(found))
 
 
-def test_the_verdict_says_no_when_the_estimator_is_no_better():
+def test_the_result_says_no_when_the_estimator_is_no_better():
     driven = drives(ROBOT, count=1, seconds=6.0, seed=3)
     found = compare(driven, load_estimator("mocap_imu"), ROBOT.limits, 0.0, lambda: None)
     worse = [dataclasses.replace(row, velocity_rmse_m_s=1.0) for row in found]
-    assert not any(line["passed"] for line in verdict(worse))
+    assert not any(line["passed"] for line in requirements_met(worse))

@@ -57,7 +57,7 @@ class Broken(Recounted):
         return contextlib.nullcontext(Command(("sh", "-c", script), (), {}))
 
 
-def test_a_run_without_figures_is_told_with_how_it_ended_and_what_was_wrong(tmp_path: Path) -> None:
+def test_a_run_without_figures_is_reported_with_how_it_ended_and_what_was_wrong(tmp_path: Path) -> None:
     (figures,) = measure([Broken("mine", tmp_path)], Campaign(1, 10.0, 1), lambda _done: None)
     (missed,) = figures["missed"]
     assert missed["failure"] == "it ended with 3, and last said: fulmar: no base answers"
@@ -75,7 +75,7 @@ def test_a_campaign_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> 
     assert case.notes.read_text().split() == ["2"]
 
 
-def test_a_device_without_an_emulator_is_told_with_the_nearest() -> None:
+def test_a_device_without_an_emulator_is_reported_with_the_nearest() -> None:
     assert [case.name for case in cases_of(None)] == [case.name for case in CASES]
     with pytest.raises(UnknownNameError, match="Did you mean 'kingfisher'"):
         cases_of(["kingfishr"])

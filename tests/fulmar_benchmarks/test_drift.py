@@ -11,12 +11,19 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from fulmar_benchmarks.cells import BAD, GOOD
-from fulmar_benchmarks.drift.asked import ASKED, requirements
 from fulmar_benchmarks.drift.cells import path_lines, pose_lines, unmet
 from fulmar_benchmarks.drift.conditions import CONDITIONS, CONTROLLERS, PATHS, ROWS
-from fulmar_benchmarks.drift.drop import BANDS, band_of, drop_percent
-from fulmar_benchmarks.drift.published import FIGURES, TRACKING, published
 from fulmar_benchmarks.drift.tables import print_tables
+from fulmar_benchmarks.drift.targets import (
+    BANDS,
+    FIGURES,
+    REQUIRED,
+    TRACKING,
+    band_of,
+    drop_percent,
+    published,
+    requirements,
+)
 from fulmar_cli.main import app
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import UnknownNameError
@@ -75,32 +82,32 @@ def test_every_key_is_written_down(document):
     assert [key for key in sorted(keys) if f"`{key}`" not in text] == []
 
 
-def test_what_was_judged_before_is_taken_from_the_folder(document, folder):
+def test_what_was_evaluated_before_is_taken_from_the_folder(document, folder):
     again = run(FEW, "--output", str(folder), "--json", "--no-report")
-    assert again.stderr.count("judged before") == 3
+    assert again.stderr.count("evaluated before") == 3
     timing = {"wall_s", "command"}
     assert {k: v for k, v in json.loads(again.stdout).items() if k not in timing} == {
         k: v for k, v in document.items() if k not in timing
     }
 
 
-def test_a_controller_that_cannot_drive_is_told_with_its_reason(tmp_path):
+def test_a_controller_that_cannot_drive_is_reported_with_its_reason(tmp_path):
     words = "benchmark drift --through batch --controllers policy --episodes 1 --rows ideal --no-report"
     result = run(words, "--policy", str(tmp_path / "none"), "--out", str(tmp_path))
     assert result.exit_code == 0, result.output
     assert "policy: missing: no policy is shipped" in result.stdout
-    assert "0 of 7 figures that are asked for are met; 7 could not be judged." in result.stdout
+    assert "0 of 7 figures that are required are met; 7 could not be evaluated." in result.stdout
     assert run(f"{words} --check", "--policy", str(tmp_path / "none"), "--out", str(tmp_path)).exit_code == 1
 
 
-def test_unknown_names_are_refused_before_anything_is_judged(tmp_path):
+def test_unknown_names_are_refused_before_anything_is_evaluated(tmp_path):
     for option, name in (("--rows", "storm"), ("--through", "air"), ("--controllers", "hand")):
         with pytest.raises(UnknownNameError, match=name):
             run("benchmark drift", option, name, "--out", str(tmp_path / "out"))
     assert not (tmp_path / "out").exists()
 
 
-def test_the_report_stands_alone_and_its_pictures_are_small(document, folder):
+def test_the_report_stands_alone_and_its_plots_are_small(document, folder):
     text = (folder / "index.html").read_text()
     assert not re.search(r'@import|url\((?!#)|src="http|href="http', text)
     for words in ("Go to pose under disturbances", "2 thrusters lost", "bound", "Square", "0–20 %"):
@@ -136,15 +143,15 @@ def test_published_tables_have_every_row_and_every_scenario_exists():
     assert [published("torque", name)[0] for name in ("policy", "lqr")] == ["RL", "LQR"]
     assert published("torque", "mpc") == published("torque", "lqr") != published("torque", "policy")
     assert set(TRACKING) == {path.name for path in PATHS}
-    assert all(row in ROWS for rows in ASKED.values() for row in rows)
-    assert set(ASKED) == set(CONTROLLERS)
+    assert all(row in ROWS for rows in REQUIRED.values() for row in rows)
+    assert set(REQUIRED) == set(CONTROLLERS)
 
 
 def test_a_figure_meets_what_is_asked_on_its_own_side_of_the_limit():
     gas = next(one for one in requirements("ideal", "policy") if one.figure == "AAS")
     place = next(one for one in requirements("ideal", "policy") if one.figure == "PT5")
-    assert (gas.verdict(0.09).met, gas.verdict(0.0901).met) == (True, False)
-    assert (place.verdict(80.0).met, place.verdict(79.96).met, place.verdict(None).met) == (True, False, None)
+    assert (gas.check(0.09).met, gas.check(0.0901).met) == (True, False)
+    assert (place.check(80.0).met, place.check(79.96).met, place.check(None).met) == (True, False, None)
 
 
 def test_the_table_marks_what_is_met_and_colours_what_is_lost(document):
@@ -163,7 +170,7 @@ def test_the_table_marks_what_is_met_and_colours_what_is_lost(document):
     assert [line.kind for line in path_lines(changed)] == ["ours", "published"]
 
 
-def test_episodes_whose_pose_can_be_held_are_told_beside_all(document):
+def test_episodes_whose_pose_can_be_held_are_reported_beside_all(document):
     changed = json.loads(json.dumps(document))
     row = changed["rows"]["two_lost"]
     where = {figure: {"mean": 50.0} for figure in FIGURES}
@@ -173,7 +180,7 @@ def test_episodes_whose_pose_can_be_held_are_told_beside_all(document):
     assert (lines[1].controller, lines[1].cells[0].text) == ("feasible 50 %", "50")
 
 
-def test_people_get_both_tables_with_marks_and_a_verdict(document, capsys):
+def test_people_get_both_tables_with_marks_and_a_result(document, capsys):
     print_tables(document, Console(highlight=False))
     text = capsys.readouterr().out
     for words in (
@@ -181,7 +188,7 @@ def test_people_get_both_tables_with_marks_and_a_verdict(document, capsys):
         "DRIFT's LQR",
         "Paths followed",
         "±",
-        "figures that are asked for",
+        "figures that are required",
     ):
         assert words in text
     assert "✓" in text or "✗" in text

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.drift.approach_bound import approach_bound
-from fulmar_benchmarks.drift.holdable_episodes import can_hold_episodes
+from fulmar_benchmarks.drift.bounds import approach_bound, can_hold_episodes
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
 from fulmar_core.errors import ConfigError
@@ -105,7 +104,7 @@ def test_every_condition_of_the_benchmark_but_two_lost_valves_can_be_held(scenar
     assert np.mean(can_hold_episodes(PLATFORM, drawn(scenario))) == share
 
 
-def test_episodes_are_judged_by_their_own_lost_valves():
+def test_episodes_are_evaluated_by_their_own_lost_valves():
     episodes = drawn("drift_two_lost")
     able = can_hold_episodes(PLATFORM, episodes)
     lost = [tuple(np.flatnonzero(column == 0.0)) for column in episodes.world.alive.T]

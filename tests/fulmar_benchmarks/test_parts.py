@@ -9,16 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks import bound_file, pairs, work
+from fulmar_benchmarks import pairs, results, workers
 from fulmar_benchmarks import unit as units
-from fulmar_benchmarks.outcomes import QUANTILES, Judged
 from fulmar_benchmarks.pairs import code_hash, find_pair, units_of
-from fulmar_benchmarks.required import LEAST, judged_figure, verdicts
+from fulmar_benchmarks.results import QUANTILES, PairResult
 from fulmar_benchmarks.roboran.campaign import document_of
 from fulmar_benchmarks.roboran.document import wilson
-from fulmar_benchmarks.roboran.published import ROBOTS, TABLE, TASKS, thesis_row
+from fulmar_benchmarks.roboran.targets import LEAST, ROBOTS, TABLE, TASKS, checks_of, main_figure, thesis_row
 from fulmar_benchmarks.unit import done_already
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 GOOD = {"batch": 0.995, "mujoco": 0.992}
 
@@ -40,8 +39,8 @@ def test_the_thesis_times_are_control_steps_and_ours_are_seconds():
 
 def test_something_is_required_of_every_pair_of_the_benchmark():
     assert all(0.7 < LEAST[task][robot] < 1.0 for task in TASKS for robot in ROBOTS)
-    assert judged_figure("go_through_positions") == "share_of_bound"
-    assert judged_figure("go_to_pose") == "success_rate"
+    assert main_figure("go_through_positions") == "share_of_bound"
+    assert main_figure("go_to_pose") == "success_rate"
 
 
 @pytest.mark.parametrize(
@@ -53,7 +52,7 @@ def test_something_is_required_of_every_pair_of_the_benchmark():
     ],
 )
 def test_a_pair_is_compared_with_every_requirement(changed, unmet):
-    found = verdicts("floating_platform", "go_to_pose", GOOD | changed, same=True, training_s=59.0)
+    found = checks_of("floating_platform", "go_to_pose", GOOD | changed, same=True, training_s=59.0)
     assert {one.name for one in found if one.met is False} == unmet
     assert {one.name for one in found} == {
         "batch", "mujoco", "batch_minus_mujoco", "same_at_64_worlds", "training_s",
@@ -66,19 +65,19 @@ def test_platform_poses_train_within_a_minute_and_other_pairs_within_five():
         ("kingfisher", 61.0, True),
         ("kingfisher", 301.0, False),
     ):
-        found = verdicts(robot, "go_to_pose", GOOD, same=True, training_s=seconds)
+        found = checks_of(robot, "go_to_pose", GOOD, same=True, training_s=seconds)
         assert found[-1].met is met
 
 
 def test_what_was_not_measured_is_neither_met_nor_unmet():
-    found = verdicts("kingfisher", "go_to_pose", {"batch": 0.95}, same=None, training_s=None)
+    found = checks_of("kingfisher", "go_to_pose", {"batch": 0.95}, same=None, training_s=None)
     assert {one.name: one.met for one in found} == {
         "batch": True,
         "mujoco": None,
         "batch_minus_mujoco": None,
         "same_at_64_worlds": None,
     }
-    assert verdicts("jetbot", "go_to_pose", GOOD, same=True, training_s=1.0) == []
+    assert checks_of("jetbot", "go_to_pose", GOOD, same=True, training_s=1.0) == []
 
 
 def test_the_interval_of_a_share_holds_it_and_shrinks_with_episodes():
@@ -90,10 +89,10 @@ def test_the_interval_of_a_share_holds_it_and_shrinks_with_episodes():
 
 def test_an_outcome_is_read_as_it_was_written(tmp_path):
     unit = unit_of(tmp_path)
-    told = []
-    outcome = units.judge(unit, told.append)
-    again = Judged.load(unit.path)
-    for field in dataclasses.fields(Judged):
+    reported = []
+    outcome = units.run_unit(unit, reported.append)
+    again = PairResult.load(unit.path)
+    for field in dataclasses.fields(PairResult):
         value, other = getattr(outcome, field.name), getattr(again, field.name)
         if field.name == "figures":
             assert list(value) == list(other)
@@ -105,14 +104,14 @@ def test_an_outcome_is_read_as_it_was_written(tmp_path):
             np.testing.assert_array_equal(value, other)
     assert outcome.over_time.shape == (len(QUANTILES), 300)
     assert outcome.paths.shape == (3, 300, 3)
-    assert told[-1] == unit.cost == 3 * 300
+    assert reported[-1] == unit.cost == 3 * 300
     assert outcome.about["same_at_64_worlds"] is True
 
 
 def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
     unit = unit_of(tmp_path)
     assert unit.done_before() is None
-    units.judge(unit)
+    units.run_unit(unit)
     assert unit.done_before() is not None
     assert replace(unit, trial=replace(unit.trial, episodes=4)).done_before() is None
     assert replace(unit, defines="other code").done_before() is None
@@ -120,10 +119,10 @@ def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
     assert unit.done_before() is None
 
 
-def test_what_was_judged_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path):
+def test_what_was_evaluated_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path):
     unit = unit_of(tmp_path)
     assert done_already([unit], fresh=False) == {}
-    outcome = units.judge(unit)
+    outcome = units.run_unit(unit)
     assert done_already([unit], fresh=False)[unit].about["key"] == outcome.about["key"]
     assert done_already([unit], fresh=True) == {}
 
@@ -136,14 +135,14 @@ def test_an_outcome_does_not_depend_on_where_the_policy_lies(tmp_path):
 
 def test_small_batches_give_the_same_numbers(tmp_path):
     unit = unit_of(tmp_path, robot="turtlebot2", episodes=units.FEW_WORLDS + 6)
-    outcome = units.judge(unit)
+    outcome = units.run_unit(unit)
     assert outcome.about["same_at_64_worlds"] is True
     assert outcome.about["compared_episodes"] == units.FEW_WORLDS + 6
 
 
 def test_waypoints_are_counted_over_an_episode_over_a_thousand_steps_and_over_as_long_as_the_thesis(tmp_path):
     unit = unit_of(tmp_path, task="go_through_positions", episodes=2)
-    outcome = units.judge(unit)
+    outcome = units.run_unit(unit)
     figures = outcome.figures
     assert outcome.over_time.shape[1] == 1000
     assert outcome.paths.shape[1] == 300, "60 s at 5 Hz"
@@ -158,14 +157,14 @@ def test_waypoints_are_counted_over_an_episode_over_a_thousand_steps_and_over_as
 def test_a_bound_is_computed_once_and_kept(tmp_path, monkeypatch):
     trial = unit_of(tmp_path, robot="turtlebot2", task="go_through_positions").trial
     drawn = trial.drawn(np.arange(2))
-    first = bound_file.cached_bound(trial, drawn, 5.0, tmp_path)
-    monkeypatch.setattr(bound_file, "waypoint_bound", lambda *_: pytest.fail("computed again"))
-    again = bound_file.cached_bound(trial, drawn, 5.0, tmp_path)
+    first = results.cached_bound(trial, drawn, 5.0, tmp_path)
+    monkeypatch.setattr(results, "waypoint_bound", lambda *_: pytest.fail("computed again"))
+    again = results.cached_bound(trial, drawn, 5.0, tmp_path)
     np.testing.assert_array_equal(again.goals, first.goals)
     np.testing.assert_array_equal(again.goals_at_top_speed, first.goals_at_top_speed)
     assert (again.name, again.rule) == (first.name, first.rule)
     with pytest.raises(pytest.fail.Exception):
-        bound_file.cached_bound(trial, drawn, 6.0, tmp_path)
+        results.cached_bound(trial, drawn, 6.0, tmp_path)
 
 
 def test_the_hash_of_the_code_knows_the_simulator_only_where_it_is_used():
@@ -208,10 +207,10 @@ def test_the_fault_of_one_unit_is_a_sentence_and_costs_no_other(tmp_path, monkey
         raise RuntimeError("it broke")
 
     unit = unit_of(tmp_path, way="ros", episodes=1)
-    monkeypatch.setattr(work, "judge", broken)
+    monkeypatch.setattr(workers, "run_unit", broken)
     seen = []
-    outcomes = work.do_all(
-        [unit], jobs=1, progress=lambda done: None, on_done=lambda *told: seen.append(told)
+    outcomes = workers.do_all(
+        [unit], jobs=1, progress=lambda done: None, on_done=lambda *reported: seen.append(reported)
     )
     assert outcomes == {unit: "RuntimeError: it broke"}
     assert seen == [(unit, "RuntimeError: it broke")]

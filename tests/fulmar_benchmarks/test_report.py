@@ -9,11 +9,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.outcomes import QUANTILES, Judged
 from fulmar_benchmarks.pairs import Pair
-from fulmar_benchmarks.roboran.campaign import Findings, document_of
+from fulmar_benchmarks.results import QUANTILES, PairResult
+from fulmar_benchmarks.roboran.campaign import CampaignResult, document_of
 from fulmar_benchmarks.roboran.document import pair_entry
-from fulmar_benchmarks.roboran.published import ROBOTS, TASKS
+from fulmar_benchmarks.roboran.targets import ROBOTS, TASKS
 from fulmar_benchmarks.unit import KEPT
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
@@ -53,7 +53,7 @@ class Page(HTMLParser):
         self.words.append(data)
 
 
-def outcome(robot, task, way, rng) -> Judged:
+def outcome(robot, task, way, rng) -> PairResult:
     """Numbers at random, of the right shapes."""
     the_robot, the_task = load_robot(robot), load_task(task)
     steps, dt = 60, 1.0
@@ -68,7 +68,7 @@ def outcome(robot, task, way, rng) -> Judged:
         "control_dt": dt, "control_hz": 1.0, "episode_s": 60.0, "wall_s": 1.0, "control_steps": 1, "seed": 1,
         "scenario": "nominal", "same_at_64_worlds": True, "thousand_steps_s": 1000.0, "bound": "a bound",
     }  # fmt: skip
-    return Judged(
+    return PairResult(
         about=about if task == "go_through_positions" else {k: v for k, v in about.items() if k != "bound"},
         succeeded=rng.uniform(size=EPISODES) < 0.97,
         figures=figures,
@@ -103,7 +103,7 @@ def findings():
         command="fulmar x",
         wall_s=1.0,
     )
-    return Findings(document, list(outcomes), outcomes)
+    return CampaignResult(document, list(outcomes), outcomes)
 
 
 @pytest.fixture(scope="module")
@@ -125,11 +125,11 @@ def test_the_page_shows_every_pair_and_every_task(written):
     for title in ("Go to position", "Go to pose", "Track velocities", "Go through positions", "obstacles"):
         assert title in words
     assert words.count("floating platform") >= len(TASKS)
-    assert "nobody <drives> it" in words, "what is missing is told, not left out"
+    assert "nobody <drives> it" in words, "what is missing is reported, not left out"
     assert "✓" in words
 
 
-def test_every_picture_has_a_caption_and_a_file_below_half_a_megabyte(written):
+def test_every_plot_has_a_caption_and_a_file_below_half_a_megabyte(written):
     text = written.read_text()
     page = Page(text)
     pictures = sorted((written.parent / "pictures").glob("*.png"))
@@ -146,30 +146,30 @@ def test_a_page_says_what_every_figure_means(written):
         assert meaning in words
 
 
-def test_a_task_that_nobody_did_has_no_pictures(findings, tmp_path):
+def test_a_task_that_nobody_did_has_no_plots(findings, tmp_path):
     from fulmar_benchmarks.roboran.report import write_report
 
     pair = Pair("turtlebot2", "go_to_pose", "policy", reason="no policy is shipped")
     entries = [pair_entry(pair, {})]
     document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.1)
-    page = write_report(Findings(document, [pair], {pair: {}}), tmp_path)
+    page = write_report(CampaignResult(document, [pair], {pair: {}}), tmp_path)
     assert "no policy is shipped" in page.read_text()
     assert len(list((tmp_path / "pictures").iterdir())) == 1
 
 
-@pytest.mark.parametrize("picture", ["draw_courses", "draw_scenes_with_obstacles"])
-def test_ways_are_seen_whole_unless_they_lead_far_away(findings, picture):
-    from fulmar_benchmarks.roboran.report import scene_picture
+@pytest.mark.parametrize("plot", ["draw_waypoint_paths", "draw_scenes_with_obstacles"])
+def test_ways_are_seen_whole_unless_they_lead_far_away(findings, plot):
+    from fulmar_benchmarks.roboran.report import path_plots
     from fulmar_benchmarks.roboran.report.view import views
 
-    task = "go_through_positions" if picture == "draw_courses" else "go_to_position_with_obstacles"
+    task = "go_through_positions" if plot == "draw_waypoint_paths" else "go_to_position_with_obstacles"
     runs = views(findings, task)
     near, far = (
         replace(run.main, paths=run.main.paths + shift)
         for run, shift in zip(runs[:2], (2.5, 60.0), strict=True)
     )
     runs = [replace(run, outcomes={"batch": main}) for run, main in zip(runs[:2], (near, far), strict=True)]
-    axes = getattr(scene_picture, picture)(runs).axes
+    axes = getattr(path_plots, plot)(runs).axes
     for one in axes:
         (left, right), (low, high) = one.get_xlim(), one.get_ylim()
         ways = np.concatenate([line.get_xydata() for line in one.lines])
@@ -180,10 +180,10 @@ def test_ways_are_seen_whole_unless_they_lead_far_away(findings, picture):
 
 @pytest.mark.parametrize("low", [0.2, 0.5, 0.81, 0.9])
 def test_the_overview_marks_its_scale_where_its_numbers_say(findings, low):
-    from fulmar_benchmarks.roboran.report.headline_plot import draw_headline
+    from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
 
     entries = [entry | {"judged": {"batch": low}} for entry in findings.document["pairs"][:1]]
-    figure = draw_headline(findings.document | {"pairs": entries})
+    figure = draw_glance(findings.document | {"pairs": entries})
     figure.canvas.draw()
     (axes,) = figure.axes
     for at, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):

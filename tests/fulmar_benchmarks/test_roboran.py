@@ -55,30 +55,30 @@ def test_every_key_is_written_down(judged):
     assert [key for key in sorted(keys) if f"`{key}`" not in text] == []
 
 
-def test_what_was_judged_before_is_taken_from_the_folder(judged, folder):
+def test_what_was_evaluated_before_is_taken_from_the_folder(judged, folder):
     again = run(f"{FEW} --controllers policy,classical", "--out", str(folder), "--json")
     timing = {"wall_s", "command"}
     first, second = json.loads(judged.stdout), json.loads(again.stdout)
     assert {k: v for k, v in first.items() if k not in timing} == {
         k: v for k, v in second.items() if k not in timing
     }
-    assert again.stderr.count("judged before") == 2
+    assert again.stderr.count("evaluated before") == 2
 
 
-def test_people_get_tables_with_what_is_missing_and_a_verdict(judged, folder, tmp_path):
+def test_people_get_tables_with_what_is_missing_and_a_result(judged, folder, tmp_path):
     result = run(f"{FEW} --policies {tmp_path} --controllers policy,classical", "--out", str(folder))
     assert result.exit_code == 0, result.output
     assert "Go to pose, floating platform: missing: no policy is shipped" in result.stdout
     assert "floating platform, LQR" in result.stdout
     assert "time to target [s]" in result.stdout
-    assert "0 of 1 pairs meet everything" in result.stdout
+    assert "0 of 1 pairs meet every requirement" in result.stdout
 
 
 def test_a_check_that_cannot_be_met_ends_with_one(judged, folder):
     assert run(f"{FEW} --check", "--out", str(folder)).exit_code == 1
 
 
-def test_unknown_names_are_refused_before_anything_is_judged(tmp_path):
+def test_unknown_names_are_refused_before_anything_is_evaluated(tmp_path):
     for option, name in (("--robots", "boat"), ("--through", "air"), ("--controllers", "hand")):
         with pytest.raises(UnknownNameError, match=name):
             run("benchmark roboran", option, name, "--out", str(tmp_path / "out"))

@@ -65,7 +65,7 @@ def test_boats_are_rolled_out_in_the_very_water_of_the_plant():
     thrusts = np.tile(np.asarray(BOAT.actuators.thrust(full)), (3, 1))
     for _ in range(200):
         rolled_out.step(thrusts)
-        plant.machine.drive(plant.model, plant.data, full, np.ones(2), (0.0, 0.0, 0.0))
+        plant.robot_model.drive(plant.model, plant.data, full, np.ones(2), (0.0, 0.0, 0.0))
         mujoco.mj_step(plant.model, plant.data)
     moved = np.concatenate(([plant.data.time], plant.data.qpos, plant.data.qvel))
     assert np.abs(plant.data.qvel[5]) > 0.1  # it turns
@@ -108,7 +108,7 @@ def test_without_a_compiler_numpy_computes_the_batch_and_says_so(command, monkey
 
 
 @ONE_OR_TWO_CORES
-def test_whoever_asks_for_compiled_steps_is_told_that_a_compiler_is_missing(command, monkeypatch, cores):
+def test_whoever_asks_for_compiled_steps_reads_that_a_compiler_is_missing(command, monkeypatch, cores):
     pytest.importorskip("torch")
     monkeypatch.setenv("CXX", "no-such-compiler")
     assert "python3-dev" in str(command(*SMALL, "--cores", cores, library="compiled").exception)

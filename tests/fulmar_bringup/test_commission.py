@@ -27,7 +27,7 @@ from fulmar_ros.convert import VectorWriter, stamp_of
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 from hardware_drivers.settings import hardware_path, load_hardware
-from hardware_drivers.valve_message import to_message
+from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channels
 
 ROBOT = load_robot("floating_platform")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fulmar_bringup.goal_plan import check_heading, default_task
-from fulmar_cli.commands.arguments import read_goal
+from fulmar_cli.commands.values import read_goal
 from fulmar_core.errors import ConfigError
 
 

@@ -13,10 +13,9 @@ from fulmar_bags.run_record import HealthSample, read_run
 from fulmar_bringup import run_executor
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
-from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import RunFailed
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
-from fulmar_evaluation.run_summary import summarise
+from fulmar_evaluation.run_summary import summarise, summary_text
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mock", 5.0)
 PRESSED = "e-stop: pressed. Reset it: fulmar estop --reset: actuators in their safe state"
@@ -76,7 +75,7 @@ def test_the_result_says_that_the_e_stop_was_pressed_and_what_does_not_fit(reach
     pressed, *others = summary["warnings"]
     assert "e-stop was pressed" in pressed
     assert others == ["one", "two"]
-    assert f"  warning: {pressed}\n  warning: one\n  warning: two\n" in verdict(summary)
+    assert f"  warning: {pressed}\n  warning: one\n  warning: two\n" in summary_text(summary)
 
 
 def test_a_press_after_the_plant_has_finished_is_none_of_the_run(reached):

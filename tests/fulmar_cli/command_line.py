@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import shipped_policy
 
 RUN = ["run", "floating_platform"]
 EVALUATE = ["evaluate", "floating_platform", "go_to_pose", "--controller", "lqr", "--through", "batch"]

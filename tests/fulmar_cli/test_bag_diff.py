@@ -139,3 +139,10 @@ def test_a_diff_names_the_field_and_the_time_of_the_first_difference(copy, tmp_p
     assert field["found"] - field["recorded"] == pytest.approx(0.25)
     assert log == topic.log_ns[7]
     assert answer("diff", copy, tmp_path / "changed", "--tolerance", "0.3")["same"]
+
+
+def test_a_diff_of_two_runs_ends_with_the_command_that_compares_runs():
+    assert ask("diff", POLICY, LQR).output.endswith(
+        f"to compare the two runs: fulmar report {POLICY} {LQR}\n"
+    )
+    assert "fulmar report" not in ask("diff", POLICY, LQR, "--json").output

@@ -35,7 +35,7 @@ def test_info_tells_what_the_recorder_dropped_and_which_packages_it_ran_with(tmp
     assert found["provenance"]["made_by"]["python"] == "3.12.1"
     assert found["provenance"]["uncommitted_changes"] is True
     assert found["provenance"]["recorded_to_its_end"] is False
-    assert "did not come to an orderly end" in ask("info", tmp_path / "bag").stdout
+    assert "was not shut down in order" in ask("info", tmp_path / "bag").stdout
 
 
 def test_info_tells_counts_rates_and_where_a_bag_comes_from():
@@ -101,7 +101,7 @@ def test_info_tells_when_and_why_a_ring_was_written(tmp_path, closed):
         bag.flush()
     assert answer("info", tmp_path / "bag")["faults"] == [fault]
     assert re.search(
-        r"written for a fault at 2023-11-1\d .*: plant: the watchdog tripped",
+        r"recorded around a fault at 2023-11-1\d .*: plant: the watchdog tripped",
         ask("info", tmp_path / "bag").stdout,
     )
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import importlib.util
 import shutil
 from pathlib import Path
+from typing import Annotated
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
+from fulmar_bringup.console import write_line
 from fulmar_cli.commands import benchmark as commands
+from fulmar_cli.commands.arguments import renamed
 from fulmar_core.errors import ConfigError
 
 MACHINERY = sorted(commands.OF_A_CHECKOUT)
@@ -39,3 +43,21 @@ def test_elsewhere_each_says_that_it_needs_a_checkout(name, tmp_path):
     assert isinstance(done.exception, ConfigError)
     assert f"`fulmar benchmark {name}`" in str(done.exception)
     assert "Run it from a checkout, after `make dev`." in str(done.exception)
+
+
+def test_the_old_name_of_an_option_works_is_hidden_and_warns():
+    app = typer.Typer()
+
+    @app.command()
+    def draw(plot: str = "", old_plot: Annotated[str | None, renamed("--picture", "--plot")] = None) -> None:
+        write_line(plot or old_plot)
+
+    run = CliRunner().invoke
+    assert "--picture" not in run(app, ["--help"]).output
+    done = run(app, ["--picture", "a.png"])
+    assert done.stdout == "a.png\n"
+    assert (
+        done.stderr
+        == "warning: --picture is now called --plot; the old name will be removed in the next release\n"
+    )
+    assert run(app, ["--plot", "a.png"]).stderr == ""

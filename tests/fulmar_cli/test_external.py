@@ -20,10 +20,9 @@ from fulmar_bringup.planning import plan_run
 from fulmar_bringup.readiness import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
-from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_core.wire_check import Offer
-from fulmar_evaluation.run_summary import summarise
+from fulmar_evaluation.run_summary import summarise, summary_text
 from fulmar_ros.recorder_health import COMMANDERS
 from tests.fulmar_cli.command_line import complaint
 from tests.synthetic_run import Plan, write_run
@@ -190,14 +189,14 @@ def test_commands_without_a_stamp_count_and_have_no_latency(external):
     assert summary["control_rate_hz"] == pytest.approx(5.0, rel=0.01)
     for figure in ("latency_ms", "inference_ms", "period_error_ms"):
         assert summary[figure] == {"p50": None, "p99": None, "max": None}
-    assert "  81 commands; 2 overruns, 0 watchdog trips\n" in verdict(summary)
+    assert "  81 commands; 2 overruns, 0 watchdog trips\n" in summary_text(summary)
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
 def test_what_is_unknown_of_a_run_is_not_printed(external):
     summary = summarise(replace(read_run(external), health=()))
     assert (summary["watchdog_trips"], summary["overruns"]) == (None, None)
-    assert "  81 commands\n" in verdict(summary)
+    assert "  81 commands\n" in summary_text(summary)
 
 
 def test_the_bag_of_an_external_controller_is_described_compared_and_reported(external, reached, fulmar):
@@ -231,4 +230,4 @@ def test_a_rerun_refuses_an_external_controller_and_compares_another(external, r
 @pytest.mark.parametrize("through", ["batch", "mujoco", "ros"])
 def test_an_evaluation_refuses_an_external_controller(through, fulmar):
     words = ("turtlebot2", "go_to_position", "--controller", "external", "--through", through)
-    assert "a node of your own, which no evaluation can begin anew" in complaint(fulmar("evaluate", *words))
+    assert "a node of your own, which no evaluation can restart" in complaint(fulmar("evaluate", *words))

@@ -13,8 +13,8 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_record import read_any_run
 from fulmar_core.errors import BagError
-from fulmar_evaluation.report.sources import check_overwrite, default_report, source_mark
-from fulmar_evaluation.run_evaluation import judge
+from fulmar_evaluation.report.writer import check_overwrite, default_report, source_mark
+from fulmar_evaluation.run_evaluation import evaluate_run
 from tests.foreign_bag import write_foreign
 from tests.fulmar_cli.bag_commands import LQR, POLICY
 from tests.fulmar_cli.command_line import complaint
@@ -85,14 +85,14 @@ def test_a_bag_without_a_task_is_shown_as_far_as_it_goes_and_evaluated_with_task
 def test_a_robot_under_another_name_needs_robot(hand_started):
     bag = hand_started(space="platform_3")
     with pytest.raises(BagError, match=r"names no robot.*--robot"):
-        judge(read_any_run(bag, task="go_to_pose"))
-    assert judge(read_any_run(bag, task="go_to_pose", robot="floating_platform")).success
+        evaluate_run(read_any_run(bag, task="go_to_pose"))
+    assert evaluate_run(read_any_run(bag, task="go_to_pose", robot="floating_platform")).success
 
 
 def test_a_bag_without_a_goal_says_so(hand_started):
     record = read_any_run(hand_started("goal_pose"), task="go_to_pose")
     with pytest.raises(BagError, match="holds no goal on goal_pose"):
-        judge(record)
+        evaluate_run(record)
 
 
 def test_several_bags_without_a_task_are_not_compared(fulmar, hand_started):

@@ -20,8 +20,7 @@ from fulmar_core.calibration import Calibration, Measured, calibration_path, sav
 from fulmar_core.errors import ConfigError
 from training.jobs import Outcome
 from training.progress import LearningBar
-from training.run_folder import read_start, write_start
-from training.run_lock import learning_in
+from training.run_folder import learning_in, read_start, write_start
 from training.settings import StopAtSuccess
 
 PLATFORM = ("floating_platform", "go_to_pose")
@@ -114,7 +113,9 @@ def learned(monkeypatch):
         return {"steps": 1000, "wall_s": 2.0}
 
     monkeypatch.setattr("training.jobs.learn", learn)
-    monkeypatch.setattr("training.evaluator.judge_in_mujoco", lambda run, episodes: {"success_rate": 0.875})
+    monkeypatch.setattr(
+        "training.evaluator.evaluate_in_mujoco", lambda run, episodes: {"success_rate": 0.875}
+    )
     return jobs
 
 
@@ -144,7 +145,7 @@ def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_pat
         raise KeyboardInterrupt
 
     monkeypatch.setattr("training.jobs.learn", broken_off)
-    monkeypatch.setattr("fulmar_cli.commands.train.console", Console(file=said, width=500))
+    monkeypatch.setattr("fulmar_bringup.console.console", Console(file=said, width=500))
     assert call(train, *PLATFORM, "--out", run)[0] != 0
     offers = {"--resume": f"fulmar train --resume {run}", "export": f"fulmar export {run} --out"}
     assert {word for word, offer in offers.items() if offer in said.getvalue()} == told
@@ -169,7 +170,7 @@ def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):
 )
 def test_training_says_when_it_ends_early(learned, monkeypatch, tmp_path, more, line):
     printed = io.StringIO()
-    monkeypatch.setattr("fulmar_cli.commands.train.console", Console(file=printed, width=500))
+    monkeypatch.setattr("fulmar_bringup.console.console", Console(file=printed, width=500))
     assert call(train, *PLATFORM, *more, "--out", tmp_path / "run")[0] == 0
     assert line in printed.getvalue()
 
@@ -222,7 +223,7 @@ def test_two_trainings_do_not_learn_in_one_folder(learned, tmp_path):
 def test_who_comes_second_to_a_folder_does_not_go_on_with_what_the_first_began(
     learned, tmp_path, monkeypatch
 ):
-    from training import run_lock
+    from training import run_folder
 
     @contextlib.contextmanager
     def late(run):
@@ -230,7 +231,7 @@ def test_who_comes_second_to_a_folder_does_not_go_on_with_what_the_first_began(
         (run / "start.json").write_text("{}")
         yield
 
-    monkeypatch.setattr(run_lock, "learning_in", late)
+    monkeypatch.setattr(run_folder, "learning_in", late)
     with pytest.raises(ConfigError, match="another training began there"):
         call(train, *PLATFORM, "--out", tmp_path / "run")
     assert not learned

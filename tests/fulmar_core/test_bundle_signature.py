@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from fulmar_core.bundle_signature import make_keys, sign_bundle, verify_bundle
 from fulmar_core.errors import BundleError, ConfigError, FulmarError
 from fulmar_core.policy_bundle import PASSPORT, SIGNATURE, read_bundle, read_passport
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 pytest.importorskip("cryptography")
 SHIPPED = policies_directory() / "floating_platform_go_to_pose"

@@ -331,8 +331,7 @@ def test_a_name_that_no_thing_can_have_is_refused_with_the_line_of_the_user(own,
 
 def test_no_law_no_excitation_and_no_shipped_bundle_knows_it(own):
     from fulmar_bringup.plan_checks import checked_policy
-    from policy_server.controllers import controller_entry
-    from policy_server.shipped import shipped_policy
+    from policy_server.controllers import controller_entry, shipped_policy
 
     task = load_task(own())
     with pytest.raises(

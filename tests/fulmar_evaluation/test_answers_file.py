@@ -1,4 +1,4 @@
-"""What `fulmar bag rerun` tells besides differences: the answers themselves, and why none was asked for."""
+"""What `fulmar bag rerun` shows besides differences: the answers, and why steps have none."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fulmar_core.topics import ACTION, METADATA, ODOMETRY
 from tests.foreign_bag import write_foreign
 
 POLICY = Path(__file__).resolve().parents[1] / "replay" / "bags" / "floating_platform_go_to_pose_policy"
-ASKED = ("--controller", "policy", "--robot", "turtlebot2", "--task", "go_to_position", "--goal", "0,0,0")
+REQUIRED = ("--controller", "policy", "--robot", "turtlebot2", "--task", "go_to_position", "--goal", "0,0,0")
 
 
 def ask(*words: object):
@@ -56,12 +56,12 @@ def copied(folder: Path, *, info: dict | None = None, said: tuple[str, ...] = ()
 
 def test_answers_to_a_bag_of_others_are_written_and_exit_code_1_says_that_nothing_was_compared(tmp_path):
     bag = write_foreign(tmp_path / "bag", StoragePlugin.MCAP)
-    done = ask("rerun", bag, *ASKED, "--out", tmp_path / "answers.csv")
+    done = ask("rerun", bag, *REQUIRED, "--out", tmp_path / "answers.csv")
     assert done.exit_code == 1
-    assert "nothing was recorded that its answers could be compared with" in done.output
+    assert "the bag holds no answers to compare with" in done.output
     with (tmp_path / "answers.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    assert ask("rerun", bag, *ASKED, "--out", tmp_path / "answers.npz").exit_code == 1
+    assert ask("rerun", bag, *REQUIRED, "--out", tmp_path / "answers.npz").exit_code == 1
     arrays = np.load(tmp_path / "answers.npz", allow_pickle=False)
     assert len(rows) == len(arrays["command"]) > 30
     assert [float(row["command.speed"]) for row in rows] == arrays["command"][:, 0].tolist()
@@ -98,7 +98,7 @@ def test_the_controller_that_began_is_compared_and_the_others_are_told(tmp_path)
     assert found["sha256"] == found["recorded_sha256"] == found["recorded_sha256s"][0]
     assert found["recorded_sha256s"][1:] == ["0" * 64]
     assert len(controllers_of(open_bag(bag))) == 2
-    assert "2 controllers had their turn" in ask("rerun", bag).output
+    assert "the run used 2 controllers one after another" in ask("rerun", bag).output
 
 
 @pytest.mark.parametrize("option", [("--goal", "0,0,0"), ("--odometry", "/odom")])

@@ -7,16 +7,16 @@ import pytest
 from scipy.optimize import brentq, minimize, minimize_scalar
 
 from fulmar_evaluation.bounds import goals_reached, shortest_lengths, time_optimal_bound, top_speed_bound
+from fulmar_evaluation.bounds.disc_tour import DiscTour, is_inside, stop_and_go
 from fulmar_evaluation.bounds.least_time import least_times
-from fulmar_evaluation.bounds.reach import log_barrier, reach_slack
-from fulmar_evaluation.bounds.waypoint_course import Course, is_inside, stop_and_go
+from fulmar_evaluation.bounds.reachable_set import log_barrier, reach_slack
 
 RADIUS = 0.2
 PLATFORM = 1.0 / 5.32  # m/s²: 1 N on 5.32 kg
 STILL = np.zeros(2)
 
 
-def courses(episodes: int, waypoints: int = 8, seed: int = 0) -> np.ndarray:
+def tours(episodes: int, waypoints: int = 8, seed: int = 0) -> np.ndarray:
     """Waypoints 1 to 5 m apart, shape (episodes, waypoints, 2)."""
     rng = np.random.default_rng(seed)
     length = rng.uniform(1.0, 5.0, (episodes, waypoints))
@@ -143,7 +143,7 @@ def chase(waypoints, duration_s, *, stiffness, damping, top_speed=np.inf, dt=0.0
 
 @pytest.mark.parametrize("top_speed", [np.inf, 0.5])
 def test_no_bang_bang_chase_beats_the_bound(top_speed):
-    waypoints = courses(32, seed=3)
+    waypoints = tours(32, seed=3)
     bound = platform_bound(waypoints, 60.0, top_speed=top_speed)
     by_speed = top_speed_bound(
         STILL, waypoints, radius=RADIUS, top_speed=min(top_speed, 3.0), duration_s=60.0
@@ -159,18 +159,18 @@ def test_no_bang_bang_chase_beats_the_bound(top_speed):
 
 @pytest.mark.parametrize("top_speed", [np.inf, 0.8])
 def test_plans_from_random_velocities_end_in_the_same_optimum(top_speed):
-    centres = np.ascontiguousarray(courses(32, 10, seed=4).transpose(1, 2, 0))
-    course = Course(np.zeros((4, 32)), centres, np.full(32, 10), RADIUS, top_speed)
-    expected = least_times(course)[-1]
+    centres = np.ascontiguousarray(tours(32, 10, seed=4).transpose(1, 2, 0))
+    tour = DiscTour(np.zeros((4, 32)), centres, np.full(32, 10), RADIUS, top_speed)
+    expected = least_times(tour)[-1]
     rng = np.random.default_rng(5)
     for most in (0.3, 1.5):
-        plan = stop_and_go(course)
+        plan = stop_and_go(tour)
         velocity = most * rng.normal(size=(10, 2, 32))
         speed = np.linalg.norm(velocity, axis=1, keepdims=True)
         plan.states[:, 2:4] = velocity * np.minimum(1.0, 0.9 * top_speed / speed)
-        while not (inside := is_inside(course, plan)).all():
+        while not (inside := is_inside(tour, plan)).all():
             plan.durations[~inside] *= 1.1
-        np.testing.assert_allclose(least_times(course, plan)[-1], expected, rtol=5e-4)
+        np.testing.assert_allclose(least_times(tour, plan)[-1], expected, rtol=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_plans_from_random_velocities_end_in_the_same_optimum(top_speed):
     ],
 )
 def test_who_can_do_more_reaches_no_less(less, more):
-    waypoints = courses(16, seed=6)
+    waypoints = tours(16, seed=6)
     usual = {"duration_s": 30.0}
     low, high = (platform_bound(waypoints, **(usual | case)) for case in (less, more))
     assert np.all(high.progress >= low.progress - 0.02)
@@ -192,12 +192,12 @@ def test_who_can_do_more_reaches_no_less(less, more):
 
 
 def test_progress_is_the_number_of_goals_and_a_share_of_the_next():
-    bound = platform_bound(courses(16, seed=7), 40.0)
+    bound = platform_bound(tours(16, seed=7), 40.0)
     assert np.all((bound.goals <= bound.progress) & (bound.progress < bound.goals + 1))
 
 
 def test_an_episode_alone_has_the_bound_that_it_has_in_a_batch():
-    waypoints = courses(4, seed=8)
+    waypoints = tours(4, seed=8)
     velocity = np.random.default_rng(9).uniform(-0.3, 0.3, (4, 2))
     together = platform_bound(waypoints, 25.0, start_velocity=velocity)
     alone = [platform_bound(waypoints[i], 25.0, start_velocity=velocity[i]) for i in range(4)]
@@ -207,7 +207,7 @@ def test_an_episode_alone_has_the_bound_that_it_has_in_a_batch():
 
 @pytest.mark.parametrize("duration_s", [30.0, 200.0])
 def test_a_list_without_a_loop_ends_with_its_last_waypoint(duration_s):
-    waypoints = courses(6, 4, seed=10)
+    waypoints = tours(6, 4, seed=10)
     bound = platform_bound(waypoints, duration_s, loop=False)
     fast = top_speed_bound(STILL, waypoints, radius=RADIUS, top_speed=1.0, duration_s=duration_s, loop=False)
     assert np.all(bound.goals <= 4) and np.all(fast.goals <= 4)
@@ -230,7 +230,7 @@ def test_a_straight_way_at_top_speed_is_as_long_as_it_looks():
 
 
 def test_the_length_of_the_shortest_way_is_that_of_a_general_optimiser():
-    waypoints = courses(4, 6, seed=11)
+    waypoints = tours(4, 6, seed=11)
     lengths = shortest_lengths(np.zeros((2, 4)), waypoints.transpose(1, 2, 0), radius=RADIUS)
     for i, centres in enumerate(waypoints):
 
@@ -247,7 +247,7 @@ def test_the_length_of_the_shortest_way_is_that_of_a_general_optimiser():
 
 
 def test_no_way_through_the_discs_is_shorter_than_the_shortest():
-    waypoints = courses(20, 6, seed=12)
+    waypoints = tours(20, 6, seed=12)
     lengths = shortest_lengths(np.zeros((2, 20)), waypoints.transpose(1, 2, 0), radius=RADIUS)
     rng = np.random.default_rng(13)
     for _ in range(200):
@@ -273,8 +273,8 @@ def test_after_the_last_waypoint_the_first_comes_again_in_a_loop_only():
     assert goals_reached(there_and_back, waypoints, radius=RADIUS, loop=False) == 2
 
 
-def test_many_trajectories_are_judged_at_once():
-    waypoints = courses(5, 3, seed=14)
+def test_many_trajectories_are_evaluated_at_once():
+    waypoints = tours(5, 3, seed=14)
     assert goals_reached(waypoints, waypoints, radius=RADIUS).tolist() == [3] * 5
     assert goals_reached(waypoints[0], waypoints, radius=RADIUS).shape == (5,)
 
@@ -292,9 +292,9 @@ def test_many_trajectories_are_judged_at_once():
 )
 def test_what_has_no_bound_is_refused(wrong, words):
     with pytest.raises(ValueError, match=words):
-        platform_bound(**({"waypoints": courses(1)[0], "duration_s": 10.0} | wrong))
+        platform_bound(**({"waypoints": tours(1)[0], "duration_s": 10.0} | wrong))
 
 
 def test_a_top_speed_bound_needs_a_top_speed():
     with pytest.raises(ValueError, match="'top_speed' must be finite"):
-        top_speed_bound(STILL, courses(1)[0], radius=RADIUS, top_speed=np.inf, duration_s=10.0)
+        top_speed_bound(STILL, tours(1)[0], radius=RADIUS, top_speed=np.inf, duration_s=10.0)

@@ -39,21 +39,21 @@ def test_the_length_of_an_episode_is_seconds_or_control_steps():
     ("asked", "episodes"),
     [("lqr --through batch", 4096), ("lqr --through mujoco", 256), ("lqr --through batch --episodes 3", 3)],
 )
-def test_the_batch_is_judged_by_more_episodes_where_nobody_says_how_many(asked, episodes, monkeypatch):
+def test_the_batch_is_evaluated_by_more_episodes_where_nobody_says_how_many(asked, episodes, monkeypatch):
     class AskedError(Exception):
         pass
 
     def trial(plan, through, episodes, *more):
         raise AskedError(episodes)
 
-    monkeypatch.setattr("fulmar_evaluation.evaluation.Trial", trial)
+    monkeypatch.setattr("fulmar_evaluation.trial_plan.Trial", trial)
     with pytest.raises(AskedError, match=f"^{episodes}$"):
         evaluate(f"evaluate floating_platform go_to_pose --controller {asked}")
 
 
 @pytest.mark.slow
-def test_waypoints_are_told_with_what_physics_allows(monkeypatch):
-    monkeypatch.setattr("fulmar_evaluation.evaluation.BOUNDED_EPISODES", 2)
+def test_waypoints_are_reported_with_what_physics_allows(monkeypatch):
+    monkeypatch.setattr("fulmar_evaluation.trial_plan.BOUNDED_EPISODES", 2)
     words = "evaluate turtlebot2 go_through_positions --controller classical --through batch --episodes 3"
     found = evaluate(f"{words} --episode-s 20")
     assert found["bound_episodes"] == 2

@@ -16,18 +16,17 @@ import pytest
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_core.topics import ODOMETRY
-from fulmar_evaluation.faults.bag_evidence import kept_of
+from fulmar_evaluation.faults.fault import stopped
 from fulmar_evaluation.faults.fault_environment import USUAL, request_of
-from fulmar_evaluation.faults.fault_result import stopped
 from fulmar_evaluation.faults.live_system import LiveSystem
-from fulmar_evaluation.faults.observer import Word, first_complaint
+from fulmar_evaluation.faults.observer import Statement, bag_evidence, first_complaint
 
 BAG = Path(__file__).parents[1] / "replay/bags/floating_platform_go_to_pose_lqr"
 FAULT_S = 100.0
 
 
-def word(heard_s: float, text: str, who: str = "plant") -> Word:
-    return Word(heard_s, who, "ok" if text == "running" else "error", text, {})
+def word(received_s: float, text: str, who: str = "plant") -> Statement:
+    return Statement(received_s, who, "ok" if text == "running" else "error", text, {})
 
 
 def test_what_was_wrong_before_a_fault_is_not_noticed_by_it_whatever_its_figures():
@@ -46,16 +45,16 @@ def test_the_same_words_of_another_node_or_after_good_ones_are_new():
 
 @pytest.mark.parametrize("robot", ["floating_platform", "turtlebot2", "kingfisher"])
 @pytest.mark.parametrize("late_s", [-0.01, 0.01])
-def test_whether_a_robot_stopped_in_time_can_be_told_in_json(robot: str, late_s: float, tmp_path: Path):
+def test_whether_a_robot_stopped_in_time_can_be_reported_in_json(robot: str, late_s: float, tmp_path: Path):
     live = LiveSystem(request_of(robot, tmp_path / "bag"), MagicMock(), MagicMock(), MagicMock(), USUAL, None)
     since_s = time.monotonic() - 10.0
     at_s = since_s + live.silenced_s + late_s
-    live.witness = MagicMock(
+    live.observer = MagicMock(
         applied_since=lambda _: [(at_s - 0.02, True), (at_s, False)],
         complaint_since=lambda _: word(at_s, "no command"),
     )
-    told = json.loads(json.dumps(asdict(stopped(live, since_s, live.silenced_s))))
-    assert told["passed"] is (late_s < 0.0)
+    reported = json.loads(json.dumps(asdict(stopped(live, since_s, live.silenced_s))))
+    assert reported["passed"] is (late_s < 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -65,40 +64,40 @@ def stamps() -> np.ndarray:
     return np.sort(found)
 
 
-def heard(stamps: np.ndarray) -> SimpleNamespace:
-    """A bystander who heard one message a second, from 0 s on."""
+def received(stamps: np.ndarray) -> SimpleNamespace:
+    """A bystander who received one message a second, from 0 s on."""
     times = np.arange(len(stamps), dtype=float)
-    return SimpleNamespace(wire=ODOMETRY, heard=lambda: (times, stamps))
+    return SimpleNamespace(wire=ODOMETRY, received=lambda: (times, stamps))
 
 
 def with_one_more(stamps: np.ndarray, at: int) -> np.ndarray:
     return np.insert(stamps, at, (stamps[at - 1] + stamps[at]) // 2)
 
 
-def test_a_bag_with_everything_that_was_heard_is_intact(stamps):
-    kept = kept_of(BAG, heard(stamps), None)
+def test_a_bag_with_everything_that_was_received_is_intact(stamps):
+    kept = bag_evidence(BAG, received(stamps), None)
     assert (kept.lost, kept.intact, kept.words) == (0, True, "")
 
 
 def test_a_message_that_is_missing_is_a_gap_unless_the_recorder_was_kept_from_it(stamps):
-    witness = heard(with_one_more(stamps, 10))
-    kept = kept_of(BAG, witness, None)
+    observer = received(with_one_more(stamps, 10))
+    kept = bag_evidence(BAG, observer, None)
     assert (kept.lost, kept.intact) == (1, False)
     assert "lacks 1 of odom" in kept.words
-    hung = kept_of(BAG, witness, (9.0, 11.0))
+    hung = bag_evidence(BAG, observer, (9.0, 11.0))
     assert (hung.lost, hung.intact) == (1, True)
-    assert not kept_of(BAG, witness, (11.0, 13.0)).intact
+    assert not bag_evidence(BAG, observer, (11.0, 13.0)).intact
 
 
 def test_a_recorder_that_died_may_take_its_last_second_along_and_no_more(stamps):
-    witness = heard(with_one_more(stamps, 10))
-    assert kept_of(BAG, witness, (10.5, math.inf)).intact
-    assert not kept_of(BAG, witness, (12.5, math.inf)).intact
-    before = kept_of(BAG, witness, (5.0, math.inf))
+    observer = received(with_one_more(stamps, 10))
+    assert bag_evidence(BAG, observer, (10.5, math.inf)).intact
+    assert not bag_evidence(BAG, observer, (12.5, math.inf)).intact
+    before = bag_evidence(BAG, observer, (5.0, math.inf))
     assert (before.lost, before.intact) == (0, True)
 
 
 def test_a_bag_that_does_not_open_is_lost_as_a_whole(stamps, tmp_path):
-    kept = kept_of(tmp_path, heard(stamps), None)
+    kept = bag_evidence(tmp_path, received(stamps), None)
     assert (kept.lost, kept.intact) == (len(stamps), False)
     assert str(tmp_path) in kept.words

@@ -11,15 +11,14 @@ from fulmar_core.robot import load_robot
 
 pytest.importorskip("mujoco")
 
-from tests.benchmarks.identification.campaign import document_of, run_identification
-from tests.benchmarks.identification.machines import draw_machine
-from tests.benchmarks.identification.trial import Trial, run_trial
+from tests.benchmarks.identification.campaign import Trial, document_of, run_identification, run_trial
+from tests.benchmarks.identification.driving import draw_machine
 
-ASKED = ("mass", "yaw_inertia", "thrust")
+REQUIRED = ("mass", "yaw_inertia", "thrust")
 
 
 @pytest.fixture(scope="module")
-def judged(tmp_path_factory):
+def evaluated(tmp_path_factory):
     """A platform that drove for a minute with and without ballast: what the benchmark says, and its bags."""
     home = tmp_path_factory.mktemp("bags")
     return run_trial(
@@ -27,39 +26,41 @@ def judged(tmp_path_factory):
     ), home / "floating_platform_01"
 
 
-def test_estimates_from_bags_are_within_three_per_cent_of_a_truth_that_is_far_from_nominal(judged):
+def test_estimates_from_bags_are_within_three_per_cent_of_a_truth_that_is_far_from_nominal(evaluated):
     nominal = load_robot("floating_platform")
-    quantities = judged[0]["quantities"]
+    quantities = evaluated[0]["quantities"]
     assert abs(quantities["thrust"]["truth"] / nominal.actuators.thrust - 1.0) > 0.03
-    for name in ASKED:
+    for name in REQUIRED:
         assert quantities[name]["error_percent"] < 3.0, name
     assert quantities["delay"]["value"] == pytest.approx(quantities["delay"]["truth"], abs=0.004)
 
 
-def test_the_command_finds_the_same_and_writes_a_calibration(judged, fulmar, tmp_path):
-    quantities, home = judged[0]["quantities"], judged[1]
+def test_the_command_finds_the_same_and_writes_a_calibration(evaluated, fulmar, tmp_path):
+    quantities, home = evaluated[0]["quantities"], evaluated[1]
     weight = quantities["ballast_1"]["truth"]
     out = tmp_path / "calibration.yaml"
     code, printed, _ = fulmar(
         "identify", home / "bare", home / "heavy", "--ballast", f"{home / 'heavy'}={weight}+-0.004",
         "--out", out, "--json",
     )  # fmt: skip
-    told = json.loads(printed)
+    reported = json.loads(printed)
     assert code == 0
-    assert (told["robot"], told["calibration"]) == ("floating_platform", str(out))
-    assert told["driven_s"] == pytest.approx(120.0, abs=0.1)
-    assert set(told["estimates"]["mass"]) == {"value", "low", "high", "unit"}
-    for name in ASKED:
-        assert told["estimates"][name]["value"] == pytest.approx(quantities[name]["value"], rel=0.005)
-    assert load_calibration(out).thrust.value == pytest.approx(told["estimates"]["thrust"]["value"], rel=1e-6)
+    assert (reported["robot"], reported["calibration"]) == ("floating_platform", str(out))
+    assert reported["driven_s"] == pytest.approx(120.0, abs=0.1)
+    assert set(reported["estimates"]["mass"]) == {"value", "low", "high", "unit"}
+    for name in REQUIRED:
+        assert reported["estimates"][name]["value"] == pytest.approx(quantities[name]["value"], rel=0.005)
+    assert load_calibration(out).thrust.value == pytest.approx(
+        reported["estimates"]["thrust"]["value"], rel=1e-6
+    )
 
 
 def test_a_simulation_with_the_calibration_has_the_machine_s_own_numbers(
-    judged, fulmar, tmp_path, monkeypatch
+    evaluated, fulmar, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("FULMAR_CALIBRATION", "")
-    out, home = tmp_path / "c.yaml", judged[1]
-    truth = judged[0]["quantities"]
+    out, home = tmp_path / "c.yaml", evaluated[1]
+    truth = evaluated[0]["quantities"]
     fulmar(
         "identify", home / "bare", "--known", f"mass={truth['mass']['truth']}+-0.01", "--out", out, "--json"
     )
@@ -72,8 +73,8 @@ def test_a_simulation_with_the_calibration_has_the_machine_s_own_numbers(
     )
 
 
-def test_without_a_known_mass_it_says_what_its_numbers_rest_on(judged, fulmar):
-    code, printed, err = fulmar("identify", judged[1] / "bare", "--json")
+def test_without_a_known_mass_it_says_what_its_numbers_rest_on(evaluated, fulmar):
+    code, printed, err = fulmar("identify", evaluated[1] / "bare", "--json")
     assert code == 0
     assert "weigh the robot (--known mass=KG+-KG)" in err
     assert json.loads(printed)["scale"].startswith("mass and thrust rest on the mass of the robot's YAML")
@@ -89,8 +90,8 @@ def test_without_a_known_mass_it_says_what_its_numbers_rest_on(judged, fulmar):
         (["--ballast", "BAG=2.0"], "one run without ballast is needed to compare with"),
     ],
 )
-def test_a_mistake_gets_one_line(judged, fulmar, words, message):
-    bag = str(judged[1] / "bare")
+def test_a_mistake_gets_one_line(evaluated, fulmar, words, message):
+    bag = str(evaluated[1] / "bare")
     code, out, err = fulmar("identify", bag, *(word.replace("BAG", bag) for word in words))
     assert (code, out) == (2, "")
     assert message in err.replace("\n", " ")
@@ -121,7 +122,7 @@ def test_the_document_says_what_was_asked_and_whether_it_was_met():
     off = json.loads(json.dumps(result))
     off["quantities"]["thrust"] |= {"error_percent": 4.0, "inside": False}
     good, bad = document_of([result], seed=1), document_of([result, off], seed=1)
-    assert [line["quantity"] for line in good["required"]] == list(ASKED)
+    assert [line["quantity"] for line in good["required"]] == list(REQUIRED)
     assert good["asked"] == 3
     thrust = next(line for line in bad["required"] if line["quantity"] == "thrust")
     assert (thrust["worst_error_percent"], thrust["met"]) == (4.0, False)

@@ -35,10 +35,10 @@ def test_what_is_known_is_kept_and_what_the_run_does_not_tell_is_named_and_left_
     out = tmp_path / "calibration.yaml"
     done = identify(boat(tmp_path, driven_s=3.0), "--known", "mass=35.0+-0.5", "--out", out, "--json")
     assert done.exit_code == 0, done.exception
-    told = json.loads(done.stdout[done.stdout.index("{") :])
-    assert "surge_linear_drag" in told["untold"]
+    reported = json.loads(done.stdout[done.stdout.index("{") :])
+    assert "surge_linear_drag" in reported["untold"]
     assert "the runs tell nothing of" in done.stderr
-    assert set(load_calibration(out).measured) == set(told["estimates"]) - set(told["untold"])
+    assert set(load_calibration(out).measured) == set(reported["estimates"]) - set(reported["untold"])
     assert load_calibration(out).mass is not None
 
 

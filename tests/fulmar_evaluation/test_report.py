@@ -14,7 +14,7 @@ from fulmar_bags.run_record import read_run
 from fulmar_bags.writer import BagWriter
 from fulmar_core.errors import ConfigError
 from fulmar_evaluation.report import write_report
-from fulmar_evaluation.report.actuator_plot import open_spans, watchdog_spans
+from fulmar_evaluation.report.control_plot import open_spans, watchdog_spans
 from fulmar_evaluation.report.style import colours
 from tests.synthetic_run import DRAWN, Plan, write_run
 
@@ -61,14 +61,14 @@ def test_a_page_fits_a_phone_and_a_dark_screen(compared):
     assert "var(--ink)" in text[text.index("<svg") :]
 
 
-def test_a_page_begins_with_a_verdict_on_each_run(compared):
+def test_a_page_begins_with_a_result_on_each_run(compared):
     words = " ".join(compared[1].words)
     assert words.index("Reached") < words.index("In figures")
     assert words.count("Reached") == 2
     assert "within 10 cm and 10° of the goal for all of the last 4 s" in words
 
 
-def test_a_page_shows_every_picture_with_words(compared):
+def test_a_page_shows_every_plot_with_words(compared):
     _, page = compared
     assert page.tags.count("svg") == 5
     words = " ".join(page.words)
@@ -77,14 +77,14 @@ def test_a_page_shows_every_picture_with_words(compared):
     for label in (
         "x [m]",
         "time [s]",
-        "from measurement to command, as recorded [ms]",
+        "from measurement sent to command sent [ms]",
         "commands [%]",
         "open-valve time [s]",
     ):
         assert label in page.words
 
 
-def test_a_page_tells_the_robot_s_rate_apart_from_the_wall_clock_s(reached, tmp_path):
+def test_a_page_shows_the_robot_s_rate_apart_from_the_wall_clock_s(reached, tmp_path):
     record = read_run(reached)
     fast = dataclasses.replace(record, info={**record.info, "rate": 4.0})
     words = " ".join(Page(write_report([fast], tmp_path / "r.html").read_text()).words)
@@ -97,7 +97,7 @@ def test_two_reports_of_one_run_are_the_same_bytes(reached, tmp_path):
     assert first.read_bytes() == second.read_bytes()
 
 
-def test_a_picture_is_small_and_a_picture(reached, calm, tmp_path):
+def test_a_plot_is_small_and_a_plot(reached, calm, tmp_path):
     out = write_report([read_run(calm), read_run(reached)], tmp_path / "overview.png")
     assert out.read_bytes().startswith(b"\x89PNG")
     assert out.stat().st_size < 500_000
@@ -124,14 +124,14 @@ def test_bars_of_a_valve_add_up_to_its_open_time(reached):
         assert drawn == pytest.approx(0.02 * np.count_nonzero(record.applied.effort[:, valve]), abs=0.03)
 
 
-def test_runs_of_one_controller_are_told_apart(reached, silenced, tmp_path):
+def test_runs_of_one_controller_differ(reached, silenced, tmp_path):
     words = Page(write_report([read_run(reached), read_run(silenced)], tmp_path / "r.html").read_text()).words
     assert "LQR (reached)" in words
     assert "LQR (silenced)" in words
     assert len(set(colours(["lqr", "lqr", "policy", "mine", "yours"]))) == 5
 
 
-def test_an_empty_run_still_gets_a_page_and_a_picture(tmp_path):
+def test_an_empty_run_still_gets_a_page_and_a_plot(tmp_path):
     BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_to_pose"}).close()
     record = read_run(tmp_path / "bag")
     assert "No result" in write_report([record], tmp_path / "r.html").read_text()
@@ -170,10 +170,10 @@ def test_runs_of_two_tasks_are_not_compared(reached, tmp_path):
         ("leatherback", "race_waypoints", ("Numbered circles", "What the actuators did")),
     ],
 )
-def test_every_kind_of_task_and_robot_gets_a_page_and_a_picture(robot, task, words, tmp_path):
+def test_every_kind_of_task_and_robot_gets_a_page_and_a_plot(robot, task, words, tmp_path):
     plan = Plan(robot=robot, task=task, controller="classical", control_hz=10.0, duration_s=20.0, **DRAWN)
     record = read_run(write_run(tmp_path / "bag", plan))
-    told = " ".join(Page(write_report([record], tmp_path / "r.html").read_text()).words)
+    reported = " ".join(Page(write_report([record], tmp_path / "r.html").read_text()).words)
     for word in words:
-        assert word in told
+        assert word in reported
     assert write_report([record], tmp_path / "r.png").exists()

@@ -24,12 +24,11 @@ from fulmar_core.policy_bundle import NETWORK, Golden, read_golden, read_passpor
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY
 from fulmar_evaluation.rerun import live_node
-from fulmar_evaluation.rerun.calibration import calibrated_as
+from fulmar_evaluation.rerun.embedded_configs import calibrated_as
 from fulmar_evaluation.rerun.reference_bags import TOLERANCES
 from fulmar_evaluation.rerun.rerun import rerun
-from fulmar_evaluation.rerun.rerun_result import FIELDS, judge_answers
-from policy_server.controllers import Choice, load_controller
-from policy_server.shipped import shipped_policy
+from fulmar_evaluation.rerun.rerun_result import FIELDS, compare_answers
+from policy_server.controllers import Choice, load_controller, shipped_policy
 from tests.foreign_bag import write_foreign
 
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"
@@ -44,7 +43,7 @@ def answered(bag: Path, controller: str, source: str = "observations", course=No
     loaded = load_controller(controller, course.robot, course.task, Choice(hz, str(folder)))
     # Another processor rounds a sine otherwise, of which observations are made anew.
     limits = TOLERANCES if source == "odometry" else EXACT
-    return judge_answers(course, rerun(course, loaded, source=source), limits)
+    return compare_answers(course, rerun(course, loaded, source=source), limits)
 
 
 def ask(*words: str) -> tuple[int, dict]:
@@ -140,7 +139,7 @@ def test_minus_zero_is_not_the_same_bits_as_zero():
     assert field.differing == 1
 
 
-def test_tolerances_are_told_by_field_and_refused_where_they_make_no_sense():
+def test_tolerances_are_reported_by_field_and_refused_where_they_make_no_sense():
     assert read_tolerances(["1e-3", "action=2"], FIELDS)["action"] == 2.0
     assert read_tolerances(["1e-3"], FIELDS)["command"] == 1e-3
     for wrong in ("-1", "action=much", "acton=1", "nan"):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from fulmar_bags.run_record import HealthSample
-from fulmar_evaluation.run_beliefs import believed_dead
+from fulmar_evaluation.run_summary import believed_dead
 
 
 def record(*said):

@@ -10,12 +10,11 @@ import pytest
 
 from fulmar_bags.run_record import Motion, Places, read_run
 from fulmar_bags.writer import BagWriter
-from fulmar_cli.commands.run import verdict
 from fulmar_core.errors import BagError
 from fulmar_core.rotation import yaw_of
 from fulmar_core.tasks import load_task
-from fulmar_evaluation.run_evaluation import _goals, judge
-from fulmar_evaluation.run_summary import summarise
+from fulmar_evaluation.run_evaluation import _goals, evaluate_run
+from fulmar_evaluation.run_summary import latencies_ms, summarise, summary_text
 from tests.synthetic_run import Plan, write_run
 
 
@@ -38,12 +37,12 @@ def test_a_run_that_reached_its_goal_says_so(reached):
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
-def test_time_to_goal_and_length_of_the_run_are_told_apart(reached, silenced):
+def test_time_to_goal_and_length_of_the_run_differ(reached, silenced):
     summary = summarise(read_run(reached))
-    line = verdict(summary).splitlines()[0]
+    line = summary_text(summary).splitlines()[0]
     assert line.startswith(f"lqr: goal met after {summary['time_to_target_s']:.1f} s, ")
     assert line.endswith("; length of the run 40 s")
-    missed = verdict(summarise(read_run(silenced))).splitlines()[0]
+    missed = summary_text(summarise(read_run(silenced))).splitlines()[0]
     assert missed.startswith("lqr: goal missed, ")
     assert missed.endswith("; length of the run 15 s")
 
@@ -53,12 +52,12 @@ def test_times_count_from_the_first_state_as_they_do_for_steps_in_metrics(reache
     position = np.hypot(*record.truth.position[:, :2].T)
     heading = np.abs(np.rad2deg(yaw_of(record.truth.quat_xyzw)))
     outside = np.flatnonzero((position > 0.1) | (heading > 10.0))
-    judgement = judge(record)
-    assert judgement.figure("time_to_target_s") == pytest.approx(0.02 * (outside[-1] + 1), abs=1e-6)
-    assert judgement.time_s[[0, -1]] == pytest.approx([0.02, 40.0])
-    assert judgement.duration_s == pytest.approx(40.0)
-    np.testing.assert_allclose(judgement.run.position_error[0], position[1:], rtol=1e-6)
-    np.testing.assert_allclose(judgement.run.actuators_in_use[0], record.applied.effort[:-1].mean(axis=1))
+    result = evaluate_run(record)
+    assert result.figure("time_to_target_s") == pytest.approx(0.02 * (outside[-1] + 1), abs=1e-6)
+    assert result.time_s[[0, -1]] == pytest.approx([0.02, 40.0])
+    assert result.duration_s == pytest.approx(40.0)
+    np.testing.assert_allclose(result.run.position_error[0], position[1:], rtol=1e-6)
+    np.testing.assert_allclose(result.run.actuators_in_use[0], record.applied.effort[:-1].mean(axis=1))
 
 
 def test_a_run_of_exactly_the_window_is_long_enough_whatever_its_stamps_round_to(reached):
@@ -68,17 +67,19 @@ def test_a_run_of_exactly_the_window_is_long_enough_whatever_its_stamps_round_to
     firsts = [first for first in at_goal if stamps[first + 200] - stamps[first] < 4.0]
     assert firsts, "some differences of stamps round to less than 4 s"
     window = slice(firsts[0], firsts[0] + 201)
-    assert judge(dataclasses.replace(record, truth=pick(record.truth, window))).success
+    assert evaluate_run(dataclasses.replace(record, truth=pick(record.truth, window))).success
     shorter = slice(firsts[0], firsts[0] + 200)
-    assert not judge(dataclasses.replace(record, truth=pick(record.truth, shorter))).success
+    assert not evaluate_run(dataclasses.replace(record, truth=pick(record.truth, shorter))).success
 
 
 def before_the_start(record, count):
     """The record with commands that answer nothing, as a controller sends them before the plant starts."""
     first = record.commanded
+    times = np.concatenate((first.log_s[0] - 10.0 * np.arange(count, 0, -1), first.log_s))
     early = {
         "stamp_s": np.concatenate((np.zeros(count), first.stamp_s)),
-        "log_s": np.concatenate((first.log_s[0] - 10.0 * np.arange(count, 0, -1), first.log_s)),
+        "log_s": times,
+        "publish_s": times,
         "effort": np.concatenate((np.zeros((count, 8)), first.effort)),
     }
     return dataclasses.replace(record, commanded=dataclasses.replace(first, **early))
@@ -116,11 +117,21 @@ def test_latency_comes_from_the_bag_where_the_plant_does_not_tell_it(reached):
     assert 1.5 < latency["p50"] < latency["p99"] <= latency["max"] < 6.0
 
 
+def test_latency_does_not_count_how_late_the_recorder_received_a_command(reached):
+    record = dataclasses.replace(read_run(reached), health=())
+    late = dataclasses.replace(record.commanded, log_s=record.commanded.log_s + 0.5)
+    record = dataclasses.replace(record, commanded=late)
+    assert summarise(record)["latency_ms"]["max"] < 6.0
+    sent_later = dataclasses.replace(late, publish_s=late.publish_s + 0.001)
+    before, after = (latencies_ms(dataclasses.replace(record, commanded=each)) for each in (late, sent_later))
+    np.testing.assert_allclose(after, before + 1.0, atol=1e-3)
+
+
 def test_latency_of_the_plant_counts_where_it_tells_it(reached):
     record = read_run(reached)
     plant = record.last_health("plant")
-    told = {"latency_ms_p50": "1.0", "latency_ms_p99": "2.0", "latency_ms_max": "3.0"}
-    newer = dataclasses.replace(plant, values={**plant.values, **told})
+    reported = {"latency_ms_p50": "1.0", "latency_ms_p99": "2.0", "latency_ms_max": "3.0"}
+    newer = dataclasses.replace(plant, values={**plant.values, **reported})
     summary = summarise(dataclasses.replace(record, health=(*record.health, newer)))
     assert summary["latency_ms"] == {"p50": 1.0, "p99": 2.0, "max": 3.0}
 
@@ -140,10 +151,10 @@ def test_a_run_shorter_than_the_window_is_no_success(tmp_path):
 
 def test_leaving_the_tolerance_once_in_the_window_is_no_success(reached):
     record = read_run(reached)
-    assert judge(record).success
+    assert evaluate_run(record).success
     position = record.truth.position.copy()
     position[-100, 0] += 0.15
-    assert not judge(
+    assert not evaluate_run(
         dataclasses.replace(record, truth=dataclasses.replace(record.truth, position=position))
     ).success
 
@@ -155,13 +166,13 @@ def test_lost_samples_do_not_shift_the_window(reached):
     fields = {
         field.name: getattr(record.truth, field.name)[kept] for field in dataclasses.fields(record.truth)
     }
-    thinned = judge(dataclasses.replace(record, truth=type(record.truth)(**fields)))
+    thinned = evaluate_run(dataclasses.replace(record, truth=type(record.truth)(**fields)))
     assert thinned.duration_s == pytest.approx(40.0)
     assert thinned.run.control_dt == pytest.approx(0.02)
     assert thinned.success
 
 
-def test_a_robot_without_truth_is_judged_by_its_odometry(reached):
+def test_a_robot_without_truth_is_evaluated_by_its_odometry(reached):
     record = read_run(reached)
     nothing = type(record.truth)(
         **{f.name: getattr(record.truth, f.name)[:0] for f in dataclasses.fields(record.truth)}
@@ -218,7 +229,7 @@ def test_gates_are_counted_from_the_robot_s_own_way(tmp_path):
     plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "race_waypoints"}, duration_s=60.0)
     record = read_run(write_run(tmp_path / "bag", plan))
     as_gates = dataclasses.replace(record, info={**record.info, "task": "race_gates"})
-    assert judge(as_gates).figure("goals_reached") >= 1.0
+    assert evaluate_run(as_gates).figure("goals_reached") >= 1.0
 
 
 def test_a_goal_that_is_repeated_with_its_stamp_is_the_same_goal(reached):
@@ -232,12 +243,12 @@ def test_a_goal_that_is_repeated_with_its_stamp_is_the_same_goal(reached):
     assert len(_goals(anew, task)) == 2
 
 
-def test_a_velocity_is_judged_against_the_target_of_its_time(tmp_path):
+def test_a_velocity_is_evaluated_against_the_target_of_its_time(tmp_path):
     plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "track_velocities"}, duration_s=30.0)
     record = read_run(write_run(tmp_path / "bag", plan))
     assert [goal.targets.shape for goal in record.goals] == [(1, 3)] * 3
-    judgement, summary = judge(record), summarise(record)
-    assert judgement.run.goals[0, [0, -1]].tolist() == [0.0, 2.0]
+    result, summary = evaluate_run(record), summarise(record)
+    assert result.run.goals[0, [0, -1]].tolist() == [0.0, 2.0]
     assert 0.0 < summary["velocity_error_m_s"] < 0.2
     assert 0.0 < summary["yaw_rate_error_deg_s"] < 20.0
     assert summary["final_position_error_m"] is summary["final_heading_error_deg"] is None
@@ -272,7 +283,7 @@ def test_what_a_task_does_not_ask_is_none(reached):
     assert summary["collided"] is False
 
 
-def test_a_run_on_hardware_is_judged_from_its_first_actuation_on_for_as_long_as_was_asked(reached):
+def test_a_run_on_hardware_is_evaluated_from_its_first_actuation_on_for_as_long_as_was_asked(reached):
     """A robot is measured before and after its run, too: what it did then is nobody's success or failure."""
     record = read_run(reached)
     applied, first = record.applied, 250
@@ -280,6 +291,7 @@ def test_a_run_on_hardware_is_judged_from_its_first_actuation_on_for_as_long_as_
         applied,
         stamp_s=applied.stamp_s[first:],
         log_s=applied.log_s[first:],
+        publish_s=applied.publish_s[first:],
         effort=applied.effort[first:],
     )
     info = {**record.info, "backend": "hardware", "duration_s": 20.0}

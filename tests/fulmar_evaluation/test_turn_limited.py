@@ -12,9 +12,10 @@ from scipy.integrate import quad
 
 from fulmar_core.actuators.response import Response
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import EVALUATION_SEED, draw_episodes
+from fulmar_core.episode import draw_episodes
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
+from fulmar_core.seeds import EVALUATION_SEED
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.bounds import (
@@ -26,12 +27,10 @@ from fulmar_evaluation.bounds import (
     top_speed_bound,
     turn_limited_bound,
 )
-from fulmar_evaluation.bounds.coarse_plan import coarse_plans
-from fulmar_evaluation.bounds.fine_plan import refined
 from fulmar_evaluation.bounds.leg_table import leg_table
 from fulmar_evaluation.bounds.legs import best_words
 from fulmar_evaluation.bounds.surge import Surge, time_lost
-from fulmar_evaluation.bounds.turn_course import TurnCourse
+from fulmar_evaluation.bounds.turn_plans import TurnTour, coarse_plans, refined
 
 RADIUS = 0.2
 CAR = Motions(1.0, 0.5, ((1.0, 0.8), (-0.5, 0.8), (0.0, 0.8)))
@@ -39,7 +38,7 @@ CAR = Motions(1.0, 0.5, ((1.0, 0.8), (-0.5, 0.8), (0.0, 0.8)))
 
 @pytest.fixture(autouse=True, scope="module")
 def coarse_tables():
-    """Tables of a quarter of the size, which courses as short as these do with."""
+    """Tables of a quarter of the size, which tours as short as these do with."""
     with pytest.MonkeyPatch.context() as patch:
         leg_table.cache_clear()
         patch.setattr("fulmar_evaluation.bounds.leg_table._CELLS", 28)
@@ -48,7 +47,7 @@ def coarse_tables():
         leg_table.cache_clear()
 
 
-def courses(episodes: int, waypoints: int = 6, seed: int = 0) -> np.ndarray:
+def tours(episodes: int, waypoints: int = 6, seed: int = 0) -> np.ndarray:
     """Waypoints in a square of 6 m, 1 m apart at least, shape (episodes, waypoints, 2)."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-3.0, 3.0, (episodes, 1, 2))
@@ -115,13 +114,13 @@ def test_a_half_turn_of_a_car_takes_half_its_circle():
 
 
 def test_free_turning_is_travel_at_top_speed():
-    waypoints = courses(12, seed=1)
+    waypoints = tours(12, seed=1)
     free = Motions(1.0, 1.0, ((0.0, 1e4),))
     fastest = top_speed_bound(np.zeros(2), waypoints, radius=RADIUS, top_speed=1.0, duration_s=30.0)
     np.testing.assert_allclose(bound(waypoints, 30.0, free).progress, fastest.progress, atol=1e-9)
-    course = TurnCourse(np.zeros((12, 2)), None, waypoints, RADIUS)
-    plan = coarse_plans(course, leg_table(free, 0), np.inf).plan_to(np.arange(12), np.full(12, 6))
-    _, times = refined(course, free, plan, np.full(12, 6))
+    tour = TurnTour(np.zeros((12, 2)), None, waypoints, RADIUS)
+    plan = coarse_plans(tour, leg_table(free, 0), np.inf).plan_to(np.arange(12), np.full(12, 6))
+    _, times = refined(tour, free, plan, np.full(12, 6))
     lengths = shortest_lengths(np.zeros((2, 12)), waypoints.transpose(1, 2, 0), radius=RADIUS)
     np.testing.assert_allclose(times[:, -1], lengths[-1], rtol=2e-3)  # what grids cost
 
@@ -135,12 +134,12 @@ def test_free_turning_is_travel_at_top_speed():
     ],
 )
 def test_who_can_do_more_reaches_no_less(more):
-    waypoints = courses(8, seed=2)
+    waypoints = tours(8, seed=2)
     assert np.all(bound(waypoints, 30.0, more).progress >= 0.98 * bound(waypoints, 30.0).progress - 0.05)
 
 
 def test_more_time_and_a_free_heading_reach_no_less():
-    waypoints, yaw = courses(6, seed=3), np.linspace(-3.0, 3.0, 6)
+    waypoints, yaw = tours(6, seed=3), np.linspace(-3.0, 3.0, 6)
     fixed = bound(waypoints, 30.0, start_yaw=yaw)
     assert np.all(bound(waypoints, 35.0, start_yaw=yaw).goals >= fixed.goals)
     free = bound(waypoints, 30.0)
@@ -170,7 +169,7 @@ def steered(robot: str, waypoints, *, gain: float, slow: float) -> np.ndarray:
 @pytest.mark.parametrize(("robot", "least"), [("turtlebot2", 0.65), ("kingfisher", 0.15)])
 @pytest.mark.slow
 def test_no_steering_beats_the_bound(robot, least):
-    waypoints = courses(4, seed=4)
+    waypoints = tours(4, seed=4)
     most = bound(waypoints, 60.0, motions_of(load_robot(robot)), start_yaw=np.zeros(4)).goals
     tracks = [steered(robot, waypoints, gain=2.0, slow=slow) for slow in (0.5, 1.0)]
     best = np.max([goals_reached(track, waypoints, radius=RADIUS) for track in tracks], axis=0)
@@ -245,7 +244,7 @@ def test_who_stops_later_loses_no_less():
 
 
 def test_an_episode_alone_has_the_bound_that_it_has_in_a_batch():
-    waypoints, yaw = courses(3, seed=5), np.array([0.3, -1.0, 2.0])
+    waypoints, yaw = tours(3, seed=5), np.array([0.3, -1.0, 2.0])
     together = bound(waypoints, 25.0, start_yaw=yaw)
     alone = [bound(waypoints[i], 25.0, start_yaw=yaw[i]) for i in range(3)]
     np.testing.assert_allclose(together.progress, [one.progress for one in alone], atol=1e-6)
@@ -279,7 +278,7 @@ def test_a_boat_holds_what_drag_and_propellers_balance():
 
 @pytest.mark.slow
 def test_each_family_has_its_bound():
-    waypoints = courses(1, seed=6)[0]
+    waypoints = tours(1, seed=6)[0]
     names = {
         robot: bound_of(load_robot(robot), np.zeros(2), waypoints, RADIUS, 20.0).name
         for robot in ("floating_platform", "kingfisher", "turtlebot2")

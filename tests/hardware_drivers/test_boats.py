@@ -26,8 +26,8 @@ from hardware_drivers.mavlink_telemetry import state_of
 from hardware_drivers.ports import open_port
 from hardware_drivers.settings import KingfisherNmea, MavlinkBoat, Thrust
 from sim_nodes.emulators.ardupilot import ArdupilotEmulator
+from sim_nodes.emulators.device import PtyLink, TcpLink
 from sim_nodes.emulators.kingfisher import KingfisherEmulator
-from sim_nodes.emulators.links import PtyLink, TcpLink
 from tests.hardware_drivers.bench import Bench, episode_at, until
 
 START = (3.0, -2.0, 0.7)

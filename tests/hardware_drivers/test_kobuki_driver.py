@@ -13,8 +13,8 @@ from fulmar_core.planar import planar_of
 from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kobuki_driver import KobukiDriver
 from hardware_drivers.settings import Kobuki
+from sim_nodes.emulators.device import PtyLink
 from sim_nodes.emulators.kobuki import TIMEOUT_S, KobukiEmulator
-from sim_nodes.emulators.links import PtyLink
 from tests.hardware_drivers.bench import Bench, episode_at, until
 
 START = (1.0, -0.5, 2.0)

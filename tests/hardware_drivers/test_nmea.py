@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hardware_drivers.kingfisher_protocol import Fix, Inertial, Rates, drive, read
-from hardware_drivers.nmea import Decoder, sentence
+from hardware_drivers.kingfisher_protocol import Decoder, Fix, Inertial, Rates, drive, read, sentence
 from sim_nodes.emulators.kingfisher import TIMEOUT_S, KingfisherEmulator
 from tests.hardware_drivers.test_kobuki_protocol import Wire
 

@@ -10,11 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fulmar_core.rotation import rotate, yaw_of
-from hardware_drivers.attitude import attitude
-from hardware_drivers.device_time import DeviceTime
-from hardware_drivers.local_frame import LocalFrame
-from hardware_drivers.valve_message import from_message, to_message
-from hardware_drivers.valve_timing import ValveTiming
+from hardware_drivers.earth_frame import LocalFrame, attitude
+from hardware_drivers.feedback import DeviceTime
+from hardware_drivers.valves import ValveTiming, from_message, to_message
 from hardware_drivers.wheel_odometry import WheelOdometry
 from sim_nodes.emulators import kingfisher
 

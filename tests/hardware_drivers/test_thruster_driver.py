@@ -14,7 +14,7 @@ from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.gpio import output_lines
 from hardware_drivers.settings import Bearing, GpioValves, load_hardware
 from hardware_drivers.thruster_driver import ThrusterDriver
-from sim_nodes.emulators.valves import ValveBank
+from sim_nodes.emulators.outputs import ValveBank
 from tests.hardware_drivers.bench import episode_at
 
 ROBOT = load_robot("floating_platform")

@@ -11,7 +11,7 @@ from fulmar_core.robot import load_robot
 from hardware_drivers.mavlink_driver import override_of
 from hardware_drivers.settings import MavlinkBoat, Thrust
 from hardware_drivers.wiring import channel_velocity, channels
-from sim_nodes.emulators.topics import BASE_TIMEOUT_S, TopicDevice, ValveNode
+from sim_nodes.emulators.outputs import BASE_TIMEOUT_S, TopicDevice, ValveNode
 from sim_nodes.emulators.wiring import Wiring
 
 BASE, BOAT, PLATFORM = (load_robot(name) for name in ("turtlebot2", "kingfisher", "floating_platform"))

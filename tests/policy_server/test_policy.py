@@ -32,8 +32,8 @@ from fulmar_core.policy_bundle import (
 )
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from policy_server.controllers import policies_directory, shipped_policies, shipped_policy
 from policy_server.policy import Policy
-from policy_server.shipped import policies_directory, shipped_policies, shipped_policy
 from tests.inputs import inputs_at
 from tests.policy_server.observed import inputs_seeing
 

@@ -12,7 +12,7 @@ from fulmar_core.controllers.law import Law
 from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import shipped_policy
 
 
 def make_lqr(robot: Robot, task: Task, settings: ControllerSettings) -> Law:

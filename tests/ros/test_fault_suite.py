@@ -9,10 +9,9 @@ import pytest
 
 from fulmar_cli.commands.faults import names_in
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_evaluation.faults import network_faults
-from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults import command_faults
+from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import request_of
-from fulmar_evaluation.faults.fault_result import Outcome, stopped
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
 from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults
 from tests.conftest import RosDomain
@@ -58,7 +57,7 @@ def test_a_robot_has_the_faults_that_mean_something_to_it():
 
 
 def test_faults_that_need_root_are_left_out_and_refused_where_there_is_none(monkeypatch) -> None:
-    monkeypatch.setattr(network_faults, "why_not", lambda: "two hosts need root")
+    monkeypatch.setattr(command_faults, "why_not", lambda: "two hosts need root")
     possible, skipped = faults_of("turtlebot2")
     assert not {"cable_cut", "cable_lossy"} & {fault.name for fault in possible}
     assert {one.name for one in skipped if one.reason == "two hosts need root"} == {
@@ -103,7 +102,7 @@ def test_a_fault_that_cannot_be_done_says_so_and_loses_no_other(ros_domain: RosD
 
     fault = Fault(impossible, begins=False)
     found = run_faults("turtlebot2", [fault, fault], lambda _done: None)
-    assert [finding.verdict for finding in found] == ["not done", "not done"]
+    assert [finding.status for finding in found] == ["not done", "not done"]
     assert not any(finding.passed for finding in found)
     assert found[0].reaction == "ZeroDivisionError: no way"
 

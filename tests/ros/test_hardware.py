@@ -33,10 +33,10 @@ from fulmar_core.errors import DeviceError, FulmarError
 from fulmar_core.paths import config_names
 from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
+from hardware_drivers.devices import own_watchdog, when_the_driver_dies
 from hardware_drivers.driver_node import DriverNode
-from hardware_drivers.own_watchdog import own_watchdog, when_the_driver_dies
 from hardware_drivers.settings import MavlinkBoat, load_hardware
-from sim_nodes.emulators.valves import ValveBank
+from sim_nodes.emulators.outputs import ValveBank
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import Neighbour, until

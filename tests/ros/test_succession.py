@@ -23,8 +23,8 @@ from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 from policy_server.controller_node import make_controller
+from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
-from policy_server.shipped import policies_directory
 from tests.ros.controllers import copy_of
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, asked_by_neighbour, until
 

@@ -19,7 +19,7 @@ from fulmar_bringup.robot_operator import Operator
 from fulmar_core.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import shipped_policy
 from tests.conftest import RosDomain
 from tests.ros.cli import child_running, fulmar, start_fulmar
 from tests.ros.controllers import copy_of

@@ -66,7 +66,7 @@ def test_a_world_changes_mass_yaw_inertia_and_centre_of_mass(name, episode):
     _, before, _ = whole(scene.model)
     heavy, round_ = 1.1 * robot.body.mass, 1.2 * robot.body.inertia[2]
     world = episode(robot, mass=heavy, yaw_inertia=round_, com_x=0.01, com_y=-0.02).world
-    scene.machine.take_world(scene.model, world)
+    scene.robot_model.take_world(scene.model, world)
     mass, centre, inertia = whole(scene.model)
     assert mass == pytest.approx(heavy, rel=1e-5)
     assert inertia[2] == pytest.approx(round_, rel=1e-3)
@@ -76,7 +76,7 @@ def test_a_world_changes_mass_yaw_inertia_and_centre_of_mass(name, episode):
 @pytest.mark.parametrize("name", EVERY)
 def test_every_model_keeps_the_ticks_of_its_yaml(name):
     scene = Scene(ROBOTS[name])
-    tick = scene.model.opt.timestep * scene.machine.steps_per_tick
+    tick = scene.model.opt.timestep * scene.robot_model.steps_per_tick
     assert tick == pytest.approx(ROBOTS[name].timing.physics_dt, abs=1e-15)
     assert scene.model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
 

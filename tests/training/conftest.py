@@ -45,10 +45,10 @@ def one_thread():
 @pytest.fixture(scope="session", autouse=True)
 def few_episodes():
     """Check learners on few episodes: what is tested here is not how good they are."""
-    from training import checks
+    from training import evaluator
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(checks, "EPISODES", 8)
+        patch.setattr(evaluator, "EPISODES", 8)
         yield
 
 

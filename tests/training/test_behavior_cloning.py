@@ -1,4 +1,4 @@
-"""A policy that begins as the apprentice of a classical law."""
+"""A policy that begins by cloning a classical law."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from training.behavior_cloning import Apprentice
+from training.behavior_cloning import BehaviorCloningPPO, expert_of
 from training.checkpoint import load_checkpoint
-from training.expert import teacher_of
 from training.fast_ppo import FastPPO
 from training.learners import build_learner, callbacks_of
 from training.run_folder import CHECKPOINT_FILE
@@ -24,18 +23,30 @@ from training.train import train
 from training.vec_env import BatchVecEnv
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
-LESSONS = 12
+CLONING = 12
 
 
 @pytest.fixture
 def settings(small_settings):
-    algorithm = replace(small_settings.algorithm, lessons=LESSONS, log_std=-2.0)
-    return replace(small_settings, algorithm=algorithm, scenario="drift_training", told=True, wrench=True)
+    algorithm = replace(small_settings.algorithm, cloning_updates=CLONING, log_std=-2.0)
+    return replace(
+        small_settings,
+        algorithm=algorithm,
+        scenario="drift_training",
+        disturbance_inputs=True,
+        action_space="wrench",
+    )
 
 
-def worlds(count=32, *, told=True, wrench=True):
+def worlds(count=32, *, disturbance_inputs=True, action_space="wrench"):
     return BatchVecEnv(
-        ROBOT, TASK, load_scenario("drift_training"), worlds=count, seed=3, told=told, wrench=wrench
+        ROBOT,
+        TASK,
+        load_scenario("drift_training"),
+        worlds=count,
+        seed=3,
+        disturbance_inputs=disturbance_inputs,
+        action_space=action_space,
     )
 
 
@@ -47,39 +58,39 @@ def learned(settings, updates):
 
 
 def error(learner, env):
-    """Mean squared difference between what the learner and its teacher would do, in the worlds' present states."""
+    """Mean squared difference between what the learner and its expert would do, in the worlds' present states."""
     raw = env.get_original_obs()
     actions, _ = learner.predict(env.normalize_obs(raw), deterministic=True)
-    return float(np.mean((actions - teacher_of(env.unwrapped).actions(raw)) ** 2))
+    return float(np.mean((actions - expert_of(env.unwrapped).actions(raw)) ** 2))
 
 
 @pytest.mark.slow
-def test_lessons_bring_a_policy_near_to_what_the_lqr_does(settings):
-    many = replace(settings.algorithm, lessons=60)
+def test_cloning_brings_a_policy_near_to_the_lqr(settings):
+    many = replace(settings.algorithm, cloning_updates=60)
     assert error(*learned(replace(settings, algorithm=many), 60)) < 0.3 * error(*learned(settings, 1))
 
 
-def test_after_its_lessons_it_learns_as_any_other(settings, monkeypatch):
+def test_after_its_cloning_updates_it_learns_by_ppo(settings, monkeypatch):
     calls = []
-    monkeypatch.setattr(FastPPO, "train", lambda self: calls.append(self.lesson))
-    learner, _ = learned(settings, LESSONS + 2)
-    assert isinstance(learner, Apprentice)
-    assert calls == [LESSONS, LESSONS]
+    monkeypatch.setattr(FastPPO, "train", lambda self: calls.append(self.cloned))
+    learner, _ = learned(settings, CLONING + 2)
+    assert isinstance(learner, BehaviorCloningPPO)
+    assert calls == [CLONING, CLONING]
 
 
-def test_lessons_leave_the_noise_of_exploration_as_it_was(settings):
-    learner, _ = learned(settings, LESSONS)
+def test_cloning_keeps_the_exploration_noise(settings):
+    learner, _ = learned(settings, CLONING)
     np.testing.assert_allclose(learner.policy.log_std.detach().numpy(), -2.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", [5, LESSONS + 1], ids=["within the lessons", "after them"])
-def test_a_resumed_apprentice_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_path, settings, first):
+@pytest.mark.parametrize("first", [5, CLONING + 1], ids=["within the cloning updates", "after them"])
+def test_a_resumed_cloning_run_ends_with_the_weights_of_an_uninterrupted_one(tmp_path, settings, first):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    train(ROBOT, TASK, settings, seed=1, out=whole, updates=LESSONS + 2)
+    train(ROBOT, TASK, settings, seed=1, out=whole, updates=CLONING + 2)
     train(ROBOT, TASK, settings, seed=1, out=parts, updates=first)
     torch.manual_seed(99)
-    train(ROBOT, TASK, settings, seed=1, out=parts, updates=LESSONS + 2, resume=True)
+    train(ROBOT, TASK, settings, seed=1, out=parts, updates=CLONING + 2, resume=True)
     expected, found = (
         load_checkpoint(folder / CHECKPOINT_FILE, settings.algorithm, worlds())[0].policy.state_dict()
         for folder in (whole, parts)
@@ -88,40 +99,40 @@ def test_a_resumed_apprentice_ends_with_the_very_weights_of_an_uninterrupted_one
         assert torch.equal(value, found[key]), key
 
 
-def test_the_teacher_takes_pushes_as_they_are_told(settings):
+def test_the_expert_takes_pushes_from_the_disturbance_inputs(settings):
     env = worlds(4)
     seen = env.reset()
     pushed = seen.copy()
     pushed[:, -11] = 0.3  # N ahead
-    teacher = teacher_of(env)
-    assert np.all(teacher.actions(pushed)[:, 0] <= teacher.actions(seen)[:, 0] + 1e-6)
-    assert not np.array_equal(teacher.actions(pushed), teacher.actions(seen))
+    expert = expert_of(env)
+    assert np.all(expert.actions(pushed)[:, 0] <= expert.actions(seen)[:, 0] + 1e-6)
+    assert not np.array_equal(expert.actions(pushed), expert.actions(seen))
 
 
-def test_lessons_for_single_valves_are_refused():
-    with pytest.raises(ConfigError, match="Set 'wrench: true'"):
-        teacher_of(worlds(4, wrench=False))
+def test_cloning_of_single_valves_is_rejected():
+    with pytest.raises(ConfigError, match="Set 'action_space: wrench'"):
+        expert_of(worlds(4, action_space="actuators"))
 
 
-def test_lessons_are_for_the_learner_that_can_follow_them(settings):
-    with pytest.raises(ValueError, match="'lessons' are for the fast PPO"):
+def test_cloning_needs_the_fast_ppo(settings):
+    with pytest.raises(ValueError, match="'cloning_updates' are for the fast PPO"):
         replace(settings, algorithm=replace(settings.algorithm, fast=False))
 
 
 @pytest.mark.parametrize("robot", ["kingfisher", "turtlebot2", "leatherback", "modular_freeflyer"])
-def test_where_actions_are_commands_the_teacher_gives_those_of_its_law(robot):
+def test_where_actions_are_commands_the_expert_gives_those_of_its_law(robot):
     the_robot, task = load_robot(robot), load_task("go_to_position")
     env = BatchVecEnv(the_robot, task, load_scenario("nominal"), worlds=4, seed=3)
     seen = env.reset()
-    commanded = the_robot.actuators.limited(teacher_of(env).actions(seen) * the_robot.actuators.scale)
+    commanded = the_robot.actuators.limited(expert_of(env).actions(seen) * the_robot.actuators.scale)
     np.testing.assert_allclose(commanded, law_of(the_robot, task).act(env.inputs()), atol=1e-6)
 
 
-def test_a_teacher_of_mirrored_worlds_asks_for_what_its_law_commands():
+def test_an_expert_of_mirrored_worlds_commands_what_its_law_commands():
     robot, task = load_robot("kingfisher"), load_task("go_to_position")
     env = BatchVecEnv(robot, task, load_scenario("nominal"), worlds=16, seed=3, mirror="sides")
     seen = env.reset()
-    actions = teacher_of(env).actions(seen)
+    actions = expert_of(env).actions(seen)
     commands = robot.actuators.limited(env.answered(actions) * robot.actuators.scale)
     expected = law_of(robot, task).act(env.inputs())
     np.testing.assert_allclose(commands, expected, atol=1e-6)

@@ -27,7 +27,7 @@ def test_the_two_kinds_of_a_seed_differ_in_nothing_but_the_kind_and_run_side_by_
         assert (stock.seed, stock.time_limit_s) == (fast.seed, fast.time_limit_s)
 
 
-class Told:
+class RecordedExecutor:
     """Runs nothing: seed 2 of each kind learns less, and the stock one at half the speed."""
 
     def __init__(self, broken=()):
@@ -48,22 +48,22 @@ class Told:
         return Outcome(job, record)
 
 
-def test_speed_and_success_over_time_are_told_for_both(jobs):
-    told = compare(jobs, Told(), lambda *_: None)
-    assert told["speed_ratio"] == 2.0
-    assert (told["stock"]["steps_per_s"], told["fast"]["seeds"]) == (100_000, [1, 2])
-    last = told["fast"]["curve"][-1]
+def test_speed_and_success_over_time_are_reported_for_both(jobs):
+    result = compare(jobs, RecordedExecutor(), lambda *_: None)
+    assert result["speed_ratio"] == 2.0
+    assert (result["stock"]["steps_per_s"], result["fast"]["seeds"]) == (100_000, [1, 2])
+    last = result["fast"]["curve"][-1]
     assert (last["wall_s"], last["lowest"], last["highest"]) == (8.0, 0.8, 0.95)
     assert last["success"] == pytest.approx(0.875)
-    assert told["fast"]["time_to_0.9_s"] is None  # one of two never reached it
+    assert result["fast"]["time_to_0.9_s"] is None  # one of two never reached it
 
 
-def test_a_run_that_fails_is_told_and_leaves_the_others(jobs):
-    told = compare(jobs, Told(broken=("fast 2", "stock 1", "stock 2")), lambda *_: None)
-    assert told["failed"] == ["stock 1: broke", "stock 2: broke", "fast 2: broke"]
-    assert "stock" not in told
-    assert told["fast"]["time_to_0.9_s"] == 8.1
-    assert "speed_ratio" not in told
+def test_a_failed_run_is_reported_and_leaves_the_others(jobs):
+    result = compare(jobs, RecordedExecutor(broken=("fast 2", "stock 1", "stock 2")), lambda *_: None)
+    assert result["failed"] == ["stock 1: broke", "stock 2: broke", "fast 2: broke"]
+    assert "stock" not in result
+    assert result["fast"]["time_to_0.9_s"] == 8.1
+    assert "speed_ratio" not in result
 
 
 def test_only_ppo_is_compared(tmp_path, monkeypatch):

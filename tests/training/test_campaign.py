@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.episode import EVALUATION_SEED
+from fulmar_core.seeds import EVALUATION_SEED
 from training.campaign import CAMPAIGN_FILE, run_campaign, summarised
 from training.executors import LocalExecutor
 from training.jobs import Job, Outcome, run_job
@@ -33,7 +33,7 @@ class Quiet:
 
     def advance(self, share, elapsed_s, steps): ...
 
-    def verdict(self, elapsed_s, success): ...
+    def evaluated(self, elapsed_s, success): ...
 
     def end(self): ...
 
@@ -42,13 +42,13 @@ class Quiet:
 def test_a_campaign_runs_every_seed_reports_the_one_that_fails_and_names_the_best(job, tmp_path):
     watched = []
     jobs = [with_seed(job, seed) for seed in (1, EVALUATION_SEED, 2)]
-    told = run_campaign(jobs, LocalExecutor(2), tmp_path, lambda *args: watched.append(args))
-    assert json.loads((tmp_path / CAMPAIGN_FILE).read_text()) == told
-    assert [line["seed"] for line in told["seeds"]] == [1, EVALUATION_SEED, 2]
-    assert told["failed"] == 1
-    assert "are kept for judging" in told["seeds"][1]["error"]
-    assert told["best_seed"] in (1, 2)
-    assert read_run_record(Path(told["best_run"]))["updates"] == 2
+    result = run_campaign(jobs, LocalExecutor(2), tmp_path, lambda *args: watched.append(args))
+    assert json.loads((tmp_path / CAMPAIGN_FILE).read_text()) == result
+    assert [line["seed"] for line in result["seeds"]] == [1, EVALUATION_SEED, 2]
+    assert result["failed"] == 1
+    assert "are reserved for evaluation" in result["seeds"][1]["error"]
+    assert result["best_seed"] in (1, 2)
+    assert read_run_record(Path(result["best_run"]))["updates"] == 2
     states = {number: state for number, state, _ in watched}
     assert states == {0: "done", 1: "failed", 2: "done"}
 
@@ -111,7 +111,7 @@ def test_a_job_that_was_done_is_not_done_again(job):
 
 
 @pytest.mark.slow
-def test_a_job_goes_on_where_it_was_interrupted_then_judges_and_exports(job, tmp_path):
+def test_a_job_goes_on_where_it_was_interrupted_then_evaluates_and_exports(job, tmp_path):
     run_job(job, Quiet())
     record = read_run_record(job.out)
     (job.out / "run.json").write_text(json.dumps(record | {"interrupted": True}))
@@ -130,7 +130,7 @@ def outcome(job, seed, *, held_out, mujoco=None, score=0.0):
 
 
 def test_the_best_run_is_the_one_that_does_best_in_mujoco_then_by_score(job):
-    told = summarised(
+    result = summarised(
         [
             outcome(job, 1, held_out=1.0, mujoco=0.9, score=2.0),
             outcome(job, 2, held_out=0.9, mujoco=1.0, score=1.0),
@@ -138,14 +138,14 @@ def test_the_best_run_is_the_one_that_does_best_in_mujoco_then_by_score(job):
             Outcome(with_seed(job, 4), None, "broke"),
         ]
     )
-    assert (told["best_seed"], told["failed"]) == (3, 1)
-    assert told["success_mean"] == pytest.approx(2.9 / 3.0)
-    assert told["seeds"][3] == {"seed": 4, "run": str(with_seed(job, 4).out), "error": "broke"}
+    assert (result["best_seed"], result["failed"]) == (3, 1)
+    assert result["success_mean"] == pytest.approx(2.9 / 3.0)
+    assert result["seeds"][3] == {"seed": 4, "run": str(with_seed(job, 4).out), "error": "broke"}
 
 
 def test_a_campaign_of_failures_has_no_best(job):
-    told = summarised([Outcome(job, None, "broke")])
-    assert (told["best_seed"], told["success_mean"], told["success_std"]) == (None, None, None)
+    result = summarised([Outcome(job, None, "broke")])
+    assert (result["best_seed"], result["success_mean"], result["success_std"]) == (None, None, None)
 
 
 @pytest.mark.slow
@@ -164,10 +164,10 @@ def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path, mon
         assert sum(node["Alive"] for node in ray.nodes()) == 2
         watched = []
         jobs = [with_seed(job, seed) for seed in (1, 2, EVALUATION_SEED)]
-        told = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
-        assert told["failed"] == 1
-        assert "are kept for judging" in told["seeds"][2]["error"]
-        assert told["best_seed"] in (1, 2)
+        result = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
+        assert result["failed"] == 1
+        assert "are reserved for evaluation" in result["seeds"][2]["error"]
+        assert result["best_seed"] in (1, 2)
         for one in jobs[:2]:
             assert read_run_record(one.out)["updates"] == 2
         assert {number: state for number, state, _ in watched} == {0: "done", 1: "done", 2: "failed"}

@@ -19,8 +19,7 @@ from fulmar_core.tasks import load_task
 from tests.pairs import each_pair
 from training import kernel
 from training.compiled import CompiledStep
-from training.kernel import compiler_found
-from training.pytree import leaves, parts_of
+from training.kernel import compiler_found, leaves, parts_of
 from training.vec_env import BatchVecEnv
 
 pytestmark = pytest.mark.skipif(
@@ -47,11 +46,11 @@ def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None):
         command = rng.uniform(-1.0, 1.0, (WORLDS, len(robot.actuators.names))) * robot.actuators.scale
         command = command.astype(np.float32)
         reward, over, seen = observed_step(plain, command, effort=robot.costs.effort)
-        told = compiled(command, effort=robot.costs.effort)
-        np.testing.assert_array_equal(told[1], over)
-        np.testing.assert_allclose(told[0], reward, atol=2e-4)
-        np.testing.assert_allclose(told[2], seen, atol=2e-4)
-        assert told[2].dtype == seen.dtype
+        result = compiled(command, effort=robot.costs.effort)
+        np.testing.assert_array_equal(result[1], over)
+        np.testing.assert_allclose(result[0], reward, atol=2e-4)
+        np.testing.assert_allclose(result[2], seen, atol=2e-4)
+        assert result[2].dtype == seen.dtype
         if k % 17 == 9:
             for worlds in (plain, batch):
                 worlds.reset([1, 3, 5 + k % 4])
@@ -204,7 +203,7 @@ except ConfigError as error:
 
 
 @pytest.mark.slow
-def test_a_compiler_that_fails_is_told_of(tmp_path):
+def test_a_failing_compiler_is_reported(tmp_path):
     """In a process of its own: torch looks for a compiler once."""
     failing = os.environ | {"CXX": "false", "TORCHINDUCTOR_CACHE_DIR": str(tmp_path)}
     done = subprocess.run(

@@ -103,7 +103,7 @@ def test_only_a_recurrent_policy_has_memory_and_it_forgets_on_reset(learners):
 def test_a_bundle_commands_what_the_network_does_from_the_first_command_to_the_last(
     learners, name, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("training.train.held_out_judge", lambda *_: lambda network: (0.5, 0.5))
+    monkeypatch.setattr("training.train.held_out_evaluator", lambda *_: lambda network: (0.5, 0.5))
     train(ROBOT, TASK, small(name), seed=1, out=tmp_path / "run", updates=2)
     network = deployed_network(*learners[name], ROBOT.actuators.scale)
     save_network(network, tmp_path / "run" / NETWORK_FILE)

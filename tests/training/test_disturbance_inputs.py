@@ -92,7 +92,13 @@ def test_without_noise_the_terms_of_the_task_stay_what_they_are():
 
 def test_a_learner_receives_the_same_as_a_deployed_network_up_to_errors():
     env = BatchVecEnv(
-        ROBOT, TASK, load_scenario("drift_force_4"), worlds=4, seed=2, told=True, staggered=False
+        ROBOT,
+        TASK,
+        load_scenario("drift_force_4"),
+        worlds=4,
+        seed=2,
+        disturbance_inputs=True,
+        staggered=False,
     )
     assert env.observation_space.shape == (len(NAMES) + 11,)
     seen = env.reset()
@@ -106,7 +112,13 @@ def test_a_learner_receives_the_same_as_a_deployed_network_up_to_errors():
 
 def test_a_learner_forgets_pushes_and_dead_valves_when_an_episode_begins():
     env = BatchVecEnv(
-        ROBOT, TASK, load_scenario("drift_two_lost"), worlds=4, seed=2, told=True, staggered=False
+        ROBOT,
+        TASK,
+        load_scenario("drift_two_lost"),
+        worlds=4,
+        seed=2,
+        disturbance_inputs=True,
+        staggered=False,
     )
     env.reset()
     for _ in range(3):
@@ -119,7 +131,9 @@ def test_a_learner_forgets_pushes_and_dead_valves_when_an_episode_begins():
 
 def test_what_a_learner_knows_survives_an_interruption():
     env, other = (
-        BatchVecEnv(ROBOT, TASK, load_scenario("drift_training"), worlds=4, seed=seed, told=True)
+        BatchVecEnv(
+            ROBOT, TASK, load_scenario("drift_training"), worlds=4, seed=seed, disturbance_inputs=True
+        )
         for seed in (2, 3)
     )
     for each in (env, other):

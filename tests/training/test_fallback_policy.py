@@ -1,4 +1,4 @@
-"""Two networks as one: a specialist takes over where dead valves leave no pose to hold."""
+"""Two networks as one: a fallback policy takes over where dead valves leave no pose to hold."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
 from training import fallback_policy, jobs
 from training.export import export
-from training.fallback_policy import specialist_settings
+from training.fallback_policy import fallback_settings
 from training.jobs import Job, learn
 from training.network import load_network
 from training.policies import ShippedPolicy, recipe
 from training.progress import ProgressFile
-from training.run_folder import NETWORK_FILE, SPECIALIST_FOLDER, read_run_record, read_start
-from training.settings import OnPolicy, RecurrentPpo, SpecialistPlan, load_training_settings
+from training.run_folder import FALLBACK_FOLDER, NETWORK_FILE, read_run_record, read_start
+from training.settings import FallbackPlan, OnPolicy, RecurrentPpo, load_training_settings
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 NAMES = Observer(ROBOT, TASK).names + disturbance_terms(ROBOT)
-STRANDED, MORE, ABLE = (0, 5), (0, 5, 6), (0, 1)
+UNCONTROLLABLE, MORE, ABLE = (0, 5), (0, 5, 6), (0, 1)
 
 
 @pytest.fixture(scope="module")
 def settings():
-    """Those of the policy that ships, and of its specialist, cut to what takes a moment."""
+    """Those of the policy that ships, and of its fallback, cut to what takes a moment."""
     found = load_training_settings(ROBOT, TASK)
-    assert found.specialist is not None
+    assert found.fallback_policy is not None
     return cut(found)
 
 
 def cut(settings):
-    ppo = replace(settings.algorithm, steps=16, minibatch=128, epochs=1, hidden=(16,), lessons=1)
+    ppo = replace(settings.algorithm, steps=16, minibatch=128, epochs=1, hidden=(16,), cloning_updates=1)
     return replace(settings, algorithm=ppo, worlds=32, evaluate_every_s=1e6)
 
 
@@ -67,7 +67,7 @@ def learned(folder, settings, **limits):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory, settings):
     """A run that tests only read."""
-    folder = tmp_path_factory.mktemp("specialist") / "run"
+    folder = tmp_path_factory.mktemp("fallback_policy") / "run"
     with pytest.MonkeyPatch.context() as monkeypatch:
         cut_short(monkeypatch)
         learned(folder, settings, updates=6)
@@ -89,44 +89,44 @@ def seen(*lost):
     return rows
 
 
-def test_the_specialist_acts_where_a_stranding_set_of_valves_is_dead_and_nowhere_else(run):
-    both, alone = load_network(run / NETWORK_FILE), load_network(run / SPECIALIST_FOLDER / NETWORK_FILE)
+def test_the_fallback_policy_acts_where_the_robot_is_uncontrollable_and_nowhere_else(run):
+    both, alone = load_network(run / NETWORK_FILE), load_network(run / FALLBACK_FOLDER / NETWORK_FILE)
     general = load_network(run / NETWORK_FILE)
-    general.specialist = None
-    rows = seen(STRANDED, MORE, ABLE, (3,), ())
+    general.fallback = None
+    rows = seen(UNCONTROLLABLE, MORE, ABLE, (3,), ())
     raw, special, ordinary = (network.infer(rows)[1] for network in (both, alone, general))
     np.testing.assert_array_equal(raw[:2], special[:2])
     np.testing.assert_array_equal(raw[2:], ordinary[2:])
     assert (np.abs(special - ordinary).max(axis=1) > 1e-4).all()  # else this would show nothing
 
 
-def test_it_takes_over_at_every_set_that_strands_the_robot(run):
+def test_it_takes_over_at_every_uncontrollable_set_of_dead_valves(run):
     losses = load_network(run / NETWORK_FILE).losses.numpy()
     assert {tuple(np.flatnonzero(row)) for row in losses} == set(uncontrollable_losses(ROBOT, 2))
 
 
 def test_the_exported_bundle_hands_over_as_the_network_does(run, bundle):
     folder, passport = bundle
-    assert passport.training["specialist"]["updates"] == 2
-    rows = seen(STRANDED, MORE, ABLE)
+    assert passport.training["fallback_policy"]["updates"] == 2
+    rows = seen(UNCONTROLLABLE, MORE, ABLE)
     session = onnxruntime.InferenceSession(folder / "policy.onnx")
     logits = session.run(["logits"], {"observation": rows})[0]
     np.testing.assert_allclose(logits, load_network(run / NETWORK_FILE).infer(rows)[1], atol=1e-4)
 
 
-def test_golden_vectors_prove_the_specialist_too(bundle):
+def test_golden_vectors_cover_the_fallback_policy(bundle):
     folder, _ = bundle
     Policy(folder, ROBOT, TASK)  # checks them
     dead = np.load(folder / "golden.npz")["observations"][:, -8:] < 0.5
-    told = {tuple(np.flatnonzero(row)) for row in dead}
-    assert told > set(uncontrollable_losses(ROBOT, 2))
-    assert () in told
+    reported = {tuple(np.flatnonzero(row)) for row in dead}
+    assert reported > set(uncontrollable_losses(ROBOT, 2))
+    assert () in reported
 
 
 def test_both_share_the_updates_of_the_run(run):
     record = read_run_record(run)
-    assert (record["specialist"]["updates"], record["updates"]) == (2, 4)
-    assert read_run_record(run / SPECIALIST_FOLDER)["settings"]["scenario"] == "drift_stranded"
+    assert (record["fallback_policy"]["updates"], record["updates"]) == (2, 4)
+    assert read_run_record(run / FALLBACK_FOLDER)["settings"]["scenario"] == "drift_stranded"
 
 
 def test_both_share_its_time(tmp_path, settings, quick, monkeypatch):
@@ -139,7 +139,7 @@ def test_both_share_its_time(tmp_path, settings, quick, monkeypatch):
     monkeypatch.setattr(jobs, "_train", note)
     with pytest.raises(KeyboardInterrupt):
         learned(tmp_path, settings, time_limit_s=100.0)
-    assert given == [pytest.approx(100.0 * settings.specialist.share)]
+    assert given == [pytest.approx(100.0 * settings.fallback_policy.share)]
 
 
 class Impatient:
@@ -155,13 +155,13 @@ class Impatient:
         if not self.parts_left:
             signal.raise_signal(signal.SIGINT)
 
-    def verdict(self, elapsed_s, success): ...
+    def evaluated(self, elapsed_s, success): ...
 
     def end(self): ...
 
 
 @pytest.mark.parametrize(
-    "part", [1, pytest.param(2, marks=pytest.mark.slow)], ids=["the specialist", "the other"]
+    "part", [1, pytest.param(2, marks=pytest.mark.slow)], ids=["the fallback", "the other"]
 )
 def test_a_run_that_was_broken_off_ends_with_the_very_networks_of_one_that_was_not(
     tmp_path, settings, quick, run, part
@@ -170,18 +170,18 @@ def test_a_run_that_was_broken_off_ends_with_the_very_networks_of_one_that_was_n
     broken.mkdir()
     with pytest.raises(KeyboardInterrupt):
         learn(job_in(broken, settings, updates=6), Impatient(part))
-    assert (broken / SPECIALIST_FOLDER / NETWORK_FILE).is_file()
+    assert (broken / FALLBACK_FOLDER / NETWORK_FILE).is_file()
     assert (broken / NETWORK_FILE).is_file() == (part == 2)
     assert read_start(broken)["updates"] == 6
     learned(broken, settings, updates=read_start(broken)["updates"])
     record = read_run_record(broken)
-    assert (record["specialist"]["updates"], record["updates"]) == (2, 4)
-    for row in seen(STRANDED, ABLE):
+    assert (record["fallback_policy"]["updates"], record["updates"]) == (2, 4)
+    for row in seen(UNCONTROLLABLE, ABLE):
         raw, whole = (load_network(each / NETWORK_FILE).infer(row[None])[1] for each in (broken, run))
         np.testing.assert_array_equal(raw, whole)
 
 
-def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
+def test_another_fallback_policy_makes_another_policy(settings, quick, monkeypatch):
     policy = ShippedPolicy(ROBOT.name, TASK.name, seed=1, updates=6, success=0.9)
     first = recipe(policy, settings)
     load = fallback_policy.load_training_settings
@@ -195,22 +195,22 @@ def test_another_specialist_makes_another_policy(settings, quick, monkeypatch):
     ("change", "said"),
     [
         ({"scenario": "drift_two_lost"}, "'stranding: true'"),
-        ({"told": False}, "'told'"),
-        ({"specialist": SpecialistPlan("drift_stranded", 0.5)}, "and no specialist"),
+        ({"disturbance_inputs": False}, "'disturbance_inputs'"),
+        ({"fallback_policy": FallbackPlan("drift_stranded", 0.5)}, "and no fallback"),
     ],
 )
-def test_specialists_that_could_not_take_over_are_refused(settings, monkeypatch, change, said):
+def test_fallback_policies_that_could_not_take_over_are_rejected(settings, monkeypatch, change, said):
     load = fallback_policy.load_training_settings
     monkeypatch.setattr(
         fallback_policy, "load_training_settings", lambda *given: replace(load(*given), **change)
     )
     with pytest.raises(ConfigError, match=said):
-        specialist_settings(settings, ROBOT, TASK)
+        fallback_settings(settings, ROBOT, TASK)
 
 
-def test_who_is_not_told_what_is_dead_cannot_hand_over(settings):
-    with pytest.raises(ValueError, match="needs 'told'"):
-        replace(settings, told=False)
+def test_a_fallback_policy_needs_disturbance_inputs(settings):
+    with pytest.raises(ValueError, match="needs 'disturbance_inputs'"):
+        replace(settings, disturbance_inputs=False)
 
 
 def test_a_network_with_memory_cannot_hand_over(settings):
@@ -220,13 +220,13 @@ def test_a_network_with_memory_cannot_hand_over(settings):
 
 
 def test_both_are_measured_alike():
-    """The network that hands over would else be told of a loss by an estimate that the other has never met."""
+    """The network that hands over would else be reported of a loss by an estimate that the other has never met."""
     main = load_training_settings(ROBOT, TASK)
-    own = specialist_settings(main, ROBOT, TASK)
+    own = fallback_settings(main, ROBOT, TASK)
     assert load_scenario(own.scenario).sensing == load_scenario(main.scenario).sensing
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0, -0.2])
 def test_both_need_a_part_of_the_run(share):
     with pytest.raises(ValueError, match="between 0 and 1"):
-        SpecialistPlan("any", share)
+        FallbackPlan("any", share)

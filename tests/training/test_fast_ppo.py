@@ -12,8 +12,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from torch import nn
 
 from training.action_law import action_law
-from training.fast_mlp import FastMlp
-from training.fast_ppo import FastPPO
+from training.fast_ppo import FastMlp, FastPPO
 
 MULTI_BINARY, BOX = spaces.MultiBinary(3), spaces.Box(-1.0, 1.0, (2,))
 ORDERS = spaces.MultiDiscrete([3, 3])

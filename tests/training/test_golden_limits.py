@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.policy_bundle import Golden, read_bundle
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 from training.golden_limits import reached, with_limits
 
 BUNDLES = sorted(folder for folder in policies_directory().iterdir() if folder.is_dir())

@@ -11,7 +11,6 @@ import pytest
 import torch
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import EVALUATION_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.metrics import summary
@@ -20,6 +19,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.policy_bundle import read_golden, read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends
+from fulmar_core.seeds import EVALUATION_SEED
 from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
 from sim_nodes.mujoco_backend import MujocoBackend

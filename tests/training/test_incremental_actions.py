@@ -1,4 +1,4 @@
-"""Policies that order actuators that slew astern, as they are, or ahead."""
+"""Policies that move actuators with slew astern or ahead, or hold them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from training.deploy import deployed_network
 from training.learners import build_learner
 from training.network import load_network, save_network
 from training.run_folder import NETWORK_FILE
-from training.settings import Orders, load_training_settings
+from training.settings import IncrementalActions, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -28,7 +28,7 @@ STEP = BOAT.actuators.response.slew[0] / BOAT.timing.control_hz  # of a command,
 
 def worlds(hold, robot=BOAT, scenario="nominal", **more):
     return BatchVecEnv(
-        robot, TASK, load_scenario(scenario), worlds=16, seed=3, staggered=False, orders_held=hold, **more
+        robot, TASK, load_scenario(scenario), worlds=16, seed=3, staggered=False, action_hold=hold, **more
     )
 
 
@@ -36,7 +36,7 @@ def ordered(left, right):
     return np.tile(np.array([left, right]), (16, 1))
 
 
-def test_an_order_moves_a_command_as_far_as_slew_lets_it():
+def test_an_action_moves_a_command_as_far_as_slew_allows():
     env = worlds(hold=1)
     env.reset()
     env.step(ordered(AHEAD, ASTERN))
@@ -45,7 +45,7 @@ def test_an_order_moves_a_command_as_far_as_slew_lets_it():
     np.testing.assert_allclose(env.simulation.command, np.tile([STEP, 0.0], (16, 1)), atol=1e-7)
 
 
-def test_an_order_that_is_held_is_the_same_order_again_and_its_rewards_are_added_up():
+def test_a_held_action_is_repeated_and_its_rewards_are_added_up():
     held, again = worlds(hold=3), worlds(hold=1)
     held.reset()
     again.reset()
@@ -55,7 +55,7 @@ def test_an_order_that_is_held_is_the_same_order_again_and_its_rewards_are_added
     np.testing.assert_allclose(rewards, sum(step[1] for step in steps), rtol=1e-5)
 
 
-def test_held_orders_do_not_lengthen_episodes():
+def test_held_actions_do_not_lengthen_episodes():
     env = worlds(hold=7)  # 600 steps are no multiple of it
     env.reset()
     ended = [env.step(ordered(AS_IT_IS, AS_IT_IS))[2].all() for _ in range(86)]
@@ -63,7 +63,7 @@ def test_held_orders_do_not_lengthen_episodes():
     assert ended[-1]
 
 
-def test_an_episode_that_ends_while_an_order_is_held_ends_with_it():
+def test_an_episode_that_ends_during_a_held_action_ends_with_it():
     env = worlds(hold=3, robot=replace(BOAT, limits=replace(BOAT.limits, geofence=1e-3)))
     env.reset()
     _, _, dones, infos = env.step(ordered(AHEAD, AHEAD))
@@ -80,15 +80,15 @@ def test_an_episode_that_ends_under_way_has_ended_also_if_the_last_step_says_not
     assert np.flatnonzero(env.step(ordered(AHEAD, AHEAD))[2]).tolist() == [4, 7]
 
 
-def test_orders_to_a_mirrored_goal_are_mirrored_back():
+def test_actions_for_a_mirrored_goal_are_mirrored_back():
     plain, mirrored, mirror = worlds(hold=2), worlds(hold=2, mirror="sides"), Mirror.of(BOAT, TASK, "sides")
     other = plain.reset()[:, mirror.side] < 0.0
     assert 0 < other.sum() < len(other)
     mirrored.reset()
     mirrored.step(ordered(AHEAD, ASTERN))
-    orders = ordered(AHEAD, ASTERN)
-    orders[other] = orders[other][:, ::-1]
-    plain.step(orders)
+    actions = ordered(AHEAD, ASTERN)
+    actions[other] = actions[other][:, ::-1]
+    plain.step(actions)
     np.testing.assert_array_equal(mirrored.simulation.command, plain.simulation.command)
 
 
@@ -102,22 +102,22 @@ def deployed(small_settings):
     return learner, env, deployed_network(learner, env, BOAT.actuators.scale)
 
 
-def test_a_deployed_network_asks_for_what_the_likeliest_orders_ask_for(deployed):
+def test_a_deployed_network_commands_the_likeliest_actions(deployed):
     learner, env, network = deployed
     rows = np.asarray(env.venv.simulation.observe())  # as a robot sees it: neither mirrored nor normalised
     mirror, previous = env.venv.mirror, rows[:, -2:]
     other = rows[:, mirror.side] < 0.0
     shown = np.where(other[:, None], rows @ mirror.seen, rows)
-    orders = learner.predict(env.normalize_obs(shown), deterministic=True)[0] - 1.0
-    orders[other] = orders[other] @ mirror.done
-    assert 0 < (orders == 0.0).sum() < orders.size
-    asked = np.where(orders == 0.0, previous, orders)
+    actions = learner.predict(env.normalize_obs(shown), deterministic=True)[0] - 1.0
+    actions[other] = actions[other] @ mirror.done
+    assert 0 < (actions == 0.0).sum() < actions.size
+    asked = np.where(actions == 0.0, previous, actions)
     command, raw, _ = network.infer(rows)
     np.testing.assert_allclose(command, asked * BOAT.actuators.scale, atol=1e-6)
     assert raw.shape == command.shape
 
 
-def test_a_network_of_orders_is_read_back_as_it_was_written(deployed, tmp_path):
+def test_a_network_of_incremental_actions_is_read_back_as_it_was_written(deployed, tmp_path):
     _, env, network = deployed
     save_network(network, tmp_path / "network.pt")
     seen = np.asarray(env.venv.simulation.observe())
@@ -126,32 +126,34 @@ def test_a_network_of_orders_is_read_back_as_it_was_written(deployed, tmp_path):
 
 
 def test_a_run_counts_control_steps(small_settings, tmp_path):
-    settings = replace(small_settings, orders=Orders(hold=3), mirror="sides")
+    settings = replace(small_settings, incremental_actions=IncrementalActions(hold=3), mirror="sides")
     record = train(BOAT, TASK, settings, seed=1, out=tmp_path, updates=1)
     assert record["steps"] == settings.worlds * settings.algorithm.steps * 3
     assert record["curve"][-1]["steps"] == record["steps"]
     plan = load_network(tmp_path / NETWORK_FILE).plan
-    assert (plan.decision, plan.side is None) == ("order", False)
+    assert (plan.decision, plan.side is None) == ("increment", False)
 
 
-def test_robots_whose_actuators_follow_at_once_take_no_orders():
+def test_robots_without_slew_take_no_incremental_actions():
     robot = load_robot("floating_platform")
-    with pytest.raises(ConfigError, match="'orders': the actuators of 'floating_platform' have no slew"):
+    with pytest.raises(
+        ConfigError, match="'incremental_actions': the actuators of 'floating_platform' have no slew"
+    ):
         worlds(hold=3, robot=robot)
 
 
-def test_orders_that_stand_for_no_time_are_refused():
+def test_a_hold_of_no_step_is_rejected():
     with pytest.raises(ValueError, match="'hold' must be at least 1"):
-        Orders(hold=0)
+        IncrementalActions(hold=0)
 
 
-@pytest.mark.parametrize("more", [{"told": True}, {"wrench": True}])
-def test_networks_that_are_told_or_ask_for_a_wrench_give_no_orders(more):
-    with pytest.raises(ValueError, match="'orders' are for ppo, without"):
+@pytest.mark.parametrize("more", [{"disturbance_inputs": True}, {"action_space": "wrench"}])
+def test_networks_with_disturbance_inputs_or_wrenches_take_no_incremental_actions(more):
+    with pytest.raises(ValueError, match="'incremental_actions' are for ppo, without"):
         replace(load_training_settings(BOAT, TASK), **more)
 
 
 @pytest.mark.parametrize("name", ["recurrent_ppo", "kingfisher_go_to_position_with_obstacles", "sac"])
-def test_learners_that_cannot_learn_orders_say_so(name):
-    with pytest.raises(ValueError, match="'orders' are for ppo, without"):
-        replace(load_training_settings(BOAT, TASK, name), orders=Orders(hold=3))
+def test_other_learners_take_no_incremental_actions(name):
+    with pytest.raises(ValueError, match="'incremental_actions' are for ppo, without"):
+        replace(load_training_settings(BOAT, TASK, name), incremental_actions=IncrementalActions(hold=3))

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from fulmar_core.policy_bundle import read_passport
+from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
-from policy_server.shipped import policies_directory
 from training import policies
 from training.jobs import Job, Outcome, run_job
 from training.policies import (
@@ -46,14 +46,14 @@ def test_the_table_names_every_policy_that_shall_ship():
 
 
 def test_every_shipped_policy_is_up_to_date_with_what_it_is_made_from(tmp_path):
-    told = {
+    options = {
         "episodes": 1,
         "command": "",
         "git_revision": "",
         "runs": tmp_path,
         "bundles": policies_directory(),
     }
-    assert [one.name for one in load_policy_table().policies if not is_made(policy_job(one, **told))] == []
+    assert [one.name for one in load_policy_table().policies if not is_made(policy_job(one, **options))] == []
 
 
 def test_making_all_of_them_takes_under_ninety_minutes():
@@ -69,8 +69,8 @@ def test_making_all_of_them_takes_under_ninety_minutes():
         )
         for policy in table.policies
     ]
-    judging = 60.0 * len(jobs) / table.at_once
-    assert expected_s(jobs, table.at_once) + judging < 90.0 * 60.0
+    evaluation = 60.0 * len(jobs) / table.at_once
+    assert expected_s(jobs, table.at_once) + evaluation < 90.0 * 60.0
 
 
 @pytest.mark.slow

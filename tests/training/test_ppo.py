@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from training.learners import build_learner
-from training.ppo import KlAdaptiveRate
+from training.learners import KlAdaptiveRate, build_learner
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from fulmar_core.tasks import load_task
 from training.checkpoint import load_checkpoint
 from training.fast_ppo import FastPPO
 from training.run_folder import CHECKPOINT_FILE, SETTINGS_FILE, TENSORBOARD_FOLDER, read_run_record
-from training.settings import Refinement, StopAtSuccess, load_training_settings
+from training.settings import Annealing, StopAtSuccess, load_training_settings
 from training.train import train
 from training.vec_env import BatchVecEnv
 
@@ -54,26 +54,26 @@ def _scenario(settings):
 
 
 @pytest.fixture
-def quick_judge(monkeypatch):
-    """Judge without episodes; the success rates come from this list, the last one again and again."""
+def quick_evaluator(monkeypatch):
+    """Evaluator without episodes; the success rates come from this list, the last one again and again."""
     rates = [0.5]
 
-    def judge_of(*_):
+    def evaluator_of(*_):
         left = iter(rates)
         last = [rates[0]]
 
-        def judge(network):
+        def evaluate(network):
             last[0] = next(left, last[0])
             return last[0], last[0]
 
-        return judge
+        return evaluate
 
-    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    monkeypatch.setattr("training.train.held_out_evaluator", evaluator_of)
     return rates
 
 
 @pytest.mark.parametrize("name", ["differential_drive", "recurrent_ppo", "sac", "td3"])
-def test_a_resumed_run_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_path, quick_judge, name):
+def test_a_resumed_run_ends_with_the_weights_of_an_uninterrupted_one(tmp_path, quick_evaluator, name):
     settings = small(name)
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     train(TURTLEBOT, TASK, settings, seed=1, out=whole, updates=6)
@@ -89,7 +89,7 @@ def test_a_resumed_run_ends_with_the_very_weights_of_an_uninterrupted_one(tmp_pa
     assert statistics.count == others.count
 
 
-def test_another_seed_gives_other_weights(tmp_path, quick_judge):
+def test_another_seed_gives_other_weights(tmp_path, quick_evaluator):
     settings = small("differential_drive")
     for seed in (1, 2):
         train(TURTLEBOT, TASK, settings, seed=seed, out=tmp_path / str(seed), updates=2)
@@ -99,7 +99,7 @@ def test_another_seed_gives_other_weights(tmp_path, quick_judge):
 
 @pytest.mark.parametrize("second_s", [1e-6, 1e3])
 def test_how_fast_the_machine_is_does_not_change_when_a_run_of_updates_is_checked(
-    tmp_path, quick_judge, monkeypatch, second_s
+    tmp_path, quick_evaluator, monkeypatch, second_s
 ):
     now = itertools.count()
     monkeypatch.setattr("training.session.time.monotonic", lambda: second_s * next(now))
@@ -108,21 +108,21 @@ def test_how_fast_the_machine_is_does_not_change_when_a_run_of_updates_is_checke
     assert [check["steps"] for check in record["curve"]] == [3 * 128, 6 * 128, 9 * 128, 10 * 128]
 
 
-def test_a_resumed_run_is_checked_when_the_uninterrupted_one_is(tmp_path, quick_judge):
+def test_a_resumed_run_is_checked_when_the_uninterrupted_one_is(tmp_path, quick_evaluator):
     settings = replace(small("differential_drive"), evaluate_every_s=4.0, time_limit_s=10.0)
     train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=5)
     record = train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=10, resume=True)
     assert [check["steps"] // 128 for check in record["curve"]] == [2, 4, 5, 8, 10]
 
 
-def test_a_number_of_updates_is_kept(tmp_path, quick_judge):
+def test_a_number_of_updates_is_kept(tmp_path, quick_evaluator):
     record = train(TURTLEBOT, TASK, small("differential_drive"), seed=1, out=tmp_path, updates=3)
     assert record["updates"] == 3
     assert record["steps"] == 3 * 8 * 16
 
 
-def test_a_run_stops_early_once_several_checks_in_a_row_are_good_enough(tmp_path, quick_judge):
-    quick_judge[:] = [0.995, 0.9, 1.0, 0.996, 1.0]
+def test_a_run_stops_early_once_several_checks_in_a_row_are_good_enough(tmp_path, quick_evaluator):
+    quick_evaluator[:] = [0.995, 0.9, 1.0, 0.996, 1.0]
     settings = replace(
         small("differential_drive"), evaluate_every_s=1e-6, stop_at_success=StopAtSuccess(0.995, checks=2)
     )
@@ -140,12 +140,12 @@ class Impatient:
         if steps == 2 * 8 * 16:
             os.kill(os.getpid(), signal.SIGINT)
 
-    def verdict(self, elapsed_s, success): ...
+    def evaluated(self, elapsed_s, success): ...
 
     def end(self): ...
 
 
-def test_ctrl_c_leaves_a_finished_run_that_can_be_resumed(tmp_path, quick_judge):
+def test_ctrl_c_leaves_a_finished_run_that_can_be_resumed(tmp_path, quick_evaluator):
     settings, before = small("differential_drive"), signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=50, watcher=Impatient())
@@ -157,19 +157,19 @@ def test_ctrl_c_leaves_a_finished_run_that_can_be_resumed(tmp_path, quick_judge)
     assert (again["updates"], again["interrupted"]) == (4, False)
 
 
-def test_a_run_that_a_person_broke_off_goes_on_as_if_nobody_had(tmp_path, monkeypatch):
+def test_an_interrupted_run_continues_as_an_uninterrupted_one(tmp_path, monkeypatch):
     """What it is worth when it is broken off is looked at, and must not count later."""
 
-    def judge_of(*_):
+    def evaluator_of(*_):
         scores = itertools.count(1.0, -0.1)  # so that the first check of a part is its best one
 
-        def judge(network):
+        def evaluate(network):
             score = next(scores)
             return 0.5, score
 
-        return judge
+        return evaluate
 
-    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    monkeypatch.setattr("training.train.held_out_evaluator", evaluator_of)
     settings = replace(small("differential_drive"), evaluate_every_s=4.0, time_limit_s=10.0)
     settings = replace(settings, stop_at_success=StopAtSuccess(0.5, checks=2))
     with pytest.raises(KeyboardInterrupt):
@@ -183,7 +183,7 @@ def test_a_run_that_a_person_broke_off_goes_on_as_if_nobody_had(tmp_path, monkey
 
 @pytest.mark.parametrize("left", ["nothing", "a check"])
 def test_a_disk_that_has_no_room_for_a_checkpoint_costs_not_the_network(
-    tmp_path, quick_judge, monkeypatch, left
+    tmp_path, quick_evaluator, monkeypatch, left
 ):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device", "checkpoint.pkl")
@@ -200,7 +200,7 @@ def test_a_disk_that_has_no_room_for_a_checkpoint_costs_not_the_network(
         assert (record["updates"], record["interrupted"]) == (3, True)
 
 
-def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypatch):
+def test_annealing_reaches_worlds_and_learner(tmp_path, quick_evaluator, monkeypatch):
     dearer, less, smaller = [], [], []
     monkeypatch.setattr(BatchVecEnv, "set_effort", lambda self, factor: dearer.append(factor))
     monkeypatch.setattr(
@@ -208,8 +208,8 @@ def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypa
         "train",
         lambda self: (less.append(self.ent_coef), smaller.append(self.learning_rate.target)),
     )
-    refinement = Refinement(0.0, 1.0, 5.0, -0.004, updates=0.2)
-    settings = replace(small("differential_drive"), refinement=refinement)
+    annealing = Annealing(0.0, 1.0, 5.0, -0.004, target_kl=0.2)
+    settings = replace(small("differential_drive"), annealing=annealing)
     before, target = settings.algorithm.entropy, settings.algorithm.target_kl
     train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=4)
     assert dearer == pytest.approx([1.0, 2.0, 3.0, 4.0, 5.0])
@@ -217,21 +217,21 @@ def test_a_refinement_reaches_worlds_and_learner(tmp_path, quick_judge, monkeypa
     assert smaller == pytest.approx([target * share for share in (1.0, 0.8, 0.6, 0.4)])
 
 
-def test_a_refined_run_keeps_its_last_network(tmp_path, quick_judge):
-    quick_judge[:] = [0.9, 1.0, 0.8, 0.7]
+def test_an_annealed_run_keeps_its_last_network(tmp_path, quick_evaluator):
+    quick_evaluator[:] = [0.9, 1.0, 0.8, 0.7]
     settings = replace(small("differential_drive"), evaluate_every_s=1e-6)
     kept = [
         train(TURTLEBOT, TASK, each, seed=1, out=tmp_path / name, updates=3)["best"]["success_rate"]
         for name, each in (
             ("plain", settings),
-            ("refined", replace(settings, refinement=Refinement(0.0, 1.0, 1.0, 0.0))),
+            ("annealed", replace(settings, annealing=Annealing(0.0, 1.0, 1.0, 0.0))),
         )
     ]
     assert kept[0] == 1.0
     assert kept[1] < 0.9
 
 
-def test_a_run_folder_holds_settings_curves_and_a_checkpoint(tmp_path, quick_judge):
+def test_a_run_folder_holds_settings_curves_and_a_checkpoint(tmp_path, quick_evaluator):
     settings = small("differential_drive")
     train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=2)
     assert load_training_settings(TURTLEBOT, TASK, str(tmp_path / SETTINGS_FILE)) == settings
@@ -239,7 +239,7 @@ def test_a_run_folder_holds_settings_curves_and_a_checkpoint(tmp_path, quick_jud
     assert (tmp_path / CHECKPOINT_FILE).is_file()
 
 
-def test_a_checkpoint_of_another_version_is_refused_in_words(tmp_path, quick_judge, monkeypatch):
+def test_a_checkpoint_of_another_version_is_refused_in_words(tmp_path, quick_evaluator, monkeypatch):
     settings = small("differential_drive")
     train(TURTLEBOT, TASK, settings, seed=1, out=tmp_path, updates=1)
     monkeypatch.setattr(BatchVecEnv, "set_state", lambda self, state: state["something newer"])

@@ -1,4 +1,4 @@
-"""Every pair of robot and task has settings; mistakes in them are told."""
+"""Every pair of robot and task has settings; mistakes in them are reported."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from training.settings import (
-    Refinement,
+    Annealing,
     StopAtSuccess,
     load_training_settings,
     write_training_settings,
@@ -69,7 +69,23 @@ def test_an_unknown_algorithm_names_the_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("progress", "effort", "entropy", "updates"),
+    ("old", "new"),
+    [
+        ("told: true", "write 'disturbance_inputs'"),
+        ("wrench: true", "write 'action_space: wrench'"),
+        ("specialist: {training: x, share: 0.5}", "write 'fallback_policy'"),
+        ("annealing: {begin: 0.1, end: 0.2, updates: 0.5}", "write 'target_kl' in 'annealing'"),
+        ("algorithm: {kind: ppo, lessons: 3}", "write 'cloning_updates'"),
+    ],
+)
+def test_an_old_key_names_its_line_and_the_new_key(tmp_path, old, new):
+    (tmp_path / "old.yaml").write_text(f"scenario: nominal\n{old}\n")
+    with pytest.raises(ConfigError, match=rf"old\.yaml:2: '\w+' has a new name: {new}\.$"):
+        load_training_settings(PLATFORM, TASK, str(tmp_path / "old.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("progress", "effort", "entropy", "target_kl"),
     [
         (0.0, 1.0, 0.0, 1.0),
         (0.2, 1.0, 0.0, 1.0),
@@ -78,14 +94,12 @@ def test_an_unknown_algorithm_names_the_line(tmp_path):
         (1.0, 3.0, -0.02, 0.2),
     ],
 )
-def test_a_refinement_makes_commands_dearer_exploring_worth_less_and_updates_smaller(
-    progress, effort, entropy, updates
-):
-    refinement = Refinement(0.2, 0.6, 3.0, -0.02, updates=0.2)
-    refined = replace(load_training_settings(PLATFORM, TASK), refinement=refinement)
-    assert refined.target_kl(progress) == pytest.approx(updates * refined.algorithm.target_kl)
-    assert refined.effort(progress) == pytest.approx(effort)
-    assert refined.entropy(progress) == pytest.approx(entropy)
+def test_annealing_raises_effort_and_lowers_entropy_and_update_size(progress, effort, entropy, target_kl):
+    annealing = Annealing(0.2, 0.6, 3.0, -0.02, target_kl=0.2)
+    annealed = replace(load_training_settings(PLATFORM, TASK), annealing=annealing)
+    assert annealed.target_kl(progress) == pytest.approx(target_kl * annealed.algorithm.target_kl)
+    assert annealed.effort(progress) == pytest.approx(effort)
+    assert annealed.entropy(progress) == pytest.approx(entropy)
 
 
 @pytest.mark.parametrize(
@@ -98,15 +112,15 @@ def test_a_refinement_makes_commands_dearer_exploring_worth_less_and_updates_sma
         (0.1, 0.5, 1.0, 0.0, 0.0),
     ],
 )
-def test_a_refinement_of_impossible_shares_is_refused(values):
+def test_annealing_with_impossible_shares_is_rejected(values):
     with pytest.raises(ValueError, match="must lie in"):
-        Refinement(*values)
+        Annealing(*values)
 
 
-def test_a_learner_that_weighs_entropy_by_itself_takes_no_refinement():
+def test_sac_takes_no_annealing():
     settings = load_training_settings(load_robot("turtlebot2"), TASK, "sac")
     with pytest.raises(ValueError, match="sac weighs entropy by itself"):
-        replace(settings, refinement=Refinement(0.2, 0.6, 3.0, 0.0))
+        replace(settings, annealing=Annealing(0.2, 0.6, 3.0, 0.0))
 
 
 @pytest.mark.parametrize(

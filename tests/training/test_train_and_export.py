@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import torch
 
-from fulmar_core.episode import EVALUATION_SEED, HELD_OUT_SEED
 from fulmar_core.errors import ConfigError
 from fulmar_core.policy_bundle import read_golden, read_passport
+from fulmar_core.seeds import EVALUATION_SEED, HELD_OUT_SEED
 from policy_server.policy import Policy
 from tests.policy_server.observed import inputs_seeing
 from training.deploy import deployed_network
-from training.evaluator import judge_in_mujoco
+from training.evaluator import evaluate_in_mujoco
 from training.export import export
 from training.network import NetworkController, load_network
 from training.run_folder import NETWORK_FILE, RUN_FILE, read_run_record
@@ -68,11 +68,11 @@ def test_the_network_of_a_run_can_be_loaded_and_used(run, robot, task):
     assert controller.act(inputs_seeing(np.zeros((3, 10)))).shape == (3, 8)
 
 
-def test_judging_writes_the_figures_into_the_record(run_copy):
-    figures = judge_in_mujoco(run_copy, episodes=2)
-    judged = json.loads((run_copy / RUN_FILE).read_text())["mujoco"]
-    assert judged["success_rate"] == figures["success_rate"]
-    assert judged["episodes"] == 2
+def test_evaluation_writes_the_metrics_into_the_record(run_copy):
+    figures = evaluate_in_mujoco(run_copy, episodes=2)
+    mujoco = json.loads((run_copy / RUN_FILE).read_text())["mujoco"]
+    assert mujoco["success_rate"] == figures["success_rate"]
+    assert mujoco["episodes"] == 2
 
 
 def test_the_bundle_of_a_run_is_accepted_by_the_policy_server(bundle, robot, task):
@@ -159,13 +159,13 @@ def test_a_network_for_another_number_of_terms_is_refused(run_copy, tmp_path):
 
 
 @pytest.mark.parametrize("seed", [HELD_OUT_SEED, EVALUATION_SEED, -1])
-def test_a_seed_of_the_episodes_that_judge_is_refused(robot, task, small_settings, tmp_path, seed):
-    words = f"seed {seed} must not be negative, nor 2026 and 1000003, which are kept for judging"
+def test_a_seed_reserved_for_evaluation_is_rejected(robot, task, small_settings, tmp_path, seed):
+    words = f"seed {seed} must not be negative, nor 2026 and 1000003, which are reserved for evaluation"
     with pytest.raises(ConfigError, match=words):
         train(robot, task, small_settings, seed=seed, out=tmp_path)
 
 
-def test_evaluate_judges_with_a_seed_that_no_run_has_learned_from():
+def test_evaluate_uses_a_seed_that_no_run_has_learned_from():
     from fulmar_cli.commands.evaluate import evaluate
 
     assert inspect.signature(evaluate).parameters["seed"].default == EVALUATION_SEED
@@ -175,16 +175,16 @@ def interrupted_after(checks, monkeypatch):
     """Let a person press Ctrl-C twice when this many checks have been done; they get worse."""
     scores = iter(range(checks, 0, -1))
 
-    def judge_of(*_):
-        def judge(network):
+    def evaluator_of(*_):
+        def evaluate_network(network):
             score = next(scores, None)
             if score is None:
                 raise KeyboardInterrupt
             return 0.5, float(score)
 
-        return judge
+        return evaluate_network
 
-    monkeypatch.setattr("training.train.held_out_judge", judge_of)
+    monkeypatch.setattr("training.train.held_out_evaluator", evaluator_of)
 
 
 def test_an_interrupted_run_keeps_its_best_network_and_says_so(
@@ -228,13 +228,13 @@ def test_ctrl_c_during_an_export_ends_it_when_the_exporter_is_done(run_copy, tmp
     assert not (tmp_path / "bundle").exists()
 
 
-def test_the_passport_carries_the_verdict_of_mujoco(run_copy, tmp_path):
+def test_the_passport_carries_the_result_of_mujoco(run_copy, tmp_path):
     assert "mujoco" not in export(run_copy, tmp_path / "before").training
-    figures = judge_in_mujoco(run_copy, episodes=2)
-    verdict = export(run_copy, tmp_path / "after").training["mujoco"]
-    assert (verdict["seed"], verdict["scenario"], verdict["episodes"]) == (EVALUATION_SEED, "nominal", 2)
-    assert verdict["success_rate"] == figures["success_rate"]
+    figures = evaluate_in_mujoco(run_copy, episodes=2)
+    result = export(run_copy, tmp_path / "after").training["mujoco"]
+    assert (result["seed"], result["scenario"], result["episodes"]) == (EVALUATION_SEED, "nominal", 2)
+    assert result["success_rate"] == figures["success_rate"]
     shares = [f"{kind}{limit}_percent" for kind in ("PT", "OT") for limit in (5, 2, 1)]
-    assert {name: verdict[name] for name in [*shares, "AAS"]} == {
+    assert {name: result[name] for name in [*shares, "AAS"]} == {
         name: figures[name]["mean"] for name in [*shares, "AAS"]
     }

@@ -11,7 +11,7 @@ import types
 import pytest
 
 from training.jobs import Job, learn
-from training.wandb_curves import WandbCurves
+from training.progress import WandbCurves
 
 
 class Quiet:
@@ -19,7 +19,7 @@ class Quiet:
 
     def advance(self, share, elapsed_s, steps): ...
 
-    def verdict(self, elapsed_s, success): ...
+    def evaluated(self, elapsed_s, success): ...
 
     def end(self): ...
 
@@ -31,22 +31,22 @@ def job(small_settings, tmp_path):
 
 @pytest.fixture
 def recorded(monkeypatch):
-    """A stand-in for the package that notes what it is told."""
-    told = {"logged": [], "finished": 0}
+    """A stand-in for the package that records its calls."""
+    calls = {"logged": [], "finished": 0}
 
     def finish(**_):
-        told["finished"] += 1
+        calls["finished"] += 1
 
     run = types.SimpleNamespace(
-        log=lambda numbers, step: told["logged"].append((step, numbers)), finish=finish
+        log=lambda numbers, step: calls["logged"].append((step, numbers)), finish=finish
     )
 
     def init(**settings):
-        told["settings"] = settings
+        calls["settings"] = settings
         return run
 
     monkeypatch.setitem(sys.modules, "wandb", types.SimpleNamespace(init=init))
-    return told
+    return calls
 
 
 def test_every_number_that_is_logged_is_sent_and_the_run_is_ended(recorded, job):

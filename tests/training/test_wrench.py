@@ -1,4 +1,4 @@
-"""Networks that ask for a wrench, from learning to the bundle."""
+"""Networks whose actions are wrenches, from learning to the bundle."""
 
 from __future__ import annotations
 
@@ -27,11 +27,19 @@ ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 
 
 @pytest.fixture(
-    scope="module", params=[True, pytest.param(False, marks=pytest.mark.slow)], ids=["told", "not told"]
+    scope="module",
+    params=[True, pytest.param(False, marks=pytest.mark.slow)],
+    ids=["disturbance inputs", "none"],
 )
 def learner(request, small_settings):
     worlds = BatchVecEnv(
-        ROBOT, TASK, load_scenario("drift_training"), worlds=32, seed=3, told=request.param, wrench=True
+        ROBOT,
+        TASK,
+        load_scenario("drift_training"),
+        worlds=32,
+        seed=3,
+        disturbance_inputs=request.param,
+        action_space="wrench",
     )
     env = VecNormalize(worlds, norm_reward=False)
     ppo = build_learner(small_settings.algorithm, env, seed=3)
@@ -45,7 +53,12 @@ def learner(request, small_settings):
 def bundle(learner, small_settings, tmp_path_factory):
     """A bundle of the learner's network."""
     run, out = tmp_path_factory.mktemp("run"), tmp_path_factory.mktemp("bundle")
-    settings = replace(small_settings, scenario="drift_training", told=learner[1].unwrapped.told, wrench=True)
+    settings = replace(
+        small_settings,
+        scenario="drift_training",
+        disturbance_inputs=learner[1].unwrapped.takes_disturbances,
+        action_space="wrench",
+    )
     train(ROBOT, TASK, settings, seed=3, updates=1, out=run)
     save_network(deployed_network(*learner, ROBOT.actuators.scale), run / "network.pt")
     export(run, out)
@@ -53,7 +66,7 @@ def bundle(learner, small_settings, tmp_path_factory):
 
 
 def test_actions_are_wrenches_and_what_the_robot_gets_are_valves():
-    env = BatchVecEnv(ROBOT, TASK, load_scenario("drift_ideal"), worlds=4, seed=1, wrench=True)
+    env = BatchVecEnv(ROBOT, TASK, load_scenario("drift_ideal"), worlds=4, seed=1, action_space="wrench")
     env.reset()
     assert env.action_space.shape == (3,)
     env.step(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]))
@@ -64,12 +77,20 @@ def test_actions_are_wrenches_and_what_the_robot_gets_are_valves():
 
 
 def test_valves_that_are_known_to_be_dead_stay_closed():
-    env = BatchVecEnv(ROBOT, TASK, load_scenario("drift_two_lost"), worlds=64, seed=1, told=True, wrench=True)
+    env = BatchVecEnv(
+        ROBOT,
+        TASK,
+        load_scenario("drift_two_lost"),
+        worlds=64,
+        seed=1,
+        disturbance_inputs=True,
+        action_space="wrench",
+    )
     env.reset()
     rng = np.random.default_rng(2)
     for _ in range(60):
         env.step(rng.uniform(-1.0, 1.0, (64, 3)))
-    known = np.asarray(env._told.dead)
+    known = np.asarray(env._disturbances.dead)
     assert known.sum() > 100
     env.step(rng.uniform(-1.0, 1.0, (64, 3)))
     assert not (np.asarray(env.simulation.command) * known).any()
@@ -79,7 +100,7 @@ def test_the_bundle_opens_the_valves_that_training_would_have_opened(learner, bu
     ppo, env = learner
     seen = read_golden(bundle).observations
     shares, _ = ppo.predict(env.normalize_obs(seen), deterministic=True)
-    dead = 1.0 - torch.from_numpy(seen[:, -8:]) if env.unwrapped.told else None
+    dead = 1.0 - torch.from_numpy(seen[:, -8:]) if env.unwrapped.takes_disturbances else None
     trained = env.unwrapped.choice.best(torch.from_numpy(shares), dead).numpy()
     network = deployed_network(ppo, env, ROBOT.actuators.scale)
     commands, margins, _ = network.infer(seen)
@@ -99,7 +120,7 @@ def test_the_served_policy_flies_as_the_network_does(learner, bundle):
     loop.begin(goal_in_float64(env.simulation.goal))
     for number in range(5):
         inputs = loop.inputs(env.simulation.measured, round(1e9 * number * loop.dt))
-        assert (inputs.estimates is not None) == learner[1].unwrapped.told
+        assert (inputs.estimates is not None) == learner[1].unwrapped.takes_disturbances
         step = loop.act(inputs)
         np.testing.assert_array_equal(step.action, twin.act(inputs))
         env.simulation.move(step.command)
@@ -126,5 +147,5 @@ def test_a_robot_without_on_off_valves_cannot_be_asked_for_wrenches():
             load_scenario("nominal"),
             worlds=2,
             seed=1,
-            wrench=True,
+            action_space="wrench",
         )

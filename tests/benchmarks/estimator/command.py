@@ -10,7 +10,7 @@ from rich.table import Table
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import step_bar
-from fulmar_cli.commands.arguments import JsonOption, SeedOption
+from fulmar_cli.commands.arguments import JsonOption, SeedOption, renamed
 from fulmar_core.errors import FAILED
 
 
@@ -23,35 +23,37 @@ def estimator(
     ] = "mocap_imu",
     latency_ms: Annotated[
         float,
-        typer.Option(metavar="MS", min=0.0, max=500.0, help="How late poses come; the estimator is told."),
+        typer.Option(
+            metavar="MS", min=0.0, max=500.0, help="How late poses come; the estimator is estimates."
+        ),
     ] = 10.0,
     drives: Annotated[int, typer.Option(metavar="N", min=1, help="How many drives.")] = 3,
     seconds: Annotated[float, typer.Option(metavar="S", min=10.0, help="How long each drive is.")] = 40.0,
-    picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw one drive into a PNG file.")
-    ] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw one drive into a PNG file.")] = None,
+    old_plot: Annotated[Path | None, renamed("--picture", "--plot")] = None,
     seed: SeedOption = 0,
     as_json: JsonOption = False,
 ) -> None:
     """Compare the state estimator with the mean of 30 poses that RoboRAN deploys, on the same data.
 
     A robot is driven about in the core's dynamics at 200 Hz; its poses, at 200 Hz and at 25 Hz, and its inertial
-    readings have the noise of the robot's YAML. Every figure is about what a controller is told at the very instant,
+    readings have the noise of the robot's YAML. Every figure is about what a controller receives at an instant,
     against the truth at that instant. Exit code 1 if the estimator's velocity error is more than half the mean's, or
     20 ms late.
 
     Try:
 
-    fulmar benchmark estimator --picture estimator.png
+    fulmar benchmark estimator --plot estimator.png
     """
     import dataclasses
 
     from fulmar_cli.extras import require
     from fulmar_core.robot import load_robot
 
-    require("filterpy", *(["matplotlib"] if picture else []))
+    plot = plot or old_plot
+    require("filterpy", *(["matplotlib"] if plot else []))
     from fulmar_core.estimation.motion_filter import load_estimator
-    from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, compare, verdict
+    from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, compare, requirements_met
     from tests.benchmarks.estimator.comparison import as_json as rows_of
     from tests.benchmarks.estimator.drive import drives as drive_about
 
@@ -61,7 +63,7 @@ def estimator(
     with step_bar("estimating", 3 * len(RATES_HZ)) as progress:
         driven = drive_about(the_robot, count=drives, seconds=seconds, seed=seed)
         found = compare(driven, believed, the_robot.limits, latency_ms / 1e3, lambda: progress(next(done)))
-    lines = verdict(found)
+    lines = requirements_met(found)
     figures: dict[str, Any] = {
         "robot": robot,
         "settings": settings,
@@ -71,13 +73,13 @@ def estimator(
         "rows": rows_of(found),
         "required": lines,
     }
-    if picture is not None:
+    if plot is not None:
         from fulmar_evaluation.report.style import as_png
-        from tests.benchmarks.estimator.picture import draw
+        from tests.benchmarks.estimator.plot import draw
 
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        picture.write_bytes(as_png(draw(driven[0], found, believed, the_robot.limits, latency_ms / 1e3)))
-        console.print(f"drawn: {picture}", markup=False)
+        plot.parent.mkdir(parents=True, exist_ok=True)
+        plot.write_bytes(as_png(draw(driven[0], found, believed, the_robot.limits, latency_ms / 1e3)))
+        console.print(f"drawn: {plot}", markup=False)
     if as_json:
         print_json(figures)
     else:

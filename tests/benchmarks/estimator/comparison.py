@@ -1,7 +1,8 @@
-"""What each estimator tells at every tick, and how far that is from the truth."""
+"""Estimates at every tick of each method, and their errors."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
@@ -13,10 +14,32 @@ from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw
 from fulmar_core.sensors.imu import ImuSample
 from tests.benchmarks.estimator.drive import TICK_S, Drive
-from tests.benchmarks.estimator.thirty_poses import ThirtyPoses
+
+POSES = 30
+
+
+class ThirtyPoses:
+    """The mean over a buffer."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._poses: deque[tuple[float, np.ndarray]] = deque(maxlen=POSES)
+
+    def see_pose(self, time_s: float, pose: np.ndarray) -> None:
+        """Note a pose (x [m], y [m], continuous yaw [rad]), captured at a time [s]."""
+        self._poses.append((time_s, pose))
+
+    def motion(self) -> np.ndarray | None:
+        """Velocity in the world [m/s] and turn rate [rad/s], shape (3,); None before the buffer is full."""
+        if len(self._poses) < POSES:
+            return None
+        (first_s, first), (last_s, last) = self._poses[0], self._poses[-1]
+        mean_difference = (last - first) / (POSES - 1)
+        return np.asarray(mean_difference / ((last_s - first_s) / POSES))
+
 
 MEAN, POSES_ALONE, WITH_IMU = "mean of 30 poses", "Fulmar, poses alone", "Fulmar, poses and inertial unit"
-SETTLE_S = 2.0  # before anything is judged: every method has its buffer full then
+SETTLE_S = 2.0  # before anything is evaluated: every method has its buffer full then
 LONGEST_DELAY_S = 1.2
 RATES_HZ = (200.0, 25.0)
 DELAY_LIMIT_S, RMSE_SHARE_LIMIT = 0.020, 0.5  # what is required of the estimator, beside the mean
@@ -24,7 +47,7 @@ DELAY_LIMIT_S, RMSE_SHARE_LIMIT = 0.020, 0.5  # what is required of the estimato
 
 @dataclass(frozen=True)
 class Figures:
-    """How far one method is from the truth at the time when it tells, over all drives."""
+    """How far one method is from the truth at the time of the estimate, over all drives."""
 
     pose_rate_hz: float
     method: str
@@ -34,54 +57,54 @@ class Figures:
     gain_error: float  # of the velocity, once shifted: 0.034 is 3.4 % too fast [-]
 
 
-def tell_by_mean(drive: Drive, every: int, latency_s: float) -> np.ndarray:
-    """What the mean of 30 poses tells at each tick, shape (n, 3); NaN before it tells anything."""
+def estimate_by_mean(drive: Drive, every: int, latency_s: float) -> np.ndarray:
+    """Motion by the mean of 30 poses at each tick, shape (n, 3); NaN before the first."""
     method, late = ThirtyPoses(), round(latency_s / TICK_S)
     yaw = drive.measured_place.copy()
     yaw[:, 2] = np.unwrap(yaw[:, 2])
-    told = np.full((len(drive.time_s), 3), np.nan)
-    for tick in range(len(told)):
+    estimates = np.full((len(drive.time_s), 3), np.nan)
+    for tick in range(len(estimates)):
         captured = tick - late
         if captured >= 0 and captured % every == 0:
             method.see_pose(float(drive.time_s[captured]), yaw[captured])
         motion = method.motion()
         if motion is not None:
-            told[tick] = motion
-    return told
+            estimates[tick] = motion
+    return estimates
 
 
-def tell_by_filter(
+def estimate_by_filter(
     drive: Drive, every: int, latency_s: float, settings: EstimatorSettings, limits: Limits, *, with_imu: bool
 ) -> np.ndarray:
-    """What the estimator tells at each tick, shape (n, 3); poses are stamped when they come, `latency_s` late."""
+    """Motion by the estimator at each tick, shape (n, 3); poses are stamped when they come, `latency_s` late."""
     estimator, late = Estimator(settings, limits), round(latency_s / TICK_S)
-    told = np.full((len(drive.time_s), 3), np.nan)
+    estimates = np.full((len(drive.time_s), 3), np.nan)
     newest = np.full(3, np.nan)
-    for tick in range(len(told)):
-        now_ns, captured, heard = round(1e9 * float(drive.time_s[tick])), tick - late, False
+    for tick in range(len(estimates)):
+        now_ns, captured, taken = round(1e9 * float(drive.time_s[tick])), tick - late, False
         if with_imu:
             sample = ImuSample(drive.force[tick], np.array([0.0, 0.0, drive.turn_rate[tick]]))
-            heard = not estimator.see_imu(sample, now_ns)
+            taken = not estimator.see_imu(sample, now_ns)
         if captured >= 0 and captured % every == 0:
             x, y, yaw = drive.measured_place[captured]
-            heard |= not estimator.see_pose(np.array([x, y, 0.0]), from_yaw(np.asarray(yaw)), now_ns)
-        estimate = estimator.estimate() if heard else None
+            taken |= not estimator.see_pose(np.array([x, y, 0.0]), from_yaw(np.asarray(yaw)), now_ns)
+        estimate = estimator.estimate() if taken else None
         if estimate is not None:
             newest = np.array(
                 [*estimate.state.velocity_in_world[:2], estimate.state.angular_velocity_in_body[2]]
             )
-        told[tick] = newest
-    return told
+        estimates[tick] = newest
+    return estimates
 
 
-def told_by(
+def estimate_by(
     method: str, drive: Drive, rate_hz: float, latency_s: float, settings: EstimatorSettings, limits: Limits
 ) -> np.ndarray:
-    """What a method tells of a drive at each tick, with poses at a rate [Hz]; shape (n, 3)."""
+    """Motion of a drive by a method at each tick, with poses at a rate [Hz]; shape (n, 3)."""
     every = round(1.0 / (rate_hz * TICK_S))
     if method == MEAN:
-        return tell_by_mean(drive, every, latency_s)
-    return tell_by_filter(drive, every, latency_s, settings, limits, with_imu=method == WITH_IMU)
+        return estimate_by_mean(drive, every, latency_s)
+    return estimate_by_filter(drive, every, latency_s, settings, limits, with_imu=method == WITH_IMU)
 
 
 def compare(
@@ -95,13 +118,15 @@ def compare(
     found = []
     for rate_hz in RATES_HZ:
         for method in (MEAN, POSES_ALONE, WITH_IMU):
-            told = [told_by(method, drive, rate_hz, latency_s, settings, limits) for drive in all_drives]
-            found.append(_figures(rate_hz, method, all_drives, told))
+            estimates = [
+                estimate_by(method, drive, rate_hz, latency_s, settings, limits) for drive in all_drives
+            ]
+            found.append(_figures(rate_hz, method, all_drives, estimates))
             progress()
     return found
 
 
-def verdict(found: list[Figures]) -> list[dict[str, object]]:
+def requirements_met(found: list[Figures]) -> list[dict[str, object]]:
     """What is required at each rate, and whether it was found."""
     lines: list[dict[str, object]] = []
     for rate_hz in RATES_HZ:
@@ -126,12 +151,12 @@ def as_json(found: list[Figures]) -> list[dict[str, object]]:
     return [asdict(row) for row in found]
 
 
-def _figures(rate_hz: float, method: str, all_drives: list[Drive], told: list[np.ndarray]) -> Figures:
+def _figures(rate_hz: float, method: str, all_drives: list[Drive], estimates: list[np.ndarray]) -> Figures:
     begin = round((SETTLE_S + LONGEST_DELAY_S) / TICK_S)
     errors = np.concatenate(
-        [one[begin:] - drive.motion[begin:] for one, drive in zip(told, all_drives, strict=True)]
+        [one[begin:] - drive.motion[begin:] for one, drive in zip(estimates, all_drives, strict=True)]
     )
-    shift, gain = _best_shift(all_drives, told, begin)
+    shift, gain = _best_shift(all_drives, estimates, begin)
     return Figures(
         pose_rate_hz=rate_hz,
         method=method,
@@ -142,19 +167,19 @@ def _figures(rate_hz: float, method: str, all_drives: list[Drive], told: list[np
     )
 
 
-def _best_shift(all_drives: list[Drive], told: list[np.ndarray], begin: int) -> tuple[float, float]:
+def _best_shift(all_drives: list[Drive], estimates: list[np.ndarray], begin: int) -> tuple[float, float]:
     """Ticks by which the true velocity is shifted for the least squared error, with the best gain, and that gain.
 
     Found between ticks by a parabola through the three best.
     """
-    told_velocity = np.concatenate([one[begin:, :2].ravel() for one in told])
+    estimated_velocity = np.concatenate([one[begin:, :2].ravel() for one in estimates])
     most = round(LONGEST_DELAY_S / TICK_S)
     least = -round(0.05 / TICK_S)
     costs, gains = [], []
     for shift in range(least, most + 1):
         true = np.concatenate([_shifted(drive.motion[:, :2], shift, begin).ravel() for drive in all_drives])
-        gain = float(true @ told_velocity / (true @ true))
-        costs.append(float(np.mean((told_velocity - gain * true) ** 2)))
+        gain = float(true @ estimated_velocity / (true @ true))
+        costs.append(float(np.mean((estimated_velocity - gain * true) ** 2)))
         gains.append(gain)
     best = int(np.argmin(costs))
     if not 0 < best < len(costs) - 1:

@@ -1,1 +1,1 @@
-"""How near `fulmar identify` comes to the truth, on simulated machines that nobody told it of."""
+"""How near `fulmar identify` comes to the truth, on simulated robots with other values."""

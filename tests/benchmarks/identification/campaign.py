@@ -1,16 +1,78 @@
-"""Many machines at once, and what came of them in one document."""
+"""Many machines: each driven into bags, identified from them and compared with the truth."""
 
 from __future__ import annotations
 
+import json
 import multiprocessing
+import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.pools import ended_with_us, one_thread_each
-from tests.benchmarks.identification.trial import Trial, run_trial
+from fulmar_benchmarks.workers import ended_with_us, one_thread_each
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.identification.identify import Weight, identify
+from fulmar_core.robot import load_robot
+from fulmar_evaluation.driven_run import driven_run
+from tests.benchmarks.identification.driving import draw_machine, drive, speeds_of_wheels
+
+# Long enough that the intervals are a third of what is asked for, and short enough for one tank of air.
+DURATION_S = {"thrusters": 120.0, "propellers": 240.0, "differential_drive": 120.0}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What to do."""
+
+    robot: str
+    number: int
+    seed: int
+    duration_s: float | None = None  # of each run; the usual of the family by default [s]
+    bags: Path | None = None  # where bags are kept; None: they are not
+
+
+def run_trial(trial: Trial) -> dict[str, Any]:
+    """Drive and identify one machine.
+
+    Returns:
+        `robot`, `number`, and for each quantity with a truth `truth`, `value`, `low`, `high`, `inside`, and
+        `error_percent` where the truth is not 0.
+    """
+    nominal = load_robot(trial.robot)
+    machine = draw_machine(nominal, trial.seed, trial.number)
+    if isinstance(nominal.actuators, DifferentialDrive):
+        machine.truth.update(speeds_of_wheels(machine))
+    duration_s = trial.duration_s or DURATION_S[nominal.actuators.kind]
+    with tempfile.TemporaryDirectory() as scratch:
+        home = (trial.bags or Path(scratch)) / f"{trial.robot}_{trial.number:02d}"
+        drives, weights = [], {}
+        for load, leg in enumerate(machine.legs):
+            noise = 1000 * trial.seed + 10 * trial.number + load
+            bag = drive(machine, leg, nominal, home / leg.name, seed=noise, duration_s=duration_s)
+            drives.append(driven_run(bag, load=load)[1])
+            if leg.ballast:
+                weights[load] = Weight(*leg.ballast)
+        if trial.bags is not None:
+            (home / "truth.json").write_text(json.dumps(machine.truth, indent=2) + "\n", encoding="utf-8")
+        found = identify(nominal, drives, ballasts=weights)
+    quantities = {}
+    for name, truth in machine.truth.items():
+        e = found.fit.estimates[name]
+        quantities[name] = {
+            "truth": truth,
+            "value": e.value,
+            "low": e.low,
+            "high": e.high,
+            "unit": e.unit,
+            "error_percent": 100.0 * abs(e.value / truth - 1.0) if truth else None,
+            "inside": bool(e.low <= truth <= e.high),
+        }
+    return {"robot": trial.robot, "number": trial.number, "quantities": quantities}
+
 
 ASKED = ("mass", "yaw_inertia", "thrust")  # of platforms
 MOST_ERROR_PERCENT = 3.0
@@ -21,13 +83,7 @@ PLATFORM = "floating_platform"
 def run_identification(
     trials: Sequence[Trial], *, jobs: int, on_done: Callable[[dict[str, Any]], None] = lambda result: None
 ) -> list[dict[str, Any]]:
-    """Run trials in processes of their own; results in the order of the trials.
-
-    Args:
-        trials: What to do.
-        jobs: Processes at once.
-        on_done: Given each result as it comes.
-    """
+    """Run trials in processes of their own; results in the order of the trials."""
     results: dict[int, dict[str, Any]] = {}
     spawn = multiprocessing.get_context("spawn")
     with one_thread_each(), ended_with_us(ProcessPoolExecutor(jobs, spawn)) as pool:

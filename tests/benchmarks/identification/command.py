@@ -51,8 +51,7 @@ def identify(
     fulmar benchmark identify --robots kingfisher,turtlebot2 --platforms 5
     """
     from fulmar_cli.extras import require
-    from tests.benchmarks.identification.campaign import document_of, run_identification
-    from tests.benchmarks.identification.trial import Trial
+    from tests.benchmarks.identification.campaign import Trial, document_of, run_identification
 
     require("mujoco")
     names = ROBOTS if robots == "all" else tuple(dict.fromkeys(name.strip() for name in robots.split(",")))

@@ -73,13 +73,13 @@ def recorder(
     if as_json:
         print_json(found)
     else:
-        for line in told(found):
+        for line in in_words(found):
             output.print(line, markup=False, soft_wrap=True)
     if not found["passed"]:
         raise typer.Exit(FAILED)
 
 
-def told(found: dict[str, Any]) -> list[str]:
+def in_words(found: dict[str, Any]) -> list[str]:
     """The figures in words."""
     return [
         f"{name + ':':<10} {'yes' if figures['passed'] else 'NO ':<4} {_WORDS[name](figures)}"

@@ -46,12 +46,7 @@ TURNS = (True, False, False, True)  # drift of the machine falls on both alike
 
 
 def cost_of_recording(
-    plan: RunPlan,
-    *,
-    stretches: int,
-    stretch_s: float,
-    out: Path,
-    progress: Callable[[], None],
+    plan: RunPlan, *, stretches: int, stretch_s: float, out: Path, progress: Callable[[], None]
 ) -> dict[str, Any]:
     """Measure.
 
@@ -60,7 +55,7 @@ def cost_of_recording(
         stretches: With a recorder, and as many without, >= 1.
         stretch_s: Length of each [s].
         out: Folder of the bags.
-        progress: Told of each stretch.
+        progress: Called after each stretch.
 
     Returns:
         Figures by name, ready for JSON.

@@ -11,9 +11,7 @@ from typing import Any
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.provenance import fulmar_version, git_revision
 from tests.benchmarks.recorder.cost import cost_of_recording
-from tests.benchmarks.recorder.kills import killed
-from tests.benchmarks.recorder.lockstep import lost_in_lock_step
-from tests.benchmarks.recorder.loss import lost_in_real_time
+from tests.benchmarks.recorder.loss import killed, lost_in_lock_step, lost_in_real_time
 
 ROBOT = "floating_platform"
 PARTS = ("cost", "loss", "lockstep", "kills")
@@ -38,7 +36,7 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
 
     Args:
         asked: What.
-        progress: Told in a few words what goes on.
+        progress: Called with a few words on what goes on.
 
     Returns:
         Figures by part, ready for JSON; `passed` where every part is.
@@ -65,18 +63,10 @@ def measure(asked: Asked, progress: Callable[[str], None]) -> dict[str, Any]:
             )
         elif part == "lockstep":
             found[part] = lost_in_lock_step(
-                ROBOT,
-                control_hz=asked.lockstep_hz,
-                simulated_s=asked.lockstep_s,
-                out=asked.out,
+                ROBOT, control_hz=asked.lockstep_hz, simulated_s=asked.lockstep_s, out=asked.out
             )
         else:
-            found[part] = killed(
-                plan,
-                kills=asked.kills,
-                out=asked.out,
-                progress=lambda: progress("kills"),
-            )
+            found[part] = killed(plan, kills=asked.kills, out=asked.out, progress=lambda: progress("kills"))
     return {
         **found,
         "passed": all(figures["passed"] for figures in found.values()),

@@ -241,7 +241,7 @@ def _checked(found: Vectors, names: tuple[str, ...], topic: str, warnings: list[
     if len(found):
         warnings.append(f"{topic} is about {', '.join(found.names)}, not about {', '.join(names)}: left out.")
     empty = np.zeros(0, dtype=np.int64)
-    return Vectors(names, empty, empty, np.zeros((0, len(names))), found.left_out + len(found))
+    return Vectors(names, empty, empty, empty, np.zeros((0, len(names))), found.left_out + len(found))
 
 
 def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int, int]]:

@@ -1,9 +1,8 @@
-"""The document of a benchmark as rows of cells: one definition for terminals and pages."""
+"""Cells of tables, requirement checks and names for people, shared by terminals and pages."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 SPOKEN = {
     "floating_platform": "floating platform",
@@ -15,14 +14,8 @@ SPOKEN = {
     "go_through_positions": "Go through positions",
     "go_to_position_with_obstacles": "Go to position with obstacles",
 }
-LAWS = {
-    "lqr": "LQR",
-    "polar": "polar law",
-    "line_of_sight": "line of sight",
-    "pure_pursuit": "pure pursuit",
-}
-WAYS = {"batch": "batch", "mujoco": "MuJoCo", "ros": "ROS"}
 GOOD, BAD = "good", "bad"
+MARKS = {GOOD: " ✓", BAD: " ✗", "": ""}  # behind a cell of that tone
 NOTHING = "–"
 
 
@@ -33,156 +26,17 @@ def spoken(name: str) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """What is written, and how it compares with what is asked."""
+    """What is written, and how it compares with what is required."""
 
     text: str
     tone: str = ""  # GOOD, BAD, or nothing to say
 
 
 @dataclass(frozen=True)
-class Row:
-    """One quantity of several pairs."""
+class Check:
+    """One requirement and what was measured."""
 
-    title: str
-    cells: tuple[Cell, ...]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One figure beside the thesis' own."""
-
-    title: str
-    unit: str
-    figure: str  # of `fulmar_core.figures`
-    thesis: str  # key of an entry's `thesis`; empty: it has none
-    digits: int
-    factor: float = 1.0  # from our unit to this one
-
-
-_COMMON = (Quantity("control deviation", "", "control_deviation", "control_variation", 2),)
-_TO_A_PLACE = (
-    Quantity("final distance", "m", "final_position_error_m", "final_distance", 3),
-    Quantity("time to target", "s", "time_to_target_s", "time_to_target_s", 1),
-    *_COMMON,
-)
-QUANTITIES = {
-    "go_to_position": _TO_A_PLACE,
-    "go_to_pose": (
-        _TO_A_PLACE[0],
-        Quantity("heading error", "°", "final_heading_error_deg", "heading_error", 2),
-        *_TO_A_PLACE[1:],
-    ),
-    "track_velocities": (
-        Quantity("velocity error", "m/s", "velocity_error_m_s", "velocity_error", 3),
-        Quantity(
-            "turn-rate error", "rad/s", "yaw_rate_error_deg_s", "yaw_rate_error", 3, 0.017453292519943295
-        ),
-        Quantity("settling time", "s", "settling_time_s", "", 1),
-        *_COMMON,
-    ),
-    "go_through_positions": (
-        Quantity("goals in 60 s", "", "goals_reached", "", 2),
-        Quantity("bound in 60 s", "", "goals_bound", "", 2),
-        Quantity("bound at top speed in 60 s", "", "goals_at_top_speed", "", 2),
-        Quantity("share of that", "", "share_at_top_speed", "", 3),
-        Quantity("goals in 1,000 steps", "", "goals_in_1000_steps", "goals", 2),
-        Quantity("goals in 100 s", "", "goals_in_100_s", "goals", 2),
-        *_COMMON,
-    ),
-    "go_to_position_with_obstacles": (
-        _TO_A_PLACE[0],
-        Quantity("collided", "", "collided", "", 3),
-        *_TO_A_PLACE[1:],
-    ),
-}
-
-
-def head(entry: dict[str, Any]) -> str:
-    """Title of a pair's column."""
-    name = spoken(entry["robot"])
-    if entry["kind"] == "policy":
-        return name
-    return f"{name}, {entry['kind'] if entry['law'] is None else LAWS.get(entry['law'], 'classical')}"
-
-
-def missing(entry: dict[str, Any]) -> str:
-    """Why a pair has no figures, or not all; empty where nothing is missing."""
-    return "" if entry["status"] == "judged" else f"{head(entry)}: {entry['status']}: {entry['reason']}"
-
-
-def rows(task: str, entries: list[dict[str, Any]]) -> list[Row]:
-    """Every quantity of a task, a cell for each pair; figures are means of its first way.
-
-    Args:
-        task: Name of the task.
-        entries: Pairs of this task, from the document.
-    """
-    figure = "share of the bound" if task == "go_through_positions" else "success"
-    ways = [way for way in WAYS if any(way in entry["ways"] for entry in entries)]
-    table = [Row(f"{figure}, {WAYS[way]}", tuple(_judged(entry, way) for entry in entries)) for way in ways]
-    table += [
-        Row("required", tuple(_required(entry) for entry in entries)),
-        Row("thesis: success", tuple(_thesis_success(entry) for entry in entries)),
-        Row("batch and MuJoCo apart by", tuple(_gap(entry) for entry in entries)),
-        Row(
-            "batch, of MuJoCo's episodes",
-            tuple(Cell(_number(entry["judged_in_batch_on_mujocos_episodes"], 3)) for entry in entries),
-        ),
-        Row("trained in, on two cores", tuple(_training(entry) for entry in entries)),
-    ]
-    for quantity in QUANTITIES.get(task, _COMMON):
-        unit = f" [{quantity.unit}]" if quantity.unit else ""
-        table.append(Row(quantity.title + unit, tuple(_beside(entry, quantity) for entry in entries)))
-    return [row for row in table if any(cell.text not in ("", NOTHING) for cell in row.cells)]
-
-
-def _checks(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    return {check["name"]: check for check in entry["verdicts"]}
-
-
-def _judged(entry: dict[str, Any], way: str) -> Cell:
-    return Cell(_number(entry["judged"].get(way), 3), _tone(_checks(entry).get(way)))
-
-
-def _required(entry: dict[str, Any]) -> Cell:
-    check = _checks(entry).get("batch")
-    return Cell("" if check is None else f"≥ {check['limit']:.2f}")
-
-
-def _thesis_success(entry: dict[str, Any]) -> Cell:
-    thesis = entry["thesis"]
-    return Cell("" if thesis["success"] is None else f"{thesis['success']:.2f} ± {thesis['success_std']:.2f}")
-
-
-def _gap(entry: dict[str, Any]) -> Cell:
-    check = _checks(entry).get("batch_minus_mujoco")
-    if check is None and {"batch", "mujoco"} <= set(entry["judged"]):
-        return Cell(_number(abs(entry["judged"]["batch"] - entry["judged"]["mujoco"]), 3))
-    return Cell(_number(None if check is None else check["measured"], 3), _tone(check))
-
-
-def _training(entry: dict[str, Any]) -> Cell:
-    ours, theirs = entry["training_s"], entry["thesis"]["training_min"]
-    if ours is None:
-        return Cell(NOTHING)
-    text = f"{ours:.0f} s" if theirs is None else f"{ours:.0f} s ({60.0 * theirs:.0f} s)"
-    return Cell(text, _tone(_checks(entry).get("training_s")))
-
-
-def _beside(entry: dict[str, Any], quantity: Quantity) -> Cell:
-    way: dict[str, Any] = next(iter(entry["ways"].values()), {})
-    mean = way.get(quantity.figure, {}).get("mean")
-    if mean is None:
-        return Cell(NOTHING)
-    ours, theirs = _number(quantity.factor * mean, quantity.digits), entry["thesis"].get(quantity.thesis)
-    return Cell(ours if theirs is None else f"{ours} ({theirs:.{min(quantity.digits, 2)}f})")
-
-
-def _tone(check: dict[str, Any] | None) -> str:
-    if check is None or check["met"] is None:
-        return ""
-    return GOOD if check["met"] else BAD
-
-
-def _number(value: float | None, digits: int) -> str:
-    return NOTHING if value is None else f"{value:.{digits}f}"
+    name: str
+    measured: float | None  # None: not measured
+    limit: float
+    met: bool | None  # None: not measured

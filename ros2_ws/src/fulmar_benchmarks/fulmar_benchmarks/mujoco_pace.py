@@ -43,7 +43,7 @@ class MujocoPace:
             model.opt.gravity[:] = 0.0  # what water would carry must not sink
             model.opt.density, model.opt.viscosity = robot.hydrodynamics.hydrostatics.water_density, 1e-3
         self._datas = [mujoco.MjData(model) for _ in range(threads)]
-        held = robot.timing.substeps(robot.timing.control_hz) * scene.machine.steps_per_tick
+        held = robot.timing.substeps(robot.timing.control_hz) * scene.robot_model.steps_per_tick
         controls = _random_controls(robot, scene, SIMULATED * STRETCH)
         self._controls = np.repeat(controls.reshape(SIMULATED, STRETCH, -1), held, axis=1)
         state = np.zeros(mujoco.mj_stateSize(model, _STATE))
@@ -77,9 +77,9 @@ class AfloatPace:
         scene = Scene(robot)
         scene.begin(draw_episode(robot, task, scenario, seed=SEED, number=0))
         self._model = model = scene.model
-        assert isinstance(scene.machine, Floater)
-        assert scene.machine.water is not None
-        self._water = scene.machine.water
+        assert isinstance(scene.robot_model, Floater)
+        assert scene.robot_model.water is not None
+        self._water = scene.robot_model.water
         self._datas = [mujoco.MjData(model) for _ in range(threads)]
         state = np.zeros(mujoco.mj_stateSize(model, _STATE))
         mujoco.mj_getState(model, scene.data, state, _STATE)
@@ -110,12 +110,7 @@ class AfloatPace:
         self._control[:, 0, : thrusts.shape[1]] = thrusts
         self._control[:, 0, -6:] = self._water.wrench(qpos[:, 2], to_world, qvel, thrusts, self._calm)
         states, _ = mujoco.rollout.rollout(
-            self._model,
-            self._datas,
-            self.states,
-            self._control,
-            control_spec=_CONTROL,
-            persistent_pool=True,
+            self._model, self._datas, self.states, self._control, control_spec=_CONTROL, persistent_pool=True
         )
         self.states = states[:, 0]
 
@@ -133,6 +128,6 @@ def _random_controls(robot: Robot, scene: Scene, count: int) -> np.ndarray:
     controls = np.empty((count, scene.model.nu))
     rng = np.random.default_rng(SEED)
     for row, command in zip(controls, random_commands(robot, count, rng), strict=True):
-        scene.machine.drive(scene.model, scene.data, command, np.ones_like(command), (0.0, 0.0, 0.0))
+        scene.robot_model.drive(scene.model, scene.data, command, np.ones_like(command), (0.0, 0.0, 0.0))
         row[:] = scene.data.ctrl
     return controls

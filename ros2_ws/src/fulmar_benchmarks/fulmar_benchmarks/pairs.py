@@ -1,4 +1,4 @@
-"""Which pairs are judged, with which controllers, and what their outcomes depend on."""
+"""Pairs to evaluate, their controllers, and what their outcomes depend on."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fulmar_core.policy_bundle import read_passport
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 KINDS = ("policy", "classical")
 
@@ -46,12 +46,6 @@ class Pair:
 
 def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) -> Pair:
     """Find who drives a robot at a task.
-
-    Args:
-        robot: Name of the robot.
-        task: Name of the task.
-        kind: policy: the bundle; classical: the law of the robot's family.
-        policies: Folder of bundles named <robot>_<task>; the shipped ones by default.
 
     Returns:
         The pair, perhaps with a reason why nobody does.
@@ -85,13 +79,7 @@ def with_policy(robot: str, task: str, folder: Path) -> Pair:
 
 
 def with_law(robot: str, task: str, name: str) -> Pair:
-    """A pair that a controller without a bundle drives, or why it cannot.
-
-    Args:
-        robot: Name of the robot.
-        task: Name of the task.
-        name: Of the controller, one of `policy_server.controllers.CONTROLLERS`.
-    """
+    """A pair that a controller without a bundle drives, or why it cannot."""
     from policy_server.controllers import Choice, load_controller
 
     the_robot, the_task = load_robot(robot), load_task(task)
@@ -100,24 +88,15 @@ def with_law(robot: str, task: str, name: str) -> Pair:
         controller = load_controller(name, the_robot, the_task, choice)
     except ConfigError as error:
         return Pair(robot, task, "classical", reason=str(error))
-    told = controller.metadata()
+    found = controller.metadata()
     law = str(getattr(controller, "law", name))
-    return Pair(robot, task, "classical", name, law=law, sha256=str(told["sha256"]))
+    return Pair(robot, task, "classical", name, law=law, sha256=str(found["sha256"]))
 
 
 def units_of(
     pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, worlds: int
 ) -> list[Unit]:
-    """The work on one pair.
-
-    Args:
-        pair: The pair.
-        ways: Episodes in each way.
-        seed: Seed of the episodes.
-        scenario: Name of the scenario.
-        folder: Where outcomes are kept.
-        worlds: Episodes of a batch at once.
-    """
+    """The work on one pair."""
     plan = RunPlan(
         robot=pair.robot,
         task=pair.task,

@@ -174,7 +174,7 @@ class SharedPace:
 
 
 def _serve(pipe: Connection) -> None:
-    """What a process does: build worlds, or step them, as it is told."""
+    """What a process does: build worlds, or step them, on request."""
     pace: BatchPace | None = None
     while True:
         try:
@@ -216,7 +216,7 @@ def measure(
         cores: Processes of the batch, and threads of MuJoCo's rollout.
         seconds: Of each measurement [s].
         rounds: Measurements of each, in turns.
-        progress: Told after every round.
+        progress: Called after every round.
 
     Returns:
         For each robot's name the medians `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`; for robots on

@@ -1,4 +1,4 @@
-"""One unit of work of a benchmark: run a pair in one way, judge it, keep what tables and pictures need."""
+"""One unit of work of a benchmark: run a pair in one way, evaluate it, keep what tables and plots need."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fulmar_benchmarks.bound_file import cached_bound
-from fulmar_benchmarks.outcomes import QUANTILES, Judged
-from fulmar_benchmarks.roboran.published import CONTROL_HZ, GOAL_STEPS
+from fulmar_benchmarks.results import QUANTILES, PairResult, cached_bound
+from fulmar_benchmarks.roboran.targets import CONTROL_HZ, GOAL_STEPS
 from fulmar_core.episode import Episode, episode_steps
 from fulmar_core.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.planar import wrapped
@@ -69,8 +68,8 @@ class Unit:
         """Hash of everything that the outcome depends on; not of where it runs."""
         trial = self.trial
         plan = asdict(replace(trial.plan, policy=""))
-        told = {"plan": plan, "through": trial.through, "episodes": trial.episodes, "defines": self.defines}
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        parts = {"plan": plan, "through": trial.through, "episodes": trial.episodes, "defines": self.defines}
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
     @property
     def path(self) -> Path:
@@ -83,25 +82,17 @@ class Unit:
         steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
         return steps * STEP_COSTS[self.trial.through]
 
-    def done_before(self) -> Judged | None:
+    def done_before(self) -> PairResult | None:
         """The outcome of an earlier run with the same key, if there is one."""
         try:
-            judged = Judged.load(self.path)
+            result = PairResult.load(self.path)
         except (OSError, ValueError, KeyError):
             return None
-        return judged if judged.about.get("key") == self.key else None
+        return result if result.about.get("key") == self.key else None
 
 
-def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, Judged]:
-    """What is known of some units from earlier runs.
-
-    Args:
-        units: What is to be done.
-        fresh: Do all of it again: nothing is known.
-
-    Returns:
-        Their outcomes.
-    """
+def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, PairResult]:
+    """What is known of some units from earlier runs."""
     known = {}
     for unit in units:
         if not fresh and (before := unit.done_before()) is not None:
@@ -109,16 +100,15 @@ def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, Judged]:
     return known
 
 
-def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None) -> Judged:
-    """Run and judge a unit, and keep the outcome in its file.
+def run_unit(
+    unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
+) -> PairResult:
+    """Run and evaluate a unit, and keep the outcome in its file.
 
     Args:
         unit: What to do.
-        progress: Told how many steps have been done, of `cost`.
+        progress: Called with how many steps have been done, of `cost`.
         pool: Processes that stay for one unit after another, through ros.
-
-    Returns:
-        The outcome.
     """
     began = time.monotonic()
     trial, weight = _long(unit.trial), STEP_COSTS[unit.trial.through]
@@ -141,7 +131,7 @@ def judge(unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool 
         about["same_at_64_worlds"], about["compared_episodes"] = _same_with_few_worlds(unit.trial, figures)
     about["wall_s"] = time.monotonic() - began
     sample = drawn[slice(0, KEPT)]  # type: ignore[index]
-    outcome = Judged(
+    outcome = PairResult(
         about=about,
         succeeded=tally.succeeded,
         figures=figures,

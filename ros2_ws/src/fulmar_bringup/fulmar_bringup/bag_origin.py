@@ -17,8 +17,7 @@ from fulmar_core.provenance import fulmar_version, git_revision
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.own_task import OwnTask
-from policy_server.controllers import controller_entry
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import controller_entry, shipped_policy
 
 if TYPE_CHECKING:
     from fulmar_bringup.run_plan import RunPlan

@@ -1,4 +1,4 @@
-"""Console output: results to standard output, everything else to standard error."""
+"""Console output: results to stdout, everything else to stderr."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import contextlib
 import json
 import logging
 import sys
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Result = TypeVar("Result", bound=dict[str, Any])
 
 # Without emoji: `robot.yaml:100: ...` would come out with a picture in the place of its line.
 console = Console(stderr=True, highlight=False, emoji=False)
@@ -19,6 +24,42 @@ output = Console(highlight=False, emoji=False)
 def print_json(value: dict[str, Any]) -> None:
     """Print one JSON object and nothing else."""
     sys.stdout.write(json.dumps(value, indent=2, allow_nan=False) + "\n")
+
+
+def print_result(result: Result, show: Callable[[Result], None], *, as_json: bool) -> None:
+    """Print a result as one JSON object, or with `show` for people."""
+    if as_json:
+        print_json(result)
+    else:
+        show(result)
+
+
+def write_line(text: object) -> None:
+    """Print one line of a result; it is not folded, so that other programs can read it."""
+    output.print(str(text), markup=False, soft_wrap=True)
+
+
+def log_line(text: str) -> None:
+    """Print one line beside the result."""
+    console.print(text, markup=False, soft_wrap=True)
+
+
+def warn(lines: Iterable[str]) -> None:
+    """Print one warning a line beside the result."""
+    for line in lines:
+        log_line(f"warning: {line}")
+
+
+def new_table(title: str, texts: Sequence[str], numbers: Sequence[str]) -> Table:
+    """Make a table with columns of text to the left and columns of numbers, aligned right, after them."""
+    from rich.table import Table
+
+    table = Table(title=title)
+    for column in texts:
+        table.add_column(column)
+    for column in numbers:
+        table.add_column(column, justify="right")
+    return table
 
 
 class _Shown(logging.Handler):
@@ -32,7 +73,7 @@ class _Shown(logging.Handler):
         message = record.getMessage()
         if message not in self._said:
             self._said.add(message)
-            console.print(f"warning: {message}", markup=False, soft_wrap=True)
+            warn([message])
 
 
 @contextlib.contextmanager

@@ -18,11 +18,41 @@ from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
-from policy_server.controllers import CONTROLLERS
-from policy_server.shipped import shipped_policy
+from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"
 OPTIONS = {POSE: "--goal x,y,deg", POSITION: "--goal x,y"}
+
+
+def task_of_run(
+    task: str | None,
+    robot: str,
+    controller: str,
+    backend: str,
+    *,
+    goal: tuple[float, ...] | None,
+    goals: str | None,
+    policy: Path | None,
+) -> tuple[str, str]:
+    """Name of the task of a run, and a note where a part of its goal has no effect.
+
+    Args:
+        task: Name of the task, if one was given.
+        robot: Name of the robot.
+        controller: Name of the controller.
+        backend: Name of the backend.
+        goal: x [m], y [m] and, for a pose, heading [deg].
+        goals: Name or path of a goal file; without a task it decides.
+        policy: Bundle that was given.
+
+    Raises:
+        ConfigError: As of `default_task` and `check_heading`.
+    """
+    if task is not None:
+        return task, "" if goal is None else check_heading(task, goal)
+    if goals:
+        return task_of_goals(goals), ""
+    return default_task(robot, controller, backend, goal=goal, policy=policy), ""
 
 
 def default_task(
@@ -179,6 +209,13 @@ def _check_turning(targets: np.ndarray, goals: str, robot: Robot) -> None:
 def first_targets(file: GoalFile) -> np.ndarray:
     """Targets that the file begins with, shape (k, 3) as in `fulmar_core.goal.Goal`."""
     return np.zeros((1, 3)) if isinstance(file, FollowedPath) else file.targets()
+
+
+def places_of(file: GoalFile) -> np.ndarray:
+    """Where a file leads, shape (n, 2 or 3), x and y first [m]; no place for velocities."""
+    if isinstance(file, FollowedPath):
+        return np.asarray(file.planner().points)
+    return np.zeros((0, 3)) if isinstance(file, Velocities) else file.targets()
 
 
 def start_of(file: GoalFile) -> PoseTuple | None:

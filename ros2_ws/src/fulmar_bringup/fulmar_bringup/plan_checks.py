@@ -32,8 +32,7 @@ from fulmar_core.tasks import Task
 from fulmar_core.topics import COMMAND, IMU, MOCAP, ODOMETRY, TRUTH, VELOCITY_COMMAND
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import TOPIC_DRIVERS, UNARMED, MavlinkBoat, load_hardware
-from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry
-from policy_server.shipped import shipped_policies, shipped_policy
+from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry, shipped_policies, shipped_policy
 
 # Topics between plant, controller and estimator. Goals, e-stop and status keep their names: the run itself and every
 # other command of `fulmar` use them.

@@ -16,7 +16,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY, Wire, command_wire
 from fulmar_core.wire_check import Offer, wire_problems
 from fulmar_ros.recorder_health import COMMANDERS
-from hardware_drivers.adapter_node import heard_class
+from hardware_drivers.adapter_node import message_class
 from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
 
 CONTROLLER_AND_RECORDER = 2  # nodes that receive the goal before anything moves
@@ -75,7 +75,7 @@ def command_input(plan: RunPlan) -> CommandInput:
     if plan.adapter:
         driver = load_hardware(plan.adapter).driver
         assert isinstance(driver, TOPIC_DRIVERS)  # as `adapter_path` has checked
-        kind = heard_class(driver)
+        kind = message_class(driver)
         wire = replace(wire, type=f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}")
         topic, reliable = plan.adapter_topic or driver.topic, False
     return CommandInput(topic if topic.startswith("/") else f"{plan.namespace}/{topic}", wire, reliable)

@@ -1,4 +1,4 @@
-"""`fulmar`: the front door. Each command lives in a module of its own below `commands/`."""
+"""The command `fulmar`; each of its commands is a module of `commands/`."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import os
 import signal
 import sys
 from collections import namedtuple
+from importlib.metadata import version
 from types import FrameType
+from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import console, showing_warnings
+from fulmar_bringup.console import console, output, showing_warnings
 from fulmar_cli.commands.bag import bag
 from fulmar_cli.commands.benchmark import benchmark
 from fulmar_cli.commands.bundle import bundle
@@ -49,12 +51,29 @@ INTERRUPTED = 130  # what typer makes of Ctrl-C
 
 app = typer.Typer(
     name="fulmar",
-    help="Robots driven by learned and classical controllers over ROS 2: simulate, run, record, train, judge.",
+    help="Robots driven by learned and classical controllers over ROS 2: simulate, run, record, train, evaluate.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        output.print(f"fulmar {version('fulmar')}", markup=False)
+        raise typer.Exit(DONE)
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    """Options of the whole program; its help is that of `app`."""
+
+
 app.command("list")(list_names)
 app.command()(run)
 app.command()(up)
@@ -80,14 +99,14 @@ app.command()(doctor)
 
 def main() -> None:
     """Run the command line; mistakes end with one line and exit code 2, failures with 1."""
-    told: list[str] = []
+    stops: list[str] = []
 
     def on_terminate(number: int, _frame: FrameType | None) -> None:
         """These stop a command as Ctrl-C does, in order; once, though `timeout` sends SIGTERM twice."""
         for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
             signal.signal(each, signal.SIG_IGN)
-        told.append(f"stopped by {signal.Signals(number).name}")
-        raise KeyboardInterrupt(*told)
+        stops.append(f"stopped by {signal.Signals(number).name}")
+        raise KeyboardInterrupt(*stops)
 
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` leaves SIGHUP
@@ -96,7 +115,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with showing_warnings():
-            _run_and_exit(told)
+            _run_and_exit(stops)
     finally:
         # Python ends by SIGINT, whatever the exit code, once Ctrl-C has come while text was run as code, as it is for
         # each named tuple or dataclass that is imported, even if it was caught; running text again takes that back
@@ -104,10 +123,10 @@ def main() -> None:
         namedtuple("Answered", ())
 
 
-def _run_and_exit(told: list[str]) -> None:
+def _run_and_exit(stops: list[str]) -> None:
     try:
         code = app(prog_name="fulmar", standalone_mode=False)
-        sys.stdout.flush()  # here, where it is known what to do if nobody reads it
+        sys.stdout.flush()  # here, where a closed pipe is handled
     except (ConfigError, BundleError, BagError) as error:
         sys.exit(_complain(str(error), BAD_USAGE))
     except FulmarError as error:
@@ -116,9 +135,9 @@ def _run_and_exit(told: list[str]) -> None:
         code = exit_request.exit_code
     except (typer.Abort, KeyboardInterrupt):
         code = INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has had enough, as in `fulmar list | head -1`
+    except BrokenPipeError:  # the reader of our output has ended, as in `fulmar list | head -1`
         nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())  # what is left over is flushed again at Python's own end
+        os.dup2(nowhere, sys.stdout.fileno())  # Python flushes the rest when it exits
         sys.exit(FAILED)
     except OSError as error:  # a folder that cannot be written, a full disk
         sys.exit(_complain(f"{error.filename or 'the system'}: {error.strerror or error}.", FAILED))
@@ -135,7 +154,7 @@ def _run_and_exit(told: list[str]) -> None:
             sys.exit(_complain(f"{error.format_message()}{_hint(error)}", BAD_USAGE))
         raise
     if code == INTERRUPTED:
-        sys.exit(_complain(told[0] if told else "stopped by the user", FAILED))
+        sys.exit(_complain(stops[0] if stops else "stopped by the user", FAILED))
     sys.exit(code if isinstance(code, int) else DONE)
 
 

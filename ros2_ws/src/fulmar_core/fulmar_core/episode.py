@@ -18,10 +18,6 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
-EVALUATION_SEED = 2026  # of episodes that evaluate finished controllers
-HELD_OUT_SEED = 1_000_003  # of episodes that learners are checked on
-EVALUATION_SEEDS = (EVALUATION_SEED, HELD_OUT_SEED)  # no training seeds: no run shall have learned from them
-
 
 @dataclass(frozen=True, slots=True)
 class Episode:

@@ -18,7 +18,7 @@ from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
-from fulmar_core.safety.geofence import outside
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS, outside, unreachable
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import Task
 
@@ -148,8 +148,13 @@ class GuardedLoop:
             self._change(bearing_off=not on)
 
     def take_goal(self, goal: Goal, stamp_ns: int, now_ns: int) -> str:
-        """Take a goal; none while a received e-stop holds."""
+        """Take a goal; none outside the robot's area, and none while a received e-stop holds."""
         with self._lock:
+            beyond = self._beyond(goal)
+            if beyond:
+                self.refusal = Refusal(stamp_ns, beyond)
+                self.mission.refuse(goal, stamp_ns)
+                return beyond
             stopped = self._estop.reason(now_ns)
             if self._estop.received and stopped:
                 self.refusal = Refusal(stamp_ns, stopped)
@@ -290,6 +295,13 @@ class GuardedLoop:
             return ""
         x, y = self.newest.state.position_in_world[:2].tolist()
         return outside(x, y, self._settings.area)
+
+    def _beyond(self, goal: Goal) -> str:
+        """How a goal lies outside the area; empty if it does not, or is no place."""
+        if self.loop.task.goal_topic == "goal_velocity":
+            return ""
+        problem = unreachable("the goal", goal.targets.tolist(), self._settings.area)
+        return problem and OUT_OF_BOUNDS + problem
 
     def _change(self, **changes: object) -> None:
         for name, value in changes.items():

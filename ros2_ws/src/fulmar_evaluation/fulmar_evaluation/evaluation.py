@@ -1,4 +1,4 @@
-"""One controller judged over many episodes, in one of three ways; what `evaluate` and `benchmark` share."""
+"""One controller evaluated over many episodes, in one of three ways; what `evaluate` and `benchmark` share."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool
 
 WAYS = ("batch", "mujoco", "ros")
-EPISODES, BATCH_EPISODES = 256, 4096  # that are judged where nobody says how many; the second in the batch
+EPISODES, BATCH_EPISODES = 256, 4096  # by default; the second in the batch
 BOUNDED_EPISODES = 256  # whose bound `evaluate` computes by default: a boat's takes 40 ms each
 Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What to judge, and how."""
+    """What to evaluate, and how."""
 
     plan: RunPlan  # robot, task, controller, rate, scenario, seed; its duration is the length of an episode
     through: str  # one of WAYS
@@ -65,16 +65,13 @@ class Trial:
 
 
 def runs_of(
-    trial: Trial,
-    progress: Progress = lambda steps: None,
-    *,
-    pool: RosPool | None = None,
+    trial: Trial, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
 ) -> Iterator[Trajectories]:
     """Run the episodes of a trial, in their order.
 
     Args:
         trial: What to run.
-        progress: Told how many control steps have been done.
+        progress: Called with how many control steps have been done.
         pool: Processes that stay for one trial after another, through ros; by default it has its own.
 
     Yields:
@@ -132,7 +129,7 @@ class Tally:
         self.steps = 0
 
     def add(self, run: Trajectories) -> None:
-        """Judge some more episodes."""
+        """Evaluate some more episodes."""
         self._succeeded.append(successes(run, self._task))
         self._figures.append(episode_metrics(run, self._task))
         self.steps += run.x.size
@@ -151,7 +148,7 @@ class Tally:
 
 
 def evaluate_trial(trial: Trial, progress: Progress = lambda steps: None) -> dict[str, Any]:
-    """Run and judge a trial; arguments and errors as in `runs_of`.
+    """Run and evaluate a trial; arguments and errors as in `runs_of`.
 
     Returns:
         Success rate and every figure, JSON-ready. Where waypoints are counted, also what physics allows in the first

@@ -1,4 +1,4 @@
-"""Judging a controller through the nodes it is deployed with: the plant here, the controller in its own process.
+"""Evaluation of a controller through the nodes it is deployed with: the plant here, the controller in its own process.
 
 Plant and controller are the very nodes of `fulmar run`, in lock step over DDS. Only the truth is read directly from
 the simulator, as no deployed node may.
@@ -60,7 +60,7 @@ def roll_out_through_ros(
             own; its start does not matter.
         episodes: Number of episodes, >= 1.
         jobs: Number of pairs, >= 1.
-        progress: Told how many control steps have been done.
+        progress: Called with how many control steps have been done.
 
     Returns:
         What happened, from the true states.
@@ -123,7 +123,7 @@ def _wait_for_all(futures: list[Future[Trajectories]], tick: Callable[[], None])
 
 @contextlib.contextmanager
 def _shut_down_in_the_end(pool: ProcessPoolExecutor) -> Iterator[None]:
-    """Wait for the workers; after an error or Ctrl-C, tell them to stop first."""
+    """Wait for the workers; after an error or Ctrl-C, ask them to stop first."""
     try:
         yield
     except BaseException:
@@ -148,14 +148,14 @@ _counts: list[Any] = []
 
 
 def _begin_worker(counts: list[Any], parent: int) -> None:
-    """Keep the shared counters in a worker, which must be handed over when it starts, and end when told to."""
+    """Keep the shared counters in a worker, which must be handed over when it starts, and end on a signal."""
     _counts[:] = counts
     for number in STOPS:
         signal.signal(number, _on_stop)
     end_with(parent, signal.SIGINT)
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)
-    except SystemExit:  # told to stop before it began; the pool would print where
+    except SystemExit:  # asked to stop before it began; the pool would print where
         os._exit(1)
 
 
@@ -166,7 +166,7 @@ def _on_stop(_number: int, _frame: FrameType | None) -> None:
 
 
 def _work(plan: RunPlan, numbers: range, domain: int, index: int) -> Trajectories:
-    """Do a share; a worker that is told to stop meanwhile stops its children and takes no further share."""
+    """Do a share; a worker that is asked to stop meanwhile stops its children and takes no further share."""
     try:
         return _roll_out_share(plan, numbers, domain, index)
     except SystemExit:
@@ -254,7 +254,7 @@ def _episodes(
             goals.append(counter.update(truths[-1], sample.things))
             commands.append(np.array(command))
 
-        with _goal_told(plan, episode, plant, overseer, group, alive):
+        with _goal_given(plan, episode, plant, overseer, group, alive):
             try:
                 plant.run_episode(episode, number=number, seed=plan.seed, steps=steps, on_step=on_step)
             except LockstepError:
@@ -267,10 +267,10 @@ def _episodes(
 
 
 @contextlib.contextmanager
-def _goal_told(
+def _goal_given(
     plan: RunPlan, episode: Episode, plant: PlantNode, overseer: Supervisor, group: ProcessGroup, alive: Alive
 ) -> Iterator[None]:
-    """While an episode lasts: the supervisor has told its goal, or a goal node tells it with each odometry."""
+    """While an episode lasts: the supervisor has given its goal, or a goal node publishes it with each odometry."""
     if not plan.goals:
         overseer.give_goal(episode.goal, time_ns=plant.clock.now_ns, alive=alive)
         yield

@@ -31,7 +31,7 @@ LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its s
 
 
 @dataclass(frozen=True)
-class Judgement:
+class RunResult:
     """What the task says about a run; times count from its first state.
 
     As in `fulmar_core.metrics`, a step is the state at its end: the first state itself is none.
@@ -87,7 +87,7 @@ class Judgement:
 
     @property
     def window_start_s(self) -> float:
-        """Where the closing window begins, which success is judged in [s]."""
+        """Where the closing window begins, in which success is decided [s]."""
         return max(0.0, self.duration_s - self.task.tolerance.hold_s)
 
     def figure(self, name: str) -> float | None:
@@ -96,14 +96,11 @@ class Judgement:
         return float(value) if np.isfinite(value) else None
 
 
-def judge(record: RunRecord) -> Judgement | None:
-    """Judge a run by its task.
-
-    Args:
-        record: The run.
+def evaluate_run(record: RunRecord) -> RunResult | None:
+    """Evaluate a run by its task.
 
     Returns:
-        The judgement; None if the record has fewer than two states.
+        The result; None if the record has fewer than two states.
 
     Raises:
         BagError: The record names no task or no goal.
@@ -127,7 +124,7 @@ def judge(record: RunRecord) -> Judgement | None:
     run = Trajectories(
         **{name: np.swapaxes(getattr(columns, name), 0, 1) for name in COLUMNS}, control_dt=float(time_s[0])
     )
-    return Judgement(
+    return RunResult(
         robot=robot,
         task=task,
         targets=goals[-1].targets,
@@ -143,12 +140,12 @@ def judge(record: RunRecord) -> Judgement | None:
 
 
 def _of_goal_file(record: RunRecord) -> dict[str, Any]:
-    """What the node that tells goals from a file said last, and the path of that file."""
+    """What the goal node reported last, and the path of that file."""
     said = record.last_health("goals")
     asked = bool(record.info.get("goals"))
     finished = said is not None and said.values.get("mode") == "finished"
     return {
-        "progress": (said.values.get("progress", "") if said else "nothing was told") if asked else None,
+        "progress": (said.values.get("progress", "") if said else "nothing was reported") if asked else None,
         "unfinished": asked and not finished and not record.info.get("endless"),
         "path": np.array(record.info.get("path") or np.empty((0, 2)), dtype=float).reshape(-1, 2),
     }
@@ -185,7 +182,7 @@ def _goals(record: RunRecord, task: Task) -> list[GivenGoal]:
 def _newest(record: RunRecord, task: Task, given: list[GivenGoal]) -> np.ndarray:
     """Which of the goals counts at each state, shape (n,).
 
-    Places count from when they came. Velocities, and whatever a goal node tells, are stamped with the time when they
+    Places count from when they came. Velocities, and goals of a goal node, are stamped with the time when they
     begin; messages of one time need not come into the bag in their order.
     """
     motion = record.motion

@@ -28,15 +28,13 @@ class RunOutcome:
 
     @property
     def exit_code(self) -> int:
-        """0: ran to its end and met the goal, or recorded nothing to evaluate; 1: otherwise."""
-        return 0 if self.summary.get("success") is not False and not self.failure else 1
+        """0: ran to its end and met the goal, had none, or recorded nothing to evaluate; 1: otherwise."""
+        missed = self.summary["success"] is False and controller_entry(self.summary["controller"]).strives
+        return 1 if missed or self.failure else 0
 
 
 def run_and_evaluate(request: RunRequest) -> RunOutcome:
     """Run once and evaluate the bag.
-
-    Args:
-        request: What to run.
 
     Returns:
         The outcome; a failed run has one too, with whatever was recorded.
@@ -71,8 +69,8 @@ def evaluate_execution(request: RunRequest, execution: Execution) -> RunOutcome:
 def _nothing_recorded(request: RunRequest) -> RunRecord:
     """The record of a run without a bag: its plan, and nothing else."""
     none, vectors = np.empty(0), np.empty((0, 3))
-    motion = Motion(none, none, vectors, np.empty((0, 4)), vectors, none)
-    actuation = Actuation(none, none, (), np.empty((0, 0)))
+    motion = Motion(none, none, none, vectors, np.empty((0, 4)), vectors, none)
+    actuation = Actuation(none, none, none, (), np.empty((0, 0)))
     return RunRecord(
         path=request.record,
         info=asdict(request.plan),

@@ -10,9 +10,8 @@ import numpy as np
 from fulmar_bags.run_record import HealthSample, RunRecord
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
-from fulmar_evaluation.run_beliefs import believed_dead, last_beliefs
-from fulmar_evaluation.run_evaluation import Judgement, judge
-from policy_server.controllers import EXTERNAL
+from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
+from policy_server.controllers import EXTERNAL, controller_entry
 
 ASKED = ("robot", "task", "controller", "backend", "seed")
 PERCENTILES = ("p50", "p99", "max")
@@ -30,16 +29,13 @@ Spread = dict[str, float | None]
 def summarise(record: RunRecord) -> dict[str, Any]:
     """Sum up a run.
 
-    Args:
-        record: The run.
-
     Returns:
         Figures by name, ready for JSON; None for what is not known.
 
     Raises:
         FulmarError: The record names no goal, or no task that is known here.
     """
-    judgement = judge(record)
+    result = evaluate_run(record)
     plant, controller = record.last_health("plant"), record.last_health("controller")
     period_error = _spread(controller, "period_error_ms")
     wall_hz = _number(controller, "control_rate_hz") or _wall_rate_hz(record)
@@ -47,12 +43,12 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         **{key: record.info.get(key) for key in ASKED},
         "name": record.info.get("name") or record.info.get("robot"),
         "steps": len(latencies_ms(record)) or _unanswering(record),
-        "duration_s": judgement.duration_s if judgement else 0.0,
-        "success": judgement is not None and judgement.success,
-        **{name: judgement.figure(name) if judgement else None for name in FIGURES},
-        "collided": None if judgement is None else bool(judgement.figures["collided"]),
-        "path_error_m": judgement.path_error_m if judgement else None,
-        "goals_progress": judgement.progress if judgement else None,
+        "duration_s": result.duration_s if result else 0.0,
+        "success": result is not None and result.success,
+        **{name: result.figure(name) if result else None for name in FIGURES},
+        "collided": None if result is None else bool(result.figures["collided"]),
+        "path_error_m": result.path_error_m if result else None,
+        "goals_progress": result.progress if result else None,
         "control_rate_hz": _own_rate_hz(record, wall_hz),
         "wall_control_rate_hz": wall_hz,
         "latency_ms": _known(_spread(plant, "latency_ms")) or percentiles(latencies_ms(record)),
@@ -60,7 +56,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "inference_ms": _spread(controller, "inference_ms"),
         "overruns": _total(plant, controller, "overruns"),
         "watchdog_trips": _total(plant, None, "watchdog_trips"),
-        "actuator_use": _use(judgement),
+        "actuator_use": _use(result),
         "estop_pressed": estop_pressed(record),
         "warnings": warnings_of(record),
         "believed_dead": believed_dead(record),
@@ -92,19 +88,23 @@ def _stopped_by(sample: HealthSample, reason: str) -> bool:
 
 
 def latencies_ms(record: RunRecord) -> np.ndarray:
-    """From an odometry message to the command that answers it, both as the recorder got them.
+    """From the sending of an odometry message to the sending of the command that answers it.
+
+    Both times are wall clock, also in lock step and with simulated time: how busy the recorder is does not count. Where
+    plant and controller run on two machines, the difference of their clocks does.
 
     Returns:
         One value for each stamp that was answered [ms].
     """
-    came: dict[float, float] = {}
-    for stamp_s, log_s in zip(record.odom.stamp_s, record.odom.log_s, strict=True):
-        came.setdefault(stamp_s, log_s)
+    odom, commanded = record.odom, record.commanded
+    sent: dict[float, float] = {}
+    for stamp_s, publish_s in zip(odom.stamp_s, odom.publish_s, strict=True):
+        sent.setdefault(stamp_s, publish_s)
     answered: dict[float, float] = {}
-    for stamp_s, log_s in zip(record.commanded.stamp_s, record.commanded.log_s, strict=True):
-        if stamp_s in came:
-            answered.setdefault(stamp_s, log_s)
-    return np.array([1e3 * (log_s - came[stamp_s]) for stamp_s, log_s in answered.items()])
+    for stamp_s, publish_s in zip(commanded.stamp_s, commanded.publish_s, strict=True):
+        if stamp_s in sent:
+            answered.setdefault(stamp_s, publish_s)
+    return np.array([1e3 * (publish_s - sent[stamp_s]) for stamp_s, publish_s in answered.items()])
 
 
 def percentiles(values: np.ndarray) -> Spread:
@@ -121,11 +121,11 @@ def _unanswering(record: RunRecord) -> int:
     return len(record.commanded) if external and not len(latencies_ms(record)) else 0
 
 
-def _use(judgement: Judgement | None) -> float | None:
+def _use(result: RunResult | None) -> float | None:
     """Mean share of actuators in use."""
-    if judgement is None or np.isnan(judgement.run.shares).any():
+    if result is None or np.isnan(result.run.shares).any():
         return None
-    return _finite(np.mean(judgement.run.actuators_in_use))
+    return _finite(np.mean(result.run.actuators_in_use))
 
 
 def _own_rate_hz(record: RunRecord, wall_hz: float | None) -> float | None:
@@ -168,3 +168,72 @@ def _number(sample: HealthSample | None, name: str) -> float | None:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+STANDS_S = 1.0  # a belief that went sooner, and before the end, is none that a run is remembered for [s]
+
+
+def believed_dead(record: RunRecord) -> list[str]:
+    """Valves that `controller/status` named as believed dead, for a while or at the end of the run.
+
+    Returns:
+        Their names, in the order in which they were first named.
+    """
+    said = [sample for sample in record.health if "believed_dead" in sample.values]
+    ends = [sample.log_s for sample in said[1:]] + [math.inf]
+    lasted: dict[str, float] = {}
+    for sample, end_s in zip(said, ends, strict=False):  # of none at all there is an end, too
+        length = end_s - sample.log_s
+        for name in filter(None, sample.values["believed_dead"].split(", ")):
+            lasted[name] = lasted.get(name, 0.0) + length
+    return [name for name, length in lasted.items() if length >= STANDS_S]
+
+
+def last_beliefs(record: RunRecord) -> str:
+    """What the newest `controller/status` says is believed of valves and push; empty if nothing is wrong."""
+    status = record.last_health("controller")
+    return status.values.get("beliefs", "") if status else ""
+
+
+FIGURE_TEXTS = {
+    "final_position_error_m": "{:.3f} m off",
+    "final_heading_error_deg": "{:.1f}° off",
+    "goals_reached": "{:.0f} targets reached",
+    "velocity_error_m_s": "velocity {:.3f} m/s off",
+    "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
+    "path_error_m": "path {:.3f} m off",
+    "goals_progress": "{}",
+}
+
+
+def summary_text(summary: dict[str, Any]) -> str:
+    """A summary in a few lines for people."""
+    if summary["success"] is None:
+        return f"{summary['controller']}: no fault, so the recorder wrote no bag; no result for the goal"
+    if controller_entry(summary["controller"]).strives:
+        result = "goal met" if summary["success"] else "goal missed"
+        if summary["success"] and summary["time_to_target_s"] is not None:
+            result += f" after {summary['time_to_target_s']:.1f} s"
+    else:
+        result = "moved without a goal"
+    known = [text.format(summary[key]) for key, text in FIGURE_TEXTS.items() if summary[key] is not None]
+    known += ["touched an obstacle"] if summary["collided"] else []
+    length = f"; length of the run {summary['duration_s']:.0f} s"
+    lines = [f"{summary['controller']}: {', '.join([result, *known])}{length}"]
+    if summary["steps"]:
+        latency = summary["latency_ms"]
+        answers = latency["p50"] is not None
+        spread = f", latency p50 {latency['p50']:.2f} ms, p99 {latency['p99']:.2f} ms" if answers else ""
+        counts = [(summary[key], key) for key in ("overruns", "watchdog_trips")]
+        counted = ", ".join(f"{count} {key.replace('_', ' ')}" for count, key in counts if count is not None)
+        lines.append(f"  {summary['steps']} commands{spread}" + (f"; {counted}" if counted else ""))
+    lines += [f"  warning: {warning}" for warning in summary["warnings"]]
+    if summary["believed_dead"]:
+        lines.append(f"  believed dead: {', '.join(summary['believed_dead'])}")
+    if summary["beliefs"]:
+        lines.append(f"  at the end: {summary['beliefs']}")
+    bag = summary["bag"]
+    lines.append(
+        "  nothing was recorded" if bag is None else f"  recorded in {bag}; view it: fulmar report {bag}"
+    )
+    return "\n".join(lines)

@@ -20,9 +20,8 @@ class WaypointBound:
     """The most waypoints that a robot can reach, and what that is made of."""
 
     goals: np.ndarray  # (episodes,) whole waypoints, by the bound that fits the robot
-    goals_at_top_speed: (
-        np.ndarray | None
-    )  # (episodes,) if nothing but its top speed held it; None: it has none
+    # (episodes,) if nothing but its top speed held it; None: it has none
+    goals_at_top_speed: np.ndarray | None
     name: str  # time_optimal, turn_limited or top_speed
     rule: str  # the same in words
 

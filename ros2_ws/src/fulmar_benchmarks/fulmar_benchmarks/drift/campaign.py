@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fulmar_benchmarks.drift.bounds import physics_of
 from fulmar_benchmarks.drift.conditions import (
     CONDITIONS,
     PATH_EPISODE_S,
@@ -19,22 +20,23 @@ from fulmar_benchmarks.drift.conditions import (
     ROBOT,
 )
 from fulmar_benchmarks.drift.document import document_of
-from fulmar_benchmarks.drift.physics import physics_of
 from fulmar_benchmarks.drift.unit import DriftUnit
-from fulmar_benchmarks.outcomes import Judged
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
-from fulmar_benchmarks.unit import Unit, done_already
-from fulmar_benchmarks.work import Outcome, do_all
+from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.unit import Unit
+from fulmar_benchmarks.workers import Outcome, evaluate_units
 from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.counts import check_episodes
+from fulmar_core.episode import episode_steps
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 
 @dataclass(frozen=True)
 class Request:
-    """What to judge."""
+    """What to evaluate."""
 
     rows: Sequence[str]
     controllers: Sequence[str]
@@ -45,16 +47,16 @@ class Request:
     policy: Path | None = None  # bundle for the pose; the shipped one by default
     tracking_policy: Path | None = None  # bundle for the paths; the shipped one by default
     jobs: int = 2
-    fresh: bool = False  # judge again what was judged before
+    fresh: bool = False  # evaluate again what was evaluated before
     command: str = ""  # for the record
 
 
 @dataclass(frozen=True)
-class Findings:
-    """The document, and what pictures are drawn from."""
+class CampaignResult:
+    """The document, and what plots are drawn from."""
 
     document: dict[str, Any]
-    outcomes: dict[tuple[str, str], Judged]  # by row and controller
+    outcomes: dict[tuple[str, str], PairResult]  # by row and controller
 
 
 def run_drift(
@@ -62,18 +64,15 @@ def run_drift(
     *,
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
-) -> Findings:
-    """Judge every controller in every row, but for what was judged before with the same code and configuration.
+) -> CampaignResult:
+    """Evaluate every controller in every row, but for what was evaluated before with the same code and configuration.
 
-    Args:
-        request: What to judge.
-        progress: Told how much is done, and of how much.
-        on_done: Told of each unit: its outcome, and whether it was there before.
-
-    Returns:
-        What was found.
+    Arguments beside the request as of `evaluate_units`.
     """
     began = time.monotonic()
+    robot = load_robot(ROBOT)
+    steps = episode_steps(load_task(POSE_TASK), robot.timing.control_s)
+    check_episodes(robot, episodes=request.episodes, steps=steps, jobs=request.jobs)
     pairs = {
         (task, controller): _pair(request, task, controller)
         for task in dict.fromkeys(_task_of_row(row) for row in request.rows)
@@ -86,16 +85,8 @@ def run_drift(
         for controller in request.controllers
         if not pairs[_task_of_row(row), controller].missing
     }
-    outcomes: dict[Unit, Outcome] = {**done_already(units.values(), fresh=request.fresh)}
-    for unit, before in outcomes.items():
-        on_done(unit, before, True)
-    left: list[Unit] = [unit for unit in units.values() if unit not in outcomes]
-    total = sum(unit.cost for unit in left)
-    outcomes |= do_all(
-        left,
-        jobs=request.jobs,
-        progress=lambda done: progress(done, total),
-        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    outcomes = evaluate_units(
+        list(units.values()), jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
     )
     found = {key: outcomes[unit] for key, unit in units.items()}
     document = document_of(
@@ -113,7 +104,7 @@ def run_drift(
         },
         wall_s=time.monotonic() - began,
     )
-    return Findings(document, {key: one for key, one in found.items() if isinstance(one, Judged)})
+    return CampaignResult(document, {key: one for key, one in found.items() if isinstance(one, PairResult)})
 
 
 def _task_of_row(row: str) -> str:

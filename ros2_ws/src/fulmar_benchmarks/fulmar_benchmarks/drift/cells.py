@@ -6,23 +6,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from fulmar_benchmarks.cells import BAD, GOOD, NOTHING
-from fulmar_benchmarks.drift.published import DIGITS, FIGURES
+from fulmar_benchmarks.drift.targets import DIGITS, FIGURES
 
 NAMES = {"policy": "policy", "lqr": "LQR", "lqr_drift": "LQR of DRIFT", "mpc": "MPC"}
-UNITS = {
-    **{name: "%" for name in FIGURES if name[1] == "T"},
-    "ALV": "m/s",
-    "AAV": "rad/s",
-    "AAS": "",
-}
+UNITS = {**{name: "%" for name in FIGURES if name[1] == "T"}, "ALV": "m/s", "AAV": "rad/s", "AAS": ""}
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What is written, how it compares with what is asked, and how far it falls behind ideal conditions."""
+    """What is written, how it compares with what is required, and how far it falls behind ideal conditions."""
 
     text: str
-    tone: str = ""  # GOOD, BAD, or nothing asked
+    tone: str = ""  # GOOD, BAD, or nothing required
     band: str = ""  # name of a `drop.Band`, or nothing to compare with
 
 
@@ -98,13 +93,7 @@ def path_lines(document: dict[str, Any]) -> list[Line]:
     return lines
 
 
-PATH_HEADS = (
-    "velocity error [m/s]",
-    "under way [m/s]",
-    "off the path [m]",
-    "at most [m]",
-    "AAS",
-)
+PATH_HEADS = ("velocity error [m/s]", "under way [m/s]", "off the path [m]", "at most [m]", "AAS")
 
 
 def pose_heads() -> tuple[str, ...]:
@@ -113,7 +102,7 @@ def pose_heads() -> tuple[str, ...]:
 
 
 def unmet(document: dict[str, Any]) -> list[str]:
-    """What is asked and was not met, in words."""
+    """Requirements that were not met, in words."""
     sentences = []
     for check in document["requirements"]:
         if check["met"] is not False:
@@ -124,20 +113,20 @@ def unmet(document: dict[str, Any]) -> list[str]:
         title = document["rows"][check["row"]]["title"]
         figure = check["figure"].replace("_", " ")
         sentences.append(
-            f"{title}, {spoken(check['controller'])}: {figure} {found}, asked {sign} {check['limit']:.{digits}f}"
+            f"{title}, {spoken(check['controller'])}: {figure} {found}, required {sign} {check['limit']:.{digits}f}"
         )
     return sentences
 
 
 def missing(document: dict[str, Any]) -> list[str]:
     """Who did not drive, and why; each reason once."""
-    told = {
+    found = {
         f"{spoken(controller)}: {entry['status']}: {entry['reason']}": None
         for row in document["rows"].values()
         for controller, entry in row["controllers"].items()
         if entry["status"] != "judged"
     }
-    return list(told)
+    return list(found)
 
 
 def _tones(document: dict[str, Any]) -> dict[tuple[str, str, str], str]:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fulmar_benchmarks.drift.asked import requirements
+from fulmar_benchmarks.drift.bounds import Physics
 from fulmar_benchmarks.drift.conditions import CONDITIONS, PATHS
-from fulmar_benchmarks.drift.drop import band_of, drop_percent
-from fulmar_benchmarks.drift.physics import Physics
-from fulmar_benchmarks.drift.published import FIGURES, TRACKING, published
-from fulmar_benchmarks.outcomes import Judged
+from fulmar_benchmarks.drift.targets import FIGURES, TRACKING, band_of, drop_percent, published, requirements
 from fulmar_benchmarks.pairs import Pair
+from fulmar_benchmarks.results import PairResult
 from fulmar_core.provenance import fulmar_version, git_revision
 
 if TYPE_CHECKING:
@@ -45,7 +42,7 @@ def document_of(
     request: Request,
     *,
     pairs: dict[Key, Pair],
-    found: dict[Key, Judged | str],
+    found: dict[Key, PairResult | str],
     physics: dict[str, Physics],
     wall_s: float,
 ) -> dict[str, Any]:
@@ -54,7 +51,7 @@ def document_of(
     Args:
         request: What was asked for.
         pairs: Who drives, by row and controller.
-        found: What was judged, or why it could not be.
+        found: Results, or why there is none.
         physics: What is possible in the conditions, by row.
         wall_s: How long it took [s].
     """
@@ -65,9 +62,9 @@ def document_of(
     }
     _add_drops(rows)
     checks = [check for row in rows for name in request.controllers for check in _checks(row, name, rows)]
-    judged = [one for one in found.values() if isinstance(one, Judged)]
-    steps = sum(one.about["control_steps"] for one in judged)
-    busy_s = sum(one.about["wall_s"] for one in judged)
+    results = [one for one in found.values() if isinstance(one, PairResult)]
+    steps = sum(one.about["control_steps"] for one in results)
+    busy_s = sum(one.about["wall_s"] for one in results)
     return {
         "benchmark": "drift",
         "format": FORMAT,
@@ -103,33 +100,33 @@ def _row(
     row: Any,
     request: Request,
     pairs: dict[Key, Pair],
-    found: dict[Key, Judged | str],
+    found: dict[Key, PairResult | str],
     physics: Physics | None,
 ) -> dict[str, Any]:
-    told: dict[str, Any] = {"title": row.title, "kind": "path" if physics is None else "pose"}
+    entry: dict[str, Any] = {"title": row.title, "kind": "path" if physics is None else "pose"}
     if physics is None:
         mean, std = TRACKING[row.name]
-        told |= {"goals": row.goals, "published": {"velocity_error": mean, "velocity_error_std": std}}
+        entry |= {"goals": row.goals, "published": {"velocity_error": mean, "velocity_error_std": std}}
     else:
-        told |= {
+        entry |= {
             "scenario": row.scenario,
             "lost_thrusters": row.lost,
             "bound": {figure: statistics(most) for figure, most in physics.bounds.items()},
             "feasible_share": float(np.mean(physics.can_hold)),
         }
-    told["controllers"] = {
+    entry["controllers"] = {
         name: _entry(row.name, name, physics, pairs[row.name, name], found.get((row.name, name)))
         for name in request.controllers
     }
-    return told
+    return entry
 
 
 def _entry(
-    row: str, name: str, physics: Physics | None, pair: Pair, outcome: Judged | str | None
+    row: str, name: str, physics: Physics | None, pair: Pair, outcome: PairResult | str | None
 ) -> dict[str, Any]:
-    judged = outcome if isinstance(outcome, Judged) else None
+    result = outcome if isinstance(outcome, PairResult) else None
     entry: dict[str, Any] = {
-        "status": "missing" if pair.missing else "failed" if judged is None else "judged",
+        "status": "missing" if pair.missing else "failed" if result is None else "judged",
         "reason": pair.reason or (outcome if isinstance(outcome, str) else None),
         "law": pair.law or None,
         "sha256": pair.sha256 or None,
@@ -137,21 +134,21 @@ def _entry(
     if physics is not None:
         beside, figures = published(row, name)
         entry |= {"published_controller": beside, "published": figures}
-    if judged is None:
+    if result is None:
         return entry | {"figures": {}}
     names = OF_PATHS if physics is None else OURS
-    about = judged.about
+    about = result.about
     if physics is not None and physics.can_hold.any():
         able = physics.can_hold
         entry["where_feasible"] = {
             "episodes": int(np.sum(able)),
-            "success_rate": float(np.mean(judged.succeeded[able])),
-            "figures": {key: statistics(judged.figures[ours][able]) for key, ours in names.items()},
+            "success_rate": float(np.mean(result.succeeded[able])),
+            "figures": {key: statistics(result.figures[ours][able]) for key, ours in names.items()},
         }
     return entry | {
-        "episodes": len(judged.succeeded),
-        "success_rate": float(np.mean(judged.succeeded)),
-        "figures": {key: statistics(judged.figures[ours]) for key, ours in names.items()},
+        "episodes": len(result.succeeded),
+        "success_rate": float(np.mean(result.succeeded)),
+        "figures": {key: statistics(result.figures[ours]) for key, ours in names.items()},
         "control_hz": about["control_hz"],
         "control_steps": about["control_steps"],
         "wall_s": about["wall_s"],
@@ -160,7 +157,7 @@ def _entry(
 
 
 def _add_drops(rows: dict[str, Any]) -> None:
-    """Tell of each figure how far it falls behind the ideal row of the same controller, ours and published."""
+    """Add to each figure how far it falls behind the ideal row of the same controller, ours and published."""
     ideal = rows.get("ideal", {"controllers": {}})["controllers"]
     for name, row in rows.items():
         if row["kind"] == "path":
@@ -192,13 +189,10 @@ def _checks(row: str, controller: str, rows: dict[str, Any]) -> list[dict[str, A
             "controller": controller,
             "figure": asked.figure,
             "better": "more" if asked.at_least else "less",
-            **{
-                key: value
-                for key, value in dataclasses.asdict(
-                    asked.verdict(figures[asked.figure]["mean"] if figures else None)
-                ).items()
-                if key != "name"
-            },
+            "measured": check.measured,
+            "limit": check.limit,
+            "met": check.met,
         }
         for asked in requirements(row, controller)
+        for check in (asked.check(figures[asked.figure]["mean"] if figures else None),)
     ]

@@ -21,7 +21,7 @@ from fulmar_benchmarks.drift.cells import (
     unmet,
 )
 from fulmar_benchmarks.drift.conditions import PATH_EPISODE_S, PATH_EPISODES, RUN_UP_S
-from fulmar_benchmarks.drift.drop import BANDS
+from fulmar_benchmarks.drift.targets import BANDS
 
 _MARKS = {GOOD: (" ✓", "green"), BAD: (" ✗", "bold red"), "": ("", "")}
 _STYLES = {band.name: band.terminal for band in BANDS}
@@ -30,12 +30,7 @@ _WIDTH = 170  # where nobody looks at a terminal, lines need not fit one
 
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
-    """Print both tables, what their figures are, what is not met, and the verdict.
-
-    Args:
-        document: Of `document_of`.
-        output: Where to.
-    """
+    """Print both tables, what their figures are, what is not met, and the conclusion."""
     wide = output if output.is_terminal else Console(highlight=False, emoji=False, width=_WIDTH)
     poses, paths = pose_lines(document), path_lines(document)
     if poses:
@@ -45,15 +40,15 @@ def print_tables(document: dict[str, Any], output: Console) -> None:
         wide.print(_table("Paths followed at 0.2 m/s", PATH_HEADS, paths))
     for line in [*missing(document), *unmet(document)]:
         wide.print(line, markup=False, style="yellow", soft_wrap=True)
-    for line in [*notes(document), verdict(document)]:
+    for line in [*notes(document), conclusion(document)]:
         wide.print(line, markup=False, soft_wrap=True)
 
 
-def verdict(document: dict[str, Any]) -> str:
-    """One sentence on what was asked and met."""
+def conclusion(document: dict[str, Any]) -> str:
+    """One sentence on what was required and met."""
     asked, met, open_ = document["asked"], document["met"], document["open"]
-    return f"{met} of {asked} figures that are asked for are met" + (
-        f"; {open_} could not be judged." if open_ else "."
+    return f"{met} of {asked} figures that are required are met" + (
+        f"; {open_} could not be evaluated." if open_ else "."
     )
 
 
@@ -78,7 +73,7 @@ def notes(document: dict[str, Any]) -> list[str]:
         )
     if document["steps_per_s"]:
         lines.append(
-            f"{document['control_steps']:,} control steps, {document['steps_per_s']:,.0f} a second while judging."
+            f"{document['control_steps']:,} control steps, {document['steps_per_s']:,.0f} a second while evaluating."
         )
     return lines
 

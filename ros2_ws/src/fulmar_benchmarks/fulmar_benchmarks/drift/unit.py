@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_benchmarks.drift.conditions import RUN_UP_S
-from fulmar_benchmarks.outcomes import QUANTILES
+from fulmar_benchmarks.results import QUANTILES
 from fulmar_benchmarks.unit import KEPT, Extra, Unit
 from fulmar_core.metrics import Trajectories
 from fulmar_core.path_task import FollowPath

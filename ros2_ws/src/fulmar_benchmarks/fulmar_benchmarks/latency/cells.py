@@ -45,7 +45,7 @@ def measure(cells: list[Cell], seconds: float, progress: Callable[[int], None]) 
     Args:
         cells: Which.
         seconds: Of each, after it has begun to act [s].
-        progress: Told how many are over.
+        progress: Called with how many are over.
 
     Returns:
         Figures by name, ready for JSON.
@@ -110,7 +110,7 @@ def _load(cell: Cell) -> Iterator[None]:
 
 
 def _required(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What is asked of the executor that Fulmar runs with, at 50 Hz."""
+    """Requirements for the executor that Fulmar runs with, at 50 Hz."""
     lines = []
     limit: float
     for row in rows:

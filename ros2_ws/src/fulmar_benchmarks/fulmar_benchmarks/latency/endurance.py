@@ -26,7 +26,7 @@ def endure(
         simulated_s: How long, in the robot's own time [s].
         rate: Seconds of it a second of the wall clock.
         folder: Where policy and bag come; must not exist.
-        progress: Told how much is over [s].
+        progress: Called with how much is over [s].
 
     Returns:
         Figures by name, ready for JSON.

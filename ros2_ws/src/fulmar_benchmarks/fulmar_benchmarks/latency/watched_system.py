@@ -1,4 +1,4 @@
-"""A whole system in real time at a rate that is asked for, and what its nodes say and use."""
+"""A whole system in real time at a given rate, and what its nodes say and use."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import SIMULATION_START_NS
-from policy_server.shipped import policies_directory
+from policy_server.controllers import policies_directory
 
 ROBOT, TASK = "floating_platform", "go_to_pose"
 STEP_HZ = 50.0  # of the robot's own time: the plant's ticks, and a command for each
@@ -74,7 +74,7 @@ def request_at(hz: float, folder: Path) -> RunRequest:
     """A system that steps and commands so often a second of the wall clock.
 
     The robot's own time goes `hz / 50` times as fast as ours, so that all rates are steps of the same physics. The
-    policy is the shipped one with 50 Hz in its passport: what it is asked for is its time, not its skill.
+    policy is the shipped one with 50 Hz in its passport: only its computing time counts, not its skill.
 
     Args:
         hz: Steps and commands a second.

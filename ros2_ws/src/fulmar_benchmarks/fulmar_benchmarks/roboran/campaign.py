@@ -1,4 +1,4 @@
-"""The benchmark after thesis Table 4.7: every pair judged, one document."""
+"""The benchmark after thesis Table 4.7: every pair evaluated, one document."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_benchmarks.outcomes import Judged
 from fulmar_benchmarks.pairs import Pair, find_pair, units_of
+from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import FORMAT, pair_entry
-from fulmar_benchmarks.unit import Unit, done_already
-from fulmar_benchmarks.work import Outcome, do_all
+from fulmar_benchmarks.unit import Unit
+from fulmar_benchmarks.workers import Outcome, evaluate_units
+from fulmar_core.counts import check_episodes
 from fulmar_core.provenance import fulmar_version, git_revision
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import BATCH_EPISODES
 from fulmar_evaluation.evaluation import EPISODES as JUDGED
 
@@ -22,7 +25,7 @@ EPISODES = {"batch": BATCH_EPISODES, "mujoco": JUDGED, "ros": 16}
 
 @dataclass(frozen=True)
 class Request:
-    """What to judge."""
+    """What to evaluate."""
 
     robots: Sequence[str]
     tasks: Sequence[str]
@@ -33,17 +36,17 @@ class Request:
     folder: Path  # outcomes are kept below it
     policies: Path | None = None  # folder of bundles; the shipped ones by default
     jobs: int = 2
-    fresh: bool = False  # judge again what was judged before
+    fresh: bool = False  # evaluate again what was evaluated before
     command: str = ""  # for the record
 
 
 @dataclass(frozen=True)
-class Findings:
-    """The document, and what pictures are drawn from."""
+class CampaignResult:
+    """The document, and what plots are drawn from."""
 
     document: dict[str, Any]
     pairs: list[Pair]
-    outcomes: dict[Pair, dict[str, Judged]]
+    outcomes: dict[Pair, dict[str, PairResult]]
 
 
 def run_benchmark(
@@ -51,18 +54,16 @@ def run_benchmark(
     *,
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
-) -> Findings:
-    """Judge every pair, but for what was judged before with the same code, configuration and controller.
+) -> CampaignResult:
+    """Evaluate every pair, but for what was evaluated before with the same code, configuration and controller.
 
-    Args:
-        request: What to judge.
-        progress: Told how much is done, and of how much.
-        on_done: Told of each unit: its outcome, and whether it was there before.
-
-    Returns:
-        What was found.
+    Arguments beside the request as of `evaluate_units`.
     """
     began = time.monotonic()
+    longest_s = max(load_task(task).episode_s for task in request.tasks)
+    for robot in map(load_robot, request.robots):
+        steps = round(longest_s * robot.timing.control_hz)
+        check_episodes(robot, episodes=max(request.episodes.values()), steps=steps, jobs=request.jobs)
     pairs = [
         find_pair(robot, task, kind, request.policies)
         for task in request.tasks
@@ -82,16 +83,8 @@ def run_benchmark(
         if not pair.missing
     }
     every = [unit for of_pair in units.values() for unit in of_pair]
-    outcomes: dict[Unit, Outcome] = {**done_already(every, fresh=request.fresh)}
-    for unit, before in outcomes.items():
-        on_done(unit, before, True)
-    left = [unit for unit in every if unit not in outcomes]
-    total = sum(unit.cost for unit in left)
-    outcomes |= do_all(
-        left,
-        jobs=request.jobs,
-        progress=lambda done: progress(done, total),
-        on_done=lambda unit, outcome: on_done(unit, outcome, False),
+    outcomes = evaluate_units(
+        every, jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
     )
     by_pair = {pair: {unit.trial.through: outcomes[unit] for unit in units.get(pair, [])} for pair in pairs}
     entries = [pair_entry(pair, by_pair[pair]) for pair in pairs]
@@ -104,10 +97,10 @@ def run_benchmark(
         wall_s=time.monotonic() - began,
     )
     judged = {
-        pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, Judged)}
+        pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, PairResult)}
         for pair, ways in by_pair.items()
     }
-    return Findings(document, pairs, judged)
+    return CampaignResult(document, pairs, judged)
 
 
 def document_of(

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.outcomes import Judged
 from fulmar_benchmarks.pairs import Pair
-from fulmar_benchmarks.required import judged_figure, verdicts
-from fulmar_benchmarks.roboran.published import thesis_row
+from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.roboran.targets import checks_of, main_figure, thesis_row
 from fulmar_core.metrics import summarise
 from fulmar_evaluation.evaluation import share_of_mean
 
@@ -19,24 +18,20 @@ FORMAT = 1
 Z95 = 1.96
 
 
-def pair_entry(pair: Pair, outcomes: dict[str, Judged | str]) -> dict[str, Any]:
-    """What is told about one pair.
-
-    Args:
-        pair: The pair.
-        outcomes: By way: what was judged, or why it could not be.
+def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, Any]:
+    """The entry of one pair.
 
     Returns:
         An entry of `pairs`; docs/evaluation.md names its keys.
     """
-    judged = {way: outcome for way, outcome in outcomes.items() if isinstance(outcome, Judged)}
+    judged = {way: outcome for way, outcome in outcomes.items() if isinstance(outcome, PairResult)}
     faults = [f"{way}: {outcome}" for way, outcome in outcomes.items() if isinstance(outcome, str)]
-    figure = judged_figure(pair.task)
+    figure = main_figure(pair.task)
     values = {way: _value(outcome, figure) for way, outcome in judged.items()}
     training_s = _seconds(pair.passport.get("wall_s"))
     same = judged["batch"].about.get("same_at_64_worlds") if "batch" in judged else None
     checks = (
-        verdicts(pair.robot, pair.task, values, same=same, training_s=training_s)
+        checks_of(pair.robot, pair.task, values, same=same, training_s=training_s)
         if pair.kind == "policy"
         else []
     )
@@ -71,7 +66,7 @@ def wilson(share: float, count: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def _way(outcome: Judged) -> dict[str, Any]:
+def _way(outcome: PairResult) -> dict[str, Any]:
     figures = summarise(outcome.succeeded, outcome.figures)
     kept = {key: value for key, value in outcome.about.items() if key not in _OF_THE_PAIR}
     entry = {**kept, **figures}
@@ -86,13 +81,13 @@ def _way(outcome: Judged) -> dict[str, Any]:
 _OF_THE_PAIR = ("key", "robot", "task", "controller", "through", "same_at_64_worlds", "goals")
 
 
-def _value(outcome: Judged, figure: str, episodes: int | None = None) -> float:
+def _value(outcome: PairResult, figure: str, episodes: int | None = None) -> float:
     values = outcome.succeeded if figure == "success_rate" else outcome.figures[figure]
     return float(np.nanmean(values[:episodes]))
 
 
-def _on_mujocos_episodes(judged: dict[str, Judged], figure: str) -> float | None:
-    """The judged figure of the batch on the very episodes that MuJoCo ran."""
+def _on_mujocos_episodes(judged: dict[str, PairResult], figure: str) -> float | None:
+    """The main figure of the batch on the very episodes that MuJoCo ran."""
     if not {"batch", "mujoco"} <= set(judged):
         return None
     return _value(judged["batch"], figure, len(judged["mujoco"].succeeded))

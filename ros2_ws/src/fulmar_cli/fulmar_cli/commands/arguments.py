@@ -1,133 +1,102 @@
-"""Arguments that several commands share, and how they are read."""
+"""Options and arguments that several commands share."""
 
 from __future__ import annotations
 
-import math
+import sys
+import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 import typer
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.safety.geofence import check_area
+from fulmar_bringup.console import warn
 
-RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A name from `fulmar list robots`.")]
+Value = TypeVar("Value")
+
+
+def option(metavar: str, text: str, *names: str, **more: Any) -> Any:
+    """An option, named like its parameter unless `names` say otherwise; `more` goes to typer, such as `min`."""
+    return typer.Option(*names, metavar=metavar, help=text, **more)
+
+
+def flag(name: str, text: str) -> Any:
+    """An option without a value."""
+    return typer.Option(name, help=text)
+
+
+def argument(metavar: str, text: str) -> Any:
+    """A positional argument."""
+    return typer.Argument(metavar=metavar, help=text)
+
+
+def renamed(old: str, new: str) -> Any:
+    """The old name of an option: hidden, still taken, with a warning."""
+
+    def check(value: Value) -> Value:
+        if value is not None:
+            warn([f"{old} is now called {new}; the old name will be removed in the next release"])
+        return value
+
+    return typer.Option(old, hidden=True, callback=check)
+
+
+RobotArgument = Annotated[str, argument("ROBOT", "A name from `fulmar list robots`.")]
 NameOption = Annotated[
-    str | None,
-    typer.Option(
-        "--name", metavar="NAME", help="What the robot is called: its namespace; its type by default."
-    ),
+    str | None, option("NAME", "Name of the robot, and its ROS namespace; its type by default.", "--name")
 ]
 TASK_HELP = "A name from `fulmar list tasks`, or your own class: mypackage.mymodule:MyTask."
-TaskArgument = Annotated[str, typer.Argument(metavar="TASK", help=TASK_HELP)]
-TaskOption = Annotated[str, typer.Option("--task", metavar="T", help=TASK_HELP)]
-ControllerOption = Annotated[
-    str,
-    typer.Option(
-        "--controller",
-        metavar="C",
-        help="policy, a classical controller such as lqr, or your own class: mypackage.mymodule:MyController. "
-        "With `fulmar run` also external: a node that you start.",
-    ),
-]
+TaskArgument = Annotated[str, argument("TASK", TASK_HELP)]
+TaskOption = Annotated[str, option("T", TASK_HELP, "--task")]
+CONTROLLER_HELP = (
+    "policy, a classical controller such as lqr, or your own class: mypackage.mymodule:MyController. "
+    "With `fulmar run` also external: a node that you start."
+)
+ControllerOption = Annotated[str, option("C", CONTROLLER_HELP, "--controller")]
 PolicyOption = Annotated[
-    Path | None, typer.Option("--policy", metavar="DIR", help="A policy bundle; the shipped one by default.")
+    Path | None, option("DIR", "A policy bundle; the shipped one by default.", "--policy")
 ]
-SeedOption = Annotated[
-    int, typer.Option("--seed", metavar="N", min=0, max=2**63 - 1, help="Seed of everything random.")
-]
-ScenarioOption = Annotated[
-    str, typer.Option("--scenario", metavar="NAME", help="Disturbances: a name from configs/scenarios.")
-]
+SeedOption = Annotated[int, option("N", "Seed of everything random.", "--seed", min=0, max=2**63 - 1)]
+ScenarioOption = Annotated[str, option("NAME", "Disturbances: a name from configs/scenarios.", "--scenario")]
 CalibrationOption = Annotated[
     Path | None,
-    typer.Option(
-        "--calibration",
-        metavar="FILE",
-        help="What `fulmar identify` measured on this robot, instead of its YAML.",
-    ),
+    option("FILE", "A result of `fulmar identify`, used in place of the robot's YAML.", "--calibration"),
 ]
-BagArgument = Annotated[
-    Path, typer.Argument(metavar="BAG", help="A bag folder, or the .mcap or .db3 file in it.")
+HARDWARE_HELP = (
+    "With --backend hardware: a name from configs/hardware, or a .yaml file; the robot's own by default."
+)
+HardwareOption = Annotated[str | None, option("NAME", HARDWARE_HELP, "--hardware")]
+EmulateOption = Annotated[
+    bool, flag("--emulate", "With --backend hardware: an emulator replaces the device.")
 ]
 ArmOption = Annotated[
     bool,
-    typer.Option(
-        "--arm",
-        help="Let the driver set MANUAL, arm the boat's autopilot and override RC, as `arm: true` does.",
+    flag(
+        "--arm", "Let the driver set MANUAL, arm the boat's autopilot and override RC, as `arm: true` does."
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+EstopOption = Annotated[
+    bool, flag("--estop", "Run an e-stop node; nothing moves without it. See `fulmar estop`.")
+]
+RateOption = Annotated[
+    float, option("F", "Simulated seconds per second of wall-clock time.", "--rate", min=0.01, max=50.0)
+]
+ControlHzOption = Annotated[float | None, option("HZ", "Command rate; the robot's own by default.", min=0.01)]
+RecordOption = Annotated[
+    Path | None, option("DIR", "Folder of the bag; runs/<time>... by default.", "--record")
+]
+JobsOption = Annotated[int | None, option("N", "Parallel processes; one for each core by default.", min=1)]
+BagArgument = Annotated[Path, argument("BAG", "A bag folder, or the .mcap or .db3 file in it.")]
+OdometryOption = Annotated[str | None, option("TOPIC", "The odometry to use, where a bag has several.")]
+JsonOption = Annotated[bool, flag("--json", "Print one JSON object and nothing else.")]
 
 
-Area = tuple[float, float, float, float]  # x_min, x_max, y_min, y_max [m]
+def invoked_command() -> str:
+    """The command line of this process, for records."""
+    return "fulmar " + " ".join(sys.argv[1:])
 
 
-def read_area(text: str | None) -> Area | None:
-    """Read `x_min,x_max,y_min,y_max` of --area [m].
-
-    Raises:
-        ConfigError: If it is not such an area.
-    """
-    if text is None:
-        return None
-    try:
-        x_min, x_max, y_min, y_max = (float(part) for part in text.split(","))
-        check_area((x_min, x_max, y_min, y_max))
-    except ValueError as error:
-        raise ConfigError(
-            f"--area = '{text}' must be x_min,x_max,y_min,y_max in m with x_min < x_max and y_min < y_max, "
-            "such as --area=-2,2,-1,1."
-        ) from error
-    return x_min, x_max, y_min, y_max
-
-
-def read_goal(text: str | None, option: str = "--goal") -> tuple[float, ...] | None:
-    """Read `x,y` or `x,y,deg`: x [m], y [m] and, for a pose, heading [deg].
-
-    Args:
-        text: What was written, or None.
-        option: Name of the option, for messages.
-
-    Raises:
-        ConfigError: If it is not two or three finite numbers.
-    """
-    if text is None:
-        return None
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) not in (2, 3) or not all(math.isfinite(value) for value in values):
-        raise ConfigError(
-            f"{option} = '{text}' must be two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
-            f"Example: {option} 1,-0.5 or {option} 1,-0.5,90"
-        )
-    return values
-
-
-def read_pose(text: str | None, option: str) -> tuple[float, float, float] | None:
-    """Read `x,y,deg`.
-
-    Args:
-        text: What was written, or None.
-        option: Name of the option, for messages.
-
-    Returns:
-        x [m], y [m] and heading [deg], or None.
-
-    Raises:
-        ConfigError: If it is not three finite numbers.
-    """
-    if text is None:
-        return None
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != 3 or not all(math.isfinite(value) for value in values):
-        raise ConfigError(
-            f"{option} = '{text}' must be three finite numbers: x [m], y [m], heading [deg]. "
-            f"Example: {option} 1,-0.5,90"
-        )
-    return values[0], values[1], values[2]
+def dated_folder(parent: str, *names: str) -> Path:
+    """A new folder, named by the time and by what is in it; of a class of one's own the module is left out."""
+    return Path(
+        parent, "_".join((time.strftime("%Y%m%d_%H%M%S"), *(name.rpartition(":")[2] for name in names)))
+    )

@@ -1,4 +1,4 @@
-"""`fulmar bag`: what one can ask a bag. Each question lives in a module of its own."""
+"""`fulmar bag`: inspect, re-run, compare and convert recorded bags."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ be read; what could be was done all the same. 2 there is no bag, nothing of it c
 """
 
 bag = typer.Typer(
-    help="Ask bags: what is in them, what another controller would have done, what differs.",
+    help="Inspect bags, re-run them with another controller, compare and export them.",
     no_args_is_help=True,
     rich_markup_mode=None,
     epilog=EPILOG,

@@ -1,4 +1,4 @@
-"""`fulmar bag info`: topics, rates, gaps, what is late or missing, and where a bag comes from."""
+"""`fulmar bag info`: topics, rates, gaps, late and missing messages, and the origin of a bag."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import print_result, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption
 from fulmar_core.errors import DONE, FAILED
 
@@ -28,12 +28,12 @@ ORIGIN = (
 
 
 def info(bag: BagArgument, as_json: JsonOption = False) -> None:
-    """Tell what is in a bag: topics, types, counts, rates, gaps, late and dropped messages, provenance.
+    """Show what is in a bag: topics, types, counts, rates, gaps, late and dropped messages, provenance.
 
     Rates and gaps go by the stamps in the messages where they have any, else by when they were recorded. A gap is 2.5
     periods without a message; a stamp of 0, which means "not set", counts for none. Late is a message that came more
-    than a period later than usual. Dropped is what must have been there: numbers that the recorder counted and the
-    file lacks, odometry that was answered but is not there.
+    than a period later than usual. Dropped are messages that the recorder counted and the file lacks, and
+    odometry that was answered but is not there.
 
     Exit code: 0 the whole bag was read, 1 part of it could not be, 2 nothing could.
     """
@@ -41,33 +41,30 @@ def info(bag: BagArgument, as_json: JsonOption = False) -> None:
     from fulmar_bags.figures import describe
 
     found = describe(open_bag(bag))
-    if as_json:
-        print_json(found)
-    else:
-        _show(found)
+    print_result(found, _show, as_json=as_json)
     raise typer.Exit(FAILED if found["damage"] else DONE)
 
 
 def _show(found: dict[str, Any]) -> None:
     when = _when(found["start_ns"])
-    _say(
+    write_line(
         f"{found['bag']}: {found['storage']}, {found['size_bytes'] / 1e3:.0f} kB, {found['messages']} messages, "
         f"{found['duration_s']:.2f} s" + (f" from {when}" if found["messages"] else "")
     )
     for row in _aligned([HEAD, *map(_row, found["topics"])]):
-        _say(row)
+        write_line(row)
     for topic in found["topics"]:
         if topic["unstamped"]:
-            _say(
+            write_line(
                 f"{topic['name']}: {topic['unstamped']} of {topic['count']} messages have a stamp of 0 (not set)"
             )
     if found["silent_topics"]:
-        _say(f"announced, without a message: {', '.join(found['silent_topics'])}")
+        write_line(f"announced, without a message: {', '.join(found['silent_topics'])}")
     for fault in found["faults"]:
-        _say(f"written for a fault at {_when(fault['time_ns'])}: {fault['reason']}")
+        write_line(f"recorded around a fault at {_when(fault['time_ns'])}: {fault['reason']}")
     _show_origin(found["provenance"])
     for line in found["damage"]:
-        _say(f"damage: {line}")
+        write_line(f"damage: {line}")
 
 
 def _row(topic: dict[str, Any]) -> tuple[str, ...]:
@@ -97,24 +94,24 @@ def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
 
 def _show_origin(origin: dict[str, Any]) -> None:
     if not origin["recorded_by_fulmar"]:
-        _say("recorded by somebody else: it does not say which code, config and robot made it")
+        write_line("not recorded by Fulmar: code, config and robot are unknown")
         return
     for key in ORIGIN:
         if origin[key] not in (None, ""):
-            _say(f"{key}: {origin[key]}")
-    _say(
+            write_line(f"{key}: {origin[key]}")
+    write_line(
         f"code: fulmar {origin['fulmar_version'] or 'unknown'}, revision {origin['git_revision'] or 'unknown'}"
     )
     if origin["made_by"]:
-        _say(f"on {origin['made_by']['platform']}, Python {origin['made_by']['python']}")
+        write_line(f"on {origin['made_by']['platform']}, Python {origin['made_by']['python']}")
     if origin["recorded_to_its_end"] is False:
-        _say("the recorder did not come to an orderly end")
+        write_line("the recorder was not shut down in order")
     if origin["controller_sha256"]:
-        _say(f"controller SHA-256: {origin['controller_sha256']}")
+        write_line(f"controller SHA-256: {origin['controller_sha256']}")
     for name, sha256 in origin["attachments"].items():
-        _say(f"carries {name}, SHA-256 {sha256[:16]}")
+        write_line(f"contains {name}, SHA-256 {sha256[:16]}")
     if origin["config_changed_since"]:
-        _say(f"changed here since then: {', '.join(origin['config_changed_since'])}")
+        write_line(f"changed here since then: {', '.join(origin['config_changed_since'])}")
 
 
 def _when(time_ns: int) -> str:
@@ -123,7 +120,3 @@ def _when(time_ns: int) -> str:
 
 def _number(value: float | None, form: str) -> str:
     return "–" if value is None else form.format(value)
-
-
-def _say(text: str) -> None:
-    output.print(text, markup=False, soft_wrap=True)

@@ -1,40 +1,31 @@
-"""`fulmar bag play`: a bag back onto ROS."""
+"""`fulmar bag play`: publish a bag on ROS again."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from fulmar_bringup.console import output, print_json
-from fulmar_cli.commands.arguments import BagArgument, JsonOption
+from fulmar_bringup.console import print_json, write_line
+from fulmar_cli.commands.arguments import BagArgument, JsonOption, flag, option
 from fulmar_cli.commands.damage import finish, open_and_warn, warn
 
 
 def play(
     bag: BagArgument,
-    rate: Annotated[
-        float, typer.Option(metavar="F", min=0.001, help="Seconds of the run in a wall-clock second.")
-    ] = 1.0,
-    start: Annotated[float, typer.Option(metavar="S", min=0.0, help="Begin so far into the run [s].")] = 0.0,
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, until Ctrl-C.")] = False,
-    clock: Annotated[bool, typer.Option("--clock", help="Publish /clock with the time of the run.")] = False,
+    rate: Annotated[float, option("F", "Seconds of the run in a wall-clock second.", min=0.001)] = 1.0,
+    start: Annotated[float, option("S", "Begin so far into the run [s].", min=0.0)] = 0.0,
+    loop: Annotated[bool, flag("--loop", "Begin again at the end, until Ctrl-C.")] = False,
+    clock: Annotated[bool, flag("--clock", "Publish /clock with the time of the run.")] = False,
     topic: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="TOPIC", help="This topic alone, such as odom; may be repeated. All by default."
-        ),
+        list[str] | None, option("TOPIC", "This topic alone, such as odom; may be repeated. All by default.")
     ] = None,
-    wait: Annotated[
-        float, typer.Option(metavar="S", min=0.0, help="Before the first message, for others to find us.")
-    ] = 0.5,
+    wait: Annotated[float, option("S", "Wait before the first message, for discovery.", min=0.0)] = 0.5,
     as_json: JsonOption = False,
 ) -> None:
-    """Publish what was recorded, byte for byte, at the pace of the run.
+    """Publish recorded messages, byte for byte, at the pace of the run.
 
     The pace is that of the stamps: a lock-step run, recorded in a second, plays for as long as it lasted. Goals and
-    other latched messages from before --start are told at the start. With --loop time jumps back, as with a restarted
-    plant.
+    other latched messages from before --start are published at the start. With --loop time jumps back, as with a
+    restarted plant.
 
     Try, with a controller listening: fulmar bag play runs/demo_x/lqr --topic odom --topic goal_pose --clock
     """
@@ -52,10 +43,8 @@ def play(
     if as_json:
         print_json({"bag": str(bag), "duration_s": duration_s, "rate": rate, **vars(done)})
     else:
-        output.print(
+        write_line(
             f"played {done.messages} messages of {duration_s:.2f} s at {rate:g} times the pace, p99 of lateness "
-            f"{done.late_ms_p99:.1f} ms",
-            markup=False,
-            soft_wrap=True,
+            f"{done.late_ms_p99:.1f} ms"
         )
     raise finish(opened)

@@ -1,16 +1,16 @@
-"""`fulmar bag recover`: a bag that a power cut or a damaged disk left torn, made whole."""
+"""`fulmar bag recover`: repair a bag that a power cut or a damaged disk left torn."""
 
 from __future__ import annotations
 
 import typer
 
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption
 from fulmar_core.errors import DONE, FAILED, BagError
 
 
 def recover(bag: BagArgument, as_json: JsonOption = False) -> None:
-    """Write the MCAP files of a bag anew with everything that can be read, and their metadata.yaml.
+    """Rewrite the MCAP files of a bag with everything that can be read, and their metadata.yaml.
 
     Where something could not be read, the old file stays beside the new one, with `.damaged` behind its name. Not for
     a bag that is being recorded.
@@ -26,5 +26,5 @@ def recover(bag: BagArgument, as_json: JsonOption = False) -> None:
         print_json({"bag": str(bag), "lost": list(lost)})
     else:
         for line in (*(f"lost: {line}" for line in lost), f"{bag}: every reader of MCAP can open it now"):
-            output.print(line, markup=False, soft_wrap=True)
+            write_line(line)
     raise typer.Exit(FAILED if lost else DONE)

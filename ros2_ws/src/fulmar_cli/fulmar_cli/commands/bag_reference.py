@@ -1,4 +1,4 @@
-"""`fulmar bag reference`: the runs that every later version must answer the same way."""
+"""`fulmar bag reference`: runs that every later version must answer the same way."""
 
 from __future__ import annotations
 
@@ -7,28 +7,23 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_bringup.console import log_line, print_json, write_line
+from fulmar_cli.commands.arguments import JsonOption, argument, flag, option
 from fulmar_core.errors import DONE, FAILED, UnknownNameError
 
 
 def reference(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Where the reference bags are.")] = Path(
-        "tests/replay/bags"
-    ),
+    folder: Annotated[Path, argument("FOLDER", "Where the reference bags are.")] = Path("tests/replay/bags"),
     update: Annotated[
-        bool,
-        typer.Option("--update", help="Record them anew through the deployed nodes; an intended change."),
+        bool, flag("--update", "Record them anew through the deployed nodes; an intended change.")
     ] = False,
-    only: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="This one alone; may be repeated.")
-    ] = None,
+    only: Annotated[list[str] | None, option("NAME", "This one alone; may be repeated.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check that the reference bags are answered as they were recorded, or record them anew.
 
     Each is a short lock-step run. It is run again from its odometry: the gates decide, observations are made, the
-    controller acts, commands are limited. Whatever differs by more than another processor rounds is told, with its
+    controller acts, commands are limited. Each difference beyond the rounding of another processor is shown with its
     field and its step.
 
     Exit code: 0 all are the same, or were recorded; 1 something differs.
@@ -44,7 +39,7 @@ def reference(
     results: list[dict[str, Any]] = []
     for name in only or list(known):
         if update:
-            console.print(f"recording {name}", markup=False)
+            log_line(f"recording {name}")
             record_reference(known[name], folder)
         fields = check_reference(folder / name)
         first = first_difference(fields)
@@ -58,7 +53,7 @@ def reference(
                 else f"differs from step {first.first_step} on: {first.field} {first.name}, "
                 f"recorded {first.recorded}, now {first.found}"
             )
-            output.print(f"{name}: {where}", markup=False, soft_wrap=True)
+            write_line(f"{name}: {where}")
     same = all(result["same"] for result in results)
     if as_json:
         print_json({"references": results, "same": same})

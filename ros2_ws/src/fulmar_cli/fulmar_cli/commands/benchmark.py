@@ -1,4 +1,4 @@
-"""`fulmar benchmark`: what was measured, beside what was published."""
+"""`fulmar benchmark`: measurements beside published results."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OF_A_CHECKOUT = {
     "hardware": ("hardware", "Drive emulated devices to their goals, through driver and protocol."),
     "identify": (
         "identification.command",
-        "Drive random machines in MuJoCo, and identify them from their bags.",
+        "Drive random robots in MuJoCo, and identify them from their bags.",
     ),
     "network": ("network", "Drive a robot by a controller on another host, over a bad cable."),
     "recorder": ("recorder.command", "Measure what recording costs the control loop and what it loses."),
@@ -29,7 +29,7 @@ OF_A_CHECKOUT = {
 CHECKOUT = Path(__file__).resolve().parents[5]
 
 benchmark = typer.Typer(
-    help="Measure policies, simulators, drivers, real time and training, beside what was published.",
+    help="Measure policies, simulators, drivers, real time and training, beside published results.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -38,7 +38,7 @@ for command in (drift, endurance, latency, roboran, throughput, training):
 
 
 def _missing(name: str) -> Callable[[typer.Context], None]:
-    """A command that says where to run it."""
+    """A command that explains where it can be run."""
 
     def refuse(_context: typer.Context) -> None:
         raise ConfigError(

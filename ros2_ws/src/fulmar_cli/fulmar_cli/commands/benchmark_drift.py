@@ -3,70 +3,63 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import typer
+from fulmar_cli.commands.arguments import (
+    JobsOption,
+    JsonOption,
+    PolicyOption,
+    SeedOption,
+    invoked_command,
+    option,
+)
+from fulmar_cli.commands.benchmark_campaign import (
+    OUT_HELP,
+    CheckOption,
+    FreshOption,
+    ReportOption,
+    run_campaign,
+)
+from fulmar_cli.commands.values import read_names
+from fulmar_cli.extras import require
+from fulmar_core.errors import UnknownNameError
+from fulmar_core.seeds import EVALUATION_SEED
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JsonOption, PolicyOption, SeedOption
-from fulmar_core.episode import EVALUATION_SEED
-from fulmar_core.errors import FAILED, UnknownNameError
+if TYPE_CHECKING:
+    from fulmar_benchmarks.results import PairResult
 
 
 def drift(
     through: Annotated[
-        str,
-        typer.Option(metavar="batch|mujoco|ros", help="ros: the deployed nodes over DDS, in lock step."),
+        str, option("batch|mujoco|ros", "ros: the deployed nodes over DDS, in lock step.")
     ] = "ros",
     controllers: Annotated[
-        str, typer.Option(metavar="K,...", help="Out of policy and the classical controllers.")
+        str, option("K,...", "Out of policy and the classical controllers.")
     ] = "policy,lqr",
     rows: Annotated[
-        str | None,
-        typer.Option(metavar="R,...", help="Names of conditions and paths; all twelve by default."),
+        str | None, option("R,...", "Names of conditions and paths; all twelve by default.")
     ] = None,
     episodes: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Trajectories of each condition; paths have at most 4.")
+        int, option("N", "Trajectories of each condition; paths have at most 4.", min=1)
     ] = 256,
     seed: SeedOption = EVALUATION_SEED,
     policy: PolicyOption = None,
     tracking_policy: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Policy bundle for the paths; the shipped one by default."),
+        Path | None, option("DIR", "Policy bundle for the paths; the shipped one by default.")
     ] = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            "--output",
-            metavar="DIR",
-            help="Where outcomes are kept, and the report with its pictures.",
-        ),
-    ] = Path("runs/benchmark/drift"),
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, help="Processes at once, pairs of them through ros; one for each core."
-        ),
-    ] = None,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="Judge again what was judged before and did not change.")
-    ] = False,
-    report: Annotated[bool, typer.Option(help="Draw the report.")] = True,
-    check: Annotated[
-        bool, typer.Option("--check", help="End with code 1 unless everything asked was measured and met.")
-    ] = False,
+    out: Annotated[Path, option("DIR", OUT_HELP, "--out", "--output")] = Path("runs/benchmark/drift"),
+    jobs: JobsOption = None,
+    fresh: FreshOption = False,
+    report: ReportOption = True,
+    check: CheckOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run the experiment of thesis Tables 3.5 and 3.6, and print both side by side.
 
-    Nine conditions of 256 trajectories from 3 to 4 m away, 250 steps of 0.2 s each, and three paths that are followed
-    at 0.2 m/s; in MuJoCo, through the nodes that are deployed. What was judged before with the same code, configuration
-    and controller is taken from DIR, so an interrupted benchmark goes on where it stopped. DIR/index.html is the
-    report, DIR/drift.json the figures.
+    Nine conditions of 256 trajectories from 3 to 4 m away, 250 steps of 0.2 s each, and three paths at 0.2 m/s; in
+    MuJoCo, through the deployed nodes. DIR keeps results for the same code, configuration and controller, so an
+    interrupted benchmark continues where it stopped. DIR/index.html is the report, DIR/drift.json the figures.
 
     Try:
 
@@ -75,83 +68,29 @@ def drift(
     from fulmar_benchmarks.drift.campaign import Request, run_drift
     from fulmar_benchmarks.drift.conditions import ROWS
     from fulmar_benchmarks.drift.tables import print_tables
-    from fulmar_benchmarks.drift.unit import DriftUnit
-    from fulmar_benchmarks.outcomes import Judged
-    from fulmar_benchmarks.unit import Unit
-    from fulmar_cli.commands.benchmark_roboran import chosen
-    from fulmar_cli.extras import require
     from fulmar_evaluation.evaluation import WAYS
     from policy_server.controllers import CONTROLLERS
 
     if through not in WAYS:
         raise UnknownNameError("way", through, WAYS)
-    known = tuple(name for name in CONTROLLERS if name != "classical")
-    names = tuple(dict.fromkeys(name.strip() for name in controllers.split(",") if name.strip()))
-    chosen(controllers, "controller", known)
-    if "policy" in names:
-        require("onnxruntime")
-    if through != "batch":
-        require("mujoco")
+    names = read_names(controllers, "controller", [name for name in CONTROLLERS if name != "classical"])
+    require(*(["onnxruntime"] if "policy" in names else []), *([] if through == "batch" else ["mujoco"]))
+    request = Request(
+        rows=ROWS if rows is None else read_names(rows, "row", ROWS), controllers=names, through=through,
+        episodes=episodes, seed=seed, folder=out, policy=policy, tracking_policy=tracking_policy,
+        jobs=jobs or len(os.sched_getaffinity(0)), fresh=fresh, command=invoked_command(),
+    )  # fmt: skip
     if report:
         require("matplotlib")
-    request = Request(
-        rows=ROWS if rows is None else chosen(rows, "row", ROWS),
-        controllers=known if "all" in names else names,
-        through=through,
-        episodes=episodes,
-        seed=seed,
-        folder=out,
-        policy=policy,
-        tracking_policy=tracking_policy,
-        jobs=jobs or len(os.sched_getaffinity(0)),
-        fresh=fresh,
-        command="fulmar " + " ".join(sys.argv[1:]),
-    )
-
-    def tell(unit: Unit, outcome: Judged | str, before: bool) -> None:
-        assert isinstance(unit, DriftUnit)
-        name = f"{unit.row}, {unit.controller}"
-        if isinstance(outcome, str):
-            console.print(f"{name}: failed: {outcome}", markup=False, soft_wrap=True)
-            return
-        speed = outcome.about["control_steps"] / outcome.about["wall_s"]
-        how = "judged before" if before else f"{outcome.about['wall_s']:.1f} s, {speed:,.0f} steps/s"
-        console.print(f"{name}: {_main_figure(outcome)} ({how})", markup=False, soft_wrap=True)
-
-    with work_bar("judging") as progress:
-        findings = run_drift(request, progress=progress, on_done=tell)
-    document = findings.document
-    written = _write(findings, out, report)
-    if as_json:
-        print_json(document)
-    else:
-        print_tables(document, output)
-    console.print(f"written: {written}", markup=False, soft_wrap=True)
-    if check and document["met"] < document["asked"]:
-        raise typer.Exit(FAILED)
+        from fulmar_benchmarks.drift.report import write_report
+    run_campaign(
+        run_drift, request, name_of=lambda unit: f"{unit.row}, {unit.controller}", figure_of=_main_figure,
+        print_tables=print_tables, write_report=write_report if report else None, check=check, as_json=as_json,
+    )  # fmt: skip
 
 
-def _main_figure(outcome: object) -> str:
-    from fulmar_benchmarks.outcomes import Judged
-
-    assert isinstance(outcome, Judged)
-    figures = outcome.figures
+def _main_figure(result: PairResult) -> str:
+    figures = result.figures
     if "PT5_percent" in figures:
         return f"PT5 {figures['PT5_percent'].mean():.1f} %, OT5 {figures['OT5_percent'].mean():.1f} %"
     return f"velocity error {figures['velocity_error_m_s'].mean():.4f} m/s"
-
-
-def _write(findings: object, out: Path, report: bool) -> Path:
-    import json
-
-    from fulmar_benchmarks.drift.campaign import Findings
-
-    assert isinstance(findings, Findings)
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / "drift.json"
-    path.write_text(json.dumps(findings.document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    if report:
-        from fulmar_benchmarks.drift.report import write_report
-
-        return write_report(findings, out)
-    return path

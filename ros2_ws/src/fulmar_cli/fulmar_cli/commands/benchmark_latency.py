@@ -9,27 +9,25 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from fulmar_bringup.console import output, print_json
+from fulmar_bringup.console import output, print_result, write_line
 from fulmar_bringup.progress import time_bar, work_bar
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_cli.commands.arguments import JsonOption, option
 from fulmar_core.errors import FAILED, ConfigError
 
 
 def latency(
     rates: Annotated[
-        str, typer.Option(metavar="HZ,...", help="Commands a second, 5 to 500, with commas between.")
+        str, option("HZ,...", "Commands a second, 5 to 500, with commas between.")
     ] = "5,10,20,50,100,200",
-    seconds: Annotated[float, typer.Option(metavar="S", min=1.0, help="Of each cell.")] = 6.0,
-    executors: Annotated[
-        str, typer.Option(metavar="E,...", help="Of events, default: which executor serves the nodes.")
-    ] = "events,default",
+    seconds: Annotated[float, option("S", "Seconds of each measurement.", min=1.0)] = 6.0,
+    executors: Annotated[str, option("E,...", "Executors of the nodes: events, default.")] = "events,default",
     as_json: JsonOption = False,
 ) -> None:
-    """Measure the way of a state through the controller and back to the actuators, at several rates.
+    """Measure the latency from a state through the controller to the actuators, at several rates.
 
     Plant (MuJoCo), controller (the shipped policy of go_to_pose) and recorder are processes, as `fulmar run` has them.
     Latency goes from where the plant publishes its state to where it has taken the command that answers it. Each rate
-    is measured on a machine that does nothing else, and with a busy process for each core; with rclpy's EventsExecutor,
+    is measured on an idle computer, and with a busy process for each core; with rclpy's EventsExecutor,
     which Fulmar uses, and with its default one. Nothing else should run meanwhile. The exit code is 1 unless at 50 Hz
     the 99th percentile is below 3 ms when idle and no watchdog trips under load.
 
@@ -44,28 +42,24 @@ def latency(
     cells = cells_of(_rates(rates), _executors(executors))
     with work_bar("measuring") as moved:
         figures = measure(cells, seconds, lambda done: moved(done, len(cells)))
-    if as_json:
-        print_json(figures)
-    else:
-        _print(figures)
+    print_result(figures, _print, as_json=as_json)
     if not figures["passed"]:
         raise typer.Exit(FAILED)
 
 
 def endurance(
     simulated_s: Annotated[
-        float, typer.Option("--seconds", metavar="S", min=10.0, help="In the robot's own time.")
+        float, option("S", "Length, in the robot's own time.", "--seconds", min=10.0)
     ] = 3600.0,
     rate: Annotated[
-        float, typer.Option(metavar="F", min=0.1, max=10.0, help="Its seconds a second of the wall clock.")
+        float, option("F", "Simulated seconds per second of wall-clock time.", min=0.1, max=10.0)
     ] = 1.0,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of the bag; runs/benchmark/<time>... by default."),
+        Path | None, option("DIR", "Folder of the bag; runs/benchmark/<time>... by default.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run a system at 50 Hz of its own time for an hour: no memory may grow, and no command be lost in the bag.
+    """Run a system at 50 Hz of its own time for an hour: memory must not grow, and the bag must hold every command.
 
     The exit code is 1 if a node grows by 5 MB or more after a tenth of the time, or if the bag lacks a command that
     the plant has taken.
@@ -85,10 +79,7 @@ def endurance(
         )
     with time_bar("running", simulated_s) as moved:
         figures = endure(simulated_s=simulated_s, rate=rate, folder=folder, progress=moved)
-    if as_json:
-        print_json(figures)
-    else:
-        _print_endurance(figures)
+    print_result(figures, _print_endurance, as_json=as_json)
     if not figures["passed"]:
         raise typer.Exit(FAILED)
 
@@ -141,7 +132,7 @@ def _print(figures: dict[str, Any]) -> None:
         )
     output.print(table)
     for line in figures["required"]:
-        output.print(f"{line['what']}: {line['value']} (limit {line['limit']:g})", markup=False)
+        write_line(f"{line['what']}: {line['value']} (limit {line['limit']:g})")
 
 
 def _print_endurance(figures: dict[str, Any]) -> None:

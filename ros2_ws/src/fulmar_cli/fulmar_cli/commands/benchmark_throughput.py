@@ -1,15 +1,14 @@
-"""`fulmar benchmark throughput`: how fast the batch simulates, beside MuJoCo."""
+"""`fulmar benchmark throughput`: the speed of the batch simulation beside MuJoCo."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any
 
-import typer
 from rich.table import Table
 
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.console import console, output, print_result
 from fulmar_bringup.progress import step_bar
-from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, TaskOption
+from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, TaskOption, option
 from fulmar_core.errors import ConfigError, UnknownNameError
 
 DEVICES, LIBRARIES = ("cpu", "cuda"), ("compiled", "numpy", "torch")
@@ -17,35 +16,26 @@ ROUNDS = 5
 
 
 def throughput(
-    robots: Annotated[
-        str | None,
-        typer.Option(metavar="R,...", help="Names with commas between; all by default."),
-    ] = None,
-    device: Annotated[
-        str, typer.Option(metavar="cpu|cuda", help="Where the batch is computed; cuda needs torch.")
-    ] = "cpu",
+    robots: Annotated[str | None, option("R,...", "Names with commas between; all by default.")] = None,
+    device: Annotated[str, option("cpu|cuda", "Where the batch is computed; cuda needs torch.")] = "cpu",
     library: Annotated[
         str | None,
-        typer.Option(
-            metavar="compiled|numpy|torch",
-            help="Who computes the batch: on cpu a compiled kernel (which takes torch and g++) or else numpy, on cuda "
+        option(
+            "compiled|numpy|torch",
+            "What computes the batch: on cpu a compiled kernel (which takes torch and g++) or else numpy, on cuda "
             "torch.",
         ),
     ] = None,
-    worlds: Annotated[int, typer.Option(metavar="N", min=1, help="Worlds of the batch.")] = 4096,
+    worlds: Annotated[int, option("N", "Worlds of the batch.", min=1)] = 4096,
     task: TaskOption = "go_to_pose",
     scenario: ScenarioOption = "randomised",
-    cores: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Processes of the batch, and threads of MuJoCo's rollout.")
-    ] = 2,
-    seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.05, help="Time of each of the measurements [s].")
-    ] = 1.0,
+    cores: Annotated[int, option("N", "Processes of the batch, and threads of MuJoCo's rollout.", min=1)] = 2,
+    seconds: Annotated[float, option("S", "Time of each of the measurements [s].", min=0.05)] = 1.0,
     as_json: JsonOption = False,
 ) -> None:
     """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
 
-    A step of the batch has all that training asks for: disturbances, odometry, observation, reward and new episodes.
+    A step of the batch has all that training needs: disturbances, odometry, observation, reward and new episodes.
     MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
     the medians are printed. Robots on water are also rolled out by MuJoCo in the water of the plant ("in water").
     Before that a step of each robot is compiled, which takes 10 to 30 s.
@@ -55,6 +45,7 @@ def throughput(
     fulmar benchmark throughput --robots kingfisher,turtlebot2 --json
     """
     from fulmar_cli.extras import require
+    from fulmar_core.counts import PROCESS_BYTES, WORLD_BYTES, check_count
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.paths import config_names
     from fulmar_core.robot import load_robot
@@ -67,6 +58,8 @@ def throughput(
     names = config_names("robots") if robots is None else [name.strip() for name in robots.split(",")]
     chosen = [load_robot(name) for name in names]
     the_task, the_scenario = load_task(task), load_scenario(scenario)
+    check_count("--worlds", worlds, bytes_each=WORLD_BYTES)
+    check_count("--cores", cores, bytes_each=PROCESS_BYTES)
     require("mujoco", *([] if library == "numpy" else ["torch"]))
     _check_device(device, library)
     from fulmar_benchmarks.throughput import Library, measure
@@ -93,14 +86,11 @@ def throughput(
         "scenario": scenario,
         "cores": cores,
     }
-    if as_json:
-        print_json(figures)
-    else:
-        _print(figures)
+    print_result(figures, _print, as_json=as_json)
 
 
 def _fastest(device: str) -> str:
-    """The library that makes most steps here."""
+    """The fastest library here."""
     from importlib.util import find_spec
 
     if device != "cpu":
@@ -115,7 +105,7 @@ def _fastest(device: str) -> str:
 
 
 def _check_device(device: str, library: str) -> None:
-    """Refuse devices that the library or the machine does not have."""
+    """Reject a device that the library or this computer does not have."""
     if device != "cuda":
         return
     if library != "torch":
@@ -146,7 +136,7 @@ def _print(figures: dict[str, Any]) -> None:
 
 
 def _afloat(found: dict[str, float]) -> tuple[str, ...]:
-    """What is measured of robots on water alone."""
+    """Figures of robots on water; none for others."""
     if "ratio_with_water" not in found:
         return ()
     return f"{found['mujoco_with_water_steps_per_s']:,.0f}", f"{found['ratio_with_water']:.1f}"

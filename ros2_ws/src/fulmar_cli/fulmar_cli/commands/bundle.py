@@ -1,4 +1,4 @@
-"""`fulmar bundle`: look at a policy bundle, or check that it would be accepted."""
+"""`fulmar bundle`: show, sign and check policy bundles."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_bringup.console import print_json, write_line
+from fulmar_cli.commands.arguments import JsonOption, argument, option
 
-bundle = typer.Typer(
-    help="Look at policy bundles, and check them.", no_args_is_help=True, rich_markup_mode=None
-)
-FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A policy bundle.")]
+bundle = typer.Typer(help="Show, sign and check policy bundles.", no_args_is_help=True, rich_markup_mode=None)
+FolderArgument = Annotated[Path, argument("DIR", "A policy bundle.")]
 
 
 @bundle.command()
@@ -39,15 +37,13 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
         lines["trained: success"] = f"{curve[0]} to {curve[-1]} in {len(curve)} checks"
     width = max(map(len, lines))
     for key, value in lines.items():
-        output.print(f"{key:<{width}}  {value}", markup=False, soft_wrap=True)
+        write_line(f"{key:<{width}}  {value}")
 
 
 @bundle.command()
 def keys(
-    private: Annotated[
-        Path, typer.Argument(metavar="PRIVATE", help="File for the private key; keep it secret.")
-    ],
-    public: Annotated[Path, typer.Argument(metavar="PUBLIC", help="File for the public key, for robots.")],
+    private: Annotated[Path, argument("PRIVATE", "File for the private key; keep it secret.")],
+    public: Annotated[Path, argument("PUBLIC", "File for the public key, for robots.")],
 ) -> None:
     """Make a pair of ed25519 keys: one to sign bundles, one for robots to check them by."""
     from fulmar_cli.extras import require
@@ -56,13 +52,13 @@ def keys(
     from fulmar_core.bundle_signature import make_keys
 
     make_keys(private, public)
-    output.print(f"sign with {private}, give {public} to robots", markup=False, soft_wrap=True)
+    write_line(f"sign with {private}, give {public} to robots")
 
 
 @bundle.command()
 def sign(
     folder: FolderArgument,
-    key: Annotated[Path, typer.Option(metavar="FILE", help="A private key of `fulmar bundle keys`.")],
+    key: Annotated[Path, option("FILE", "A private key of `fulmar bundle keys`.")],
 ) -> None:
     """Sign a bundle, whose hashes are checked first."""
     from fulmar_cli.extras import require
@@ -71,15 +67,13 @@ def sign(
     from fulmar_core.bundle_signature import sign_bundle
 
     sign_bundle(folder, key)
-    output.print(f"{folder}: signed", markup=False, soft_wrap=True)
+    write_line(f"{folder}: signed")
 
 
 @bundle.command()
 def verify(
     folder: FolderArgument,
-    trusted: Annotated[
-        Path, typer.Option(metavar="FILE|DIR", help="A public key, or a folder of them (*.pem).")
-    ],
+    trusted: Annotated[Path, option("FILE|DIR", "A public key, or a folder of them (*.pem).")],
     as_json: JsonOption = False,
 ) -> None:
     """Check that a trusted key has signed a bundle, and that nothing was changed since."""
@@ -94,7 +88,7 @@ def verify(
     if as_json:
         print_json({"bundle": str(folder), "signed_by": name, "sha256": found.passport.sha256})
     else:
-        output.print(f"{folder}: signed by {name}", markup=False, soft_wrap=True)
+        write_line(f"{folder}: signed by {name}")
 
 
 @bundle.command()
@@ -113,7 +107,4 @@ def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
     if as_json:
         print_json({"bundle": str(folder), "accepted": True, "sha256": passport.sha256})
     else:
-        output.print(
-            f"{folder}: accepted ({passport.robot}, {passport.task}, {passport.control_hz:g} Hz)",
-            markup=False,
-        )
+        write_line(f"{folder}: accepted ({passport.robot}, {passport.task}, {passport.control_hz:g} Hz)")

@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption
+from fulmar_bringup.console import log_line, print_json, write_line
+from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption, argument, flag, option
 from fulmar_core.errors import DONE, FAILED, ConfigError, UnknownNameError
+
+if TYPE_CHECKING:
+    from fulmar_bringup.commissioning.commission import Request
 
 
 def commission(
-    hardware: Annotated[
-        str,
-        typer.Argument(metavar="HARDWARE", help="A name from `fulmar list hardware`, or a .yaml file."),
-    ],
+    hardware: Annotated[str, argument("HARDWARE", "A name from `fulmar list hardware`, or a .yaml file.")],
     yes: Annotated[
-        bool, typer.Option("--yes", help="The robot may move: the air is open and 0.5 m around it are free.")
+        bool, flag("--yes", "The robot can move: the air is open and 0.5 m around it are free.")
     ] = False,
     arm: ArmOption = False,
-    port: Annotated[str, typer.Option(metavar="P", help="Takes the place of the hardware file's port.")] = "",
-    write: Annotated[
-        bool, typer.Option("--write", help="Write what was found into the hardware file.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the corrected hardware file here instead.")
-    ] = None,
-    emulate: Annotated[bool, typer.Option("--emulate", help="An emulator speaks for the device.")] = False,
+    port: Annotated[str, option("P", "Port to use in place of the hardware file's.")] = "",
+    write: Annotated[bool, flag("--write", "Write what was found into the hardware file.")] = False,
+    out: Annotated[Path | None, option("FILE", "Write the corrected hardware file here instead.")] = None,
+    emulate: Annotated[bool, flag("--emulate", "An emulator replaces the device.")] = False,
     wiring: Annotated[
-        str,
-        typer.Option(
-            metavar="W", help="With --emulate: as_written, shuffled, inverted or dead (one wire, by --seed)."
-        ),
+        str, option("W", "With --emulate: as_written, shuffled, inverted or dead (one wire, by --seed).")
     ] = "as_written",
     seed: SeedOption = 0,
     as_json: JsonOption = False,
@@ -55,70 +48,76 @@ def commission(
 
     fulmar commission turtlebot2 --emulate --wiring shuffled --seed 3 --yes
     """
-    from fulmar_bringup.commissioning.commission import WIRINGS, Request
+    from fulmar_bringup.commissioning.commission import Request
     from fulmar_bringup.commissioning.commission import commission as conduct
-    from fulmar_bringup.commissioning.hardware_file import line_of, write_line
-    from fulmar_bringup.emulation import check_emulated
-    from fulmar_bringup.plan_checks import check_arming
-    from fulmar_cli.extras import require
-    from hardware_drivers.own_driver import check_own_driver
-    from hardware_drivers.presence import check_presence
-    from hardware_drivers.settings import hardware_path, load_hardware
+    from fulmar_bringup.commissioning.hardware_file import line_of
+    from fulmar_bringup.commissioning.hardware_file import write_line as write_into_file
+    from hardware_drivers.settings import hardware_path
 
-    file = load_hardware(hardware)
-    if wiring not in WIRINGS:
-        raise UnknownNameError("wiring", wiring, WIRINGS)
-    if not emulate and wiring != "as_written":
-        raise ConfigError("--wiring goes with --emulate: a real robot has the wiring that it has.")
-    if not file.opens_valves and not yes:
-        raise ConfigError(
-            f"'{file.robot}' has no valves to click: each pulse moves it. Give --yes once 0.5 m around it are free."
-        )
     if (write or out) and not yes:
         raise ConfigError("clicks find no order to write: --write and --out need --yes.")
-    check_arming(hardware, arm=arm)
-    if emulate:
-        check_emulated(file.driver)
-    check_own_driver(file.driver)
-    require(*(("mujoco",) if emulate else ()), *file.needs)
-    if not emulate:
-        check_presence(file.driver, port)
-    say = (lambda text: None) if as_json else lambda text: output.print(f"  {text}", markup=False)
+    request = Request(hardware, yes, emulate, wiring, seed, arm, port)
+    _check(request)
+    say = (lambda text: None) if as_json else lambda text: write_line(f"  {text}")
     if not as_json:
-        output.print(
-            "each wire is pulsed; keep a hand on the e-stop (`fulmar estop`)" if yes
-            else "AIR CLOSED? Each valve clicks once; note which one you hear:", markup=False,
-        )  # fmt: skip
-    found = conduct(Request(hardware, yes, emulate, wiring, seed, arm, port), say)
+        write_line("each wire is pulsed; keep a hand on the e-stop (`fulmar estop`)" if yes
+            else "AIR CLOSED? Each valve clicks once; note which one you hear:")  # fmt: skip
+    found = conduct(request, say)
     value = found.get(found.get("key", ""))
     target = out or (hardware_path(hardware) if write else None)
     found["written"] = None
     if target is not None and value is not None and found["success"]:
-        write_line(hardware_path(hardware), target, found["key"], value)
+        write_into_file(hardware_path(hardware), target, found["key"], value)
         found["written"] = str(target)
     if as_json:
         print_json(found)
     elif yes:
         _print(found, line_of(found["key"], value) if value is not None else "")
         if target is not None and found["written"] is None:
-            console.print("nothing was written: correct what is named above first", markup=False)
+            log_line("nothing was written: correct what is named above first")
     else:
-        output.print("heard each? Open the air, free 0.5 m around the robot, and add --yes", markup=False)
+        write_line("heard each? Open the air, free 0.5 m around the robot, and add --yes")
     raise typer.Exit(DONE if found["success"] else FAILED)
+
+
+def _check(request: Request) -> None:
+    """Reject a request that cannot be carried out, before anything moves."""
+    from fulmar_bringup.commissioning.commission import WIRINGS
+    from fulmar_bringup.emulation import check_emulated
+    from fulmar_bringup.plan_checks import check_arming
+    from fulmar_cli.extras import require
+    from hardware_drivers.own_driver import check_own_driver
+    from hardware_drivers.presence import check_presence
+    from hardware_drivers.settings import load_hardware
+
+    file = load_hardware(request.hardware)
+    if request.wiring not in WIRINGS:
+        raise UnknownNameError("wiring", request.wiring, WIRINGS)
+    if not request.emulate and request.wiring != "as_written":
+        raise ConfigError("--wiring goes with --emulate: a real robot has the wiring that it has.")
+    if not file.opens_valves and not request.pulses:
+        raise ConfigError(
+            f"'{file.robot}' has no valves to click: each pulse moves it. Give --yes once 0.5 m around it are free."
+        )
+    check_arming(request.hardware, arm=request.arm)
+    if request.emulate:
+        check_emulated(file.driver)
+    check_own_driver(file.driver)
+    require(*(("mujoco",) if request.emulate else ()), *file.needs)
+    if not request.emulate:
+        check_presence(file.driver, request.port)
 
 
 def _print(found: dict[str, Any], line: str) -> None:
     for wire in found["wires"]:
         drives = wire["drives"] or "DOES NOT ANSWER"
         same = "as the file says" if drives == wire["file_says"] else f"the file says {wire['file_says']}"
-        output.print(f"{wire['name']}: {drives} ({same})", markup=False)
+        write_line(f"{wire['name']}: {drives} ({same})")
     for group in found["indistinguishable"]:
-        output.print(f"no motion distinguishes: {', '.join(group)}", markup=False)
+        write_line(f"no motion distinguishes: {', '.join(group)}")
     for problem in found["problems"]:
-        output.print(f"WRONG: {problem}", markup=False, soft_wrap=True)
+        write_line(f"WRONG: {problem}")
     if line:
-        output.print(
-            ("the file is right: " if found["as_written"] else "write into the file: ") + line, markup=False
-        )
+        write_line(("the file is right: " if found["as_written"] else "write into the file: ") + line)
     if found["written"]:
-        output.print(f"written: {found['written']}", markup=False)
+        write_line(f"written: {found['written']}")

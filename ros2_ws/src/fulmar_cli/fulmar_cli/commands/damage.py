@@ -1,4 +1,4 @@
-"""One rule for all that read bags: damage is named, and the exit code tells of it."""
+"""Damage of bags: every command that reads bags warns of it and ends with exit code 1."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from fulmar_bringup.console import console
+from fulmar_bringup.console import log_line
 from fulmar_core.errors import DONE, FAILED
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def open_and_warn(path: Path) -> Bag:
-    """Open a bag, and name what of it could not be read.
+    """Open a bag, and warn of parts that could not be read.
 
     Raises:
         BagError: As `open_bag`.
@@ -31,7 +31,7 @@ def open_and_warn(path: Path) -> Bag:
 def warn(lines: Iterable[str]) -> None:
     """Say what is wrong, beside the answer."""
     for line in lines:
-        console.print(f"warning: {line}", markup=False, soft_wrap=True)
+        log_line(f"warning: {line}")
 
 
 def finish(*bags: Bag, good: bool = True) -> typer.Exit:

@@ -1,8 +1,7 @@
-"""`fulmar demo`: the whole thing in a minute."""
+"""`fulmar demo`: two recorded runs and a report in a minute."""
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,15 +9,15 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from fulmar_bringup.console import console, output
+from fulmar_bringup.console import log_line, new_table, output, write_line
+from fulmar_cli.commands.arguments import invoked_command, option
 
 START, GOAL, DURATION_S, RATE = (2.5, 1.5, 120.0), (0.0, 0.0, 0.0), 30.0, 2.0
 
 
 def demo(
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of bags and report; runs/demo_<time> by default."),
+        Path | None, option("DIR", "Folder of bags and report; runs/demo_<time> by default.")
     ] = None,
 ) -> None:
     """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
@@ -32,56 +31,32 @@ def demo(
     out = out or Path("runs") / f"demo_{time.strftime('%Y%m%d_%H%M%S')}"
     outcomes = []
     for controller in ("policy", "lqr"):
-        console.print(
-            f"{controller}: a simulated platform, the {controller} node and a recorder, each a process of its own, "
-            f"{DURATION_S:g} s at {RATE:g} times real time",
-            markup=False,
+        log_line(
+            f"{controller}: a simulated platform, the {controller} node and a recorder, in separate processes, "
+            f"{DURATION_S:g} s at {RATE:g} times real time"
         )
         request = plan_run(
-            robot="floating_platform",
-            task="go_to_pose",
-            controller=controller,
-            backend="mujoco",
-            policy=None,
-            goal=GOAL,
-            start=START,
-            duration_s=DURATION_S,
-            lockstep=False,
-            rate=RATE,
-            control_hz=None,
-            scenario="nominal",
-            seed=1,
-            record=out / controller,
-            command="fulmar " + " ".join(sys.argv[1:]),
-        )
+            robot="floating_platform", task="go_to_pose", controller=controller, backend="mujoco", policy=None,
+            goal=GOAL, start=START, duration_s=DURATION_S, lockstep=False, rate=RATE, control_hz=None,
+            scenario="nominal", seed=1, record=out / controller, command=invoked_command(),
+        )  # fmt: skip
         outcome = run_and_evaluate(request)
         if outcome.failure:  # Ctrl-C among them: there is nothing to compare
-            console.print(f"{controller}: {outcome.failure}", markup=False, soft_wrap=True)
+            log_line(f"{controller}: {outcome.failure}")
             raise typer.Exit(outcome.exit_code)
         outcomes.append(outcome)
     output.print(_table([outcome.summary for outcome in outcomes]))
     page = write_report([read_run(out / name) for name in ("policy", "lqr")], out / "report.html")
-    output.print(f"report: {page}", markup=False, soft_wrap=True)
-    output.print(f"bags:   {out / 'policy'}  {out / 'lqr'}", markup=False, soft_wrap=True)
+    write_line(f"report: {page}")
+    write_line(f"bags:   {out / 'policy'}  {out / 'lqr'}")
     raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
 
 
 def _table(summaries: list[dict[str, Any]]) -> Table:
-    table = Table(title="floating platform, go to pose, over ROS 2")
-    columns = (
-        "controller",
-        "goal",
-        "time to goal",
-        "position",
-        "heading",
-        "valves",
-        "rate",
-        "latency p99",
-        "trips",
-    )
-    for column in columns:
-        left = column in ("controller", "goal")
-        table.add_column(column, justify="left" if left else "right", no_wrap=left)
+    numbers = ("time to goal", "position", "heading", "valves", "rate", "latency p99", "trips")
+    table = new_table("floating platform, go to pose, over ROS 2", ("controller", "goal"), numbers)
+    for column in table.columns[:2]:
+        column.no_wrap = True
     for s in summaries:
         table.add_row(
             str(s["controller"]),

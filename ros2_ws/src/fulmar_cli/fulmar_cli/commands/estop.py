@@ -1,4 +1,4 @@
-"""`fulmar estop`: stop every robot that is heard, or one; and reset."""
+"""`fulmar estop`: stop every robot in the ROS domain, or one; and reset."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_cli.commands.arguments import JsonOption, argument, flag
 from fulmar_core.errors import FAILED, RunFailed
 
 if TYPE_CHECKING:
@@ -16,11 +16,10 @@ if TYPE_CHECKING:
 
 def estop(
     robot: Annotated[
-        str | None,
-        typer.Argument(metavar="[ROBOT]", help="Name of the only robot to stop; every one by default."),
+        str | None, argument("[ROBOT]", "Name of the only robot to stop; every one by default.")
     ] = None,
     reset: Annotated[
-        bool, typer.Option("--reset", help="Release it; refused while commands are not zero.")
+        bool, flag("--reset", "Release the e-stop; refused while commands are not zero.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -43,7 +42,7 @@ def estop(
             came = person.reset_all(robot)
         else:
             came = {one.space: one.answer or _unanswered(one) for one in person.stop_all(robot)}
-        heard = f" {person.running_robots_text()}" if robot and not came else ""
+        others = f" {person.running_robots_text()}" if robot and not came else ""
     answers = [
         {"robot": space.strip("/"), "done": done, "said": words} for space, (done, words) in came.items()
     ]
@@ -51,7 +50,7 @@ def estop(
         whom = f"'{robot}'" if robot else "any robot"
         raise RunFailed(
             f"no plant and no e-stop node of {whom} is found in this ROS domain. Check ROS_DOMAIN_ID and "
-            "ROS_AUTOMATIC_DISCOVERY_RANGE" + (", or cut the power." if not reset else ".") + heard
+            "ROS_AUTOMATIC_DISCOVERY_RANGE" + (", or cut the power." if not reset else ".") + others
         )
     if as_json:
         print_json({"robots": answers})
@@ -63,10 +62,10 @@ def estop(
 
 
 def _unanswered(robot: Stopped) -> tuple[bool, str]:
-    """Whether a robot is stopped for which no e-stop node answers, and words for it."""
+    """Whether a robot whose e-stop node does not answer is stopped, and a message."""
     if robot.reached:
         return (
             True,
-            "stopped on the wire, since no e-stop node answers: it stays so until `fulmar estop --reset`",
+            "stopped by topic, since no e-stop node answers; it stays stopped until `fulmar estop --reset`",
         )
-    return False, "no e-stop node answers, and nobody hears the wire: cut the power"
+    return False, "no e-stop node answers, and nothing subscribes to the e-stop topic: cut the power"

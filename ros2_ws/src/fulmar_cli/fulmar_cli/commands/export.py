@@ -1,20 +1,19 @@
-"""`fulmar export`: a policy bundle out of a training run."""
+"""`fulmar export`: make a policy bundle from a training run."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from fulmar_bringup.console import output
+from fulmar_cli.commands.arguments import argument, flag, option
 from fulmar_core.errors import ConfigError
 
 
 def export(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder that `fulmar train` left.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the bundle; new or empty.")],
-    force: Annotated[bool, typer.Option("--force", help="Replace the bundle that DIR holds.")] = False,
+    run: Annotated[Path, argument("RUN", "Run folder that `fulmar train` left.")],
+    out: Annotated[Path, option("DIR", "Folder of the bundle; new or empty.")],
+    force: Annotated[bool, flag("--force", "Replace the bundle that DIR holds.")] = False,
 ) -> None:
     """Write a policy bundle: network, golden vectors and passport; then load it as the robot will."""
     if out.exists() and not force and (not out.is_dir() or any(out.iterdir())):

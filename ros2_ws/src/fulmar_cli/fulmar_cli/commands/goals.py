@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from fulmar_cli.commands.arguments import NameOption, read_goal
+from fulmar_cli.commands.arguments import NameOption, argument, flag, option
 from fulmar_cli.commands.list import list_names
+from fulmar_cli.commands.values import read_goal
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot_name import checked_name
 
@@ -17,43 +18,32 @@ GIVE_UP_S = 5.0  # without odometry or without a subscriber of the goals
 def goals(
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar="NAME",
-            help="A name from `fulmar list goals`, or a path that ends in .yaml; without it they are listed.",
+        argument(
+            "NAME",
+            "A name from `fulmar list goals`, or a path that ends in .yaml; without it they are listed.",
         ),
     ] = None,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="R", help="Type of the robot that is to do it: a name from `fulmar list robots`."
-        ),
-    ] = None,
+    robot: Annotated[str | None, option("R", "Type of the robot: a name from `fulmar list robots`.")] = None,
     robot_name: NameOption = None,
     pose: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "X,Y,DEG",
+            "One goal instead of a file: x [m], y [m], heading [deg]; or x,y for a position.",
             "--pose",
-            metavar="X,Y,DEG",
-            help="One goal instead of a file: x [m], y [m], heading [deg]; or x,y for a position.",
         ),
     ] = None,
     as_path: Annotated[
-        bool,
-        typer.Option(
-            "--as-path", help="Tell all positions or poses at once, for tasks that pass through them."
-        ),
+        bool, flag("--as-path", "Send all positions or poses at once, for tasks that pass through them.")
     ] = False,
-    control_hz: Annotated[
-        float, typer.Option(metavar="HZ", min=0.01, help="Velocities come so often along a path.")
-    ] = 10.0,
+    control_hz: Annotated[float, option("HZ", "Rate of velocities along a path.", min=0.01)] = 10.0,
     wait: Annotated[
-        bool,
-        typer.Option("--wait", help=f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default."),
+        bool, flag("--wait", f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default.")
     ] = False,
 ) -> None:
-    """Tell a running robot its goals, one after the other, until they are done or Ctrl-C.
+    """Send a running robot its goals, one after the other, until they are done or Ctrl-C.
 
-    Positions, poses, velocities by the clock, or a path to follow: a file in configs/goals says which; or one pose or
+    Positions, poses, velocities by the clock, or a path to follow: from a file in configs/goals; or one pose or
     position from the command line. The robot must be up, with a controller whose task takes such goals; velocities end
     in standstill.
 
@@ -80,18 +70,20 @@ def goals(
     if robot is None:
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
-    from fulmar_bringup.goal_plan import check_pace
+    from fulmar_bringup.goal_plan import check_pace, places_of
     from fulmar_bringup.node_table import goals_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
+    from fulmar_core.safety.geofence import check_places
 
     the_robot = load_robot(robot)
     given = None if place is None else single_goal(place)
     file = given or load_goals(name or "")
-    goal_sequence(file, the_robot, as_path=as_path)  # whatever is wrong is said in one line
+    goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot)
+    check_places(f"the goal of '{name}'" if name else "the goal", places_of(file).tolist())
     spec = goals_spec(
         robot,
         name or "",

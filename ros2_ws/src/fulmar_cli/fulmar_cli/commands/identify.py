@@ -1,46 +1,43 @@
-"""`fulmar identify`: from driven runs to the numbers of the machine that drove them."""
+"""`fulmar identify`: parameters of a robot estimated from its runs."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-from rich.table import Table
-
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_bringup.console import log_line, new_table, output, print_result, write_line
+from fulmar_cli.commands.arguments import JsonOption, argument, option
 from fulmar_cli.commands.damage import warn
 from fulmar_core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from fulmar_core.identification.identify import Identified
+    from fulmar_core.robot import Robot
 
 _NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
 _QUANTITY = re.compile(rf"(?P<value>{_NUMBER})(?:(?:\+-|±)(?P<error>{_NUMBER}))?(?:\s*(?:kg|N|s|m|kg·m²))?")
 
 
 def identify(
-    bags: Annotated[list[Path], typer.Argument(metavar="BAG...", help="Driven runs of one robot.")],
+    bags: Annotated[list[Path], argument("BAG...", "Driven runs of one robot.")],
     known: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE+-ERROR", help="A quantity that was measured, such as mass=5.32+-0.02."
-        ),
+        option("NAME=VALUE+-ERROR", "A quantity that was measured, such as mass=5.32+-0.02."),
     ] = None,
     ballast: Annotated[
-        list[str] | None,
-        typer.Option(metavar="BAG=KG+-KG", help="A weight that was aboard during one of the runs, anywhere."),
+        list[str] | None, option("BAG=KG+-KG", "A weight that was aboard during one of the runs, anywhere.")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write a calibration for --calibration of run, evaluate, train."),
+        Path | None, option("FILE", "Write a calibration for --calibration of run, evaluate, train.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Estimate mass, inertia, thrust, drag, wheel scale and delay from runs, with intervals of 95 % confidence.
 
-    Motion shows forces only in proportion to mass. For a platform with thrusters, say one thing more: its mass, or the
+    Motion shows forces only in proportion to mass. For a platform with thrusters, give one more value: its mass, or the
     mass of a ballast that was aboard during one of two runs. ERROR is half of a 95 % interval; without it VALUE counts
-    as exact. A boat takes the thrust curve of its YAML for true.
+    as exact. For a boat the thrust curve of its YAML is taken as exact.
 
     Try:
 
@@ -72,37 +69,37 @@ def identify(
     calibration = calibration_of(robot, found, [str(bag) for bag in bags])
     if out is not None:
         save_calibration(calibration, out)
-    document: dict[str, Any] = {
+    document = _document(robot, bags, sum(drive.duration_s for _, drive, _ in runs), found, out)
+    if found.undetermined:
+        names_left = ", ".join(found.undetermined)
+        warn([f"the runs do not show {names_left}: left out of the calibration. Drive more briskly."])
+    if not found.trusted:
+        log_line(f"note: {found.scale}.")
+    print_result(document, _print, as_json=as_json)
+
+
+def _document(
+    robot: Robot, bags: list[Path], driven_s: float, found: Identified, out: Path | None
+) -> dict[str, Any]:
+    fit = found.fit
+    return {
         "robot": robot.name,
         "bags": [str(bag) for bag in bags],
-        "driven_s": round(sum(drive.duration_s for _, drive, _ in runs), 3),
+        "driven_s": round(driven_s, 3),
         "scale": found.scale,
         "estimates": {
             name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit}
-            for name, e in found.fit.estimates.items()
+            for name, e in fit.estimates.items()
         },
         "untold": list(found.undetermined),
-        "residuals": dict(zip(("x_m", "y_m", "heading_rad"), found.fit.noise, strict=True)),
-        "windows": found.fit.windows,
+        "residuals": dict(zip(("x_m", "y_m", "heading_rad"), fit.noise, strict=True)),
+        "windows": fit.windows,
         "calibration": None if out is None else str(out),
     }
-    if found.undetermined:
-        warn(
-            [
-                f"the runs tell nothing of {', '.join(found.undetermined)}: left out of the calibration. "
-                "Drive more briskly."
-            ]
-        )
-    if not found.trusted:
-        console.print(f"note: {found.scale}.", markup=False, soft_wrap=True)
-    if as_json:
-        print_json(document)
-        return
-    _print(document)
 
 
 def _read(text: str, option: str, example: str) -> tuple[str, float, float]:
-    """Read `NAME=VALUE` or `NAME=VALUE+-ERROR`; a name may hold anything, as paths do."""
+    """Read `NAME=VALUE` or `NAME=VALUE+-ERROR`; a name can be a path."""
     name, _, quantity = text.rpartition("=")
     match = _QUANTITY.fullmatch(quantity.strip())
     if not name or match is None or float(match["value"]) <= 0.0:
@@ -131,16 +128,12 @@ def _loads(bags: list[Path], ballast: list[str]) -> tuple[list[int], dict[int, t
 
 
 def _print(document: dict[str, Any]) -> None:
-    table = Table(title=f"{document['robot']}, {document['driven_s']:g} s in {document['windows']} windows")
-    for column in ("", "value", "95 % from", "to", "unit"):
-        table.add_column(column, justify="left" if column in ("", "unit") else "right")
+    title = f"{document['robot']}, {document['driven_s']:g} s in {document['windows']} windows"
+    table = new_table(title, [""], ["value", "95 % from", "to"])
+    table.add_column("unit")
     for name, e in document["estimates"].items():
         table.add_row(name, *(f"{e[part]:.5g}" for part in ("value", "low", "high")), e["unit"])
     output.print(table)
-    output.print(f"{document['scale']}", markup=False, soft_wrap=True)
+    write_line(f"{document['scale']}")
     if document["calibration"]:
-        output.print(
-            f"written: {document['calibration']}; use it with --calibration {document['calibration']}",
-            markup=False,
-            soft_wrap=True,
-        )
+        write_line(f"written: {document['calibration']}; use it with --calibration {document['calibration']}")

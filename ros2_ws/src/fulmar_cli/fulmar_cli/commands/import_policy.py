@@ -1,4 +1,4 @@
-"""`fulmar import`: a policy bundle out of a policy that another stack trained."""
+"""`fulmar import`: make a policy bundle from a policy of another stack."""
 
 from __future__ import annotations
 
@@ -6,36 +6,28 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from fulmar_bringup.console import console, output
+from fulmar_bringup.console import log_line, write_line
+from fulmar_cli.commands.arguments import argument, option
 
 
 def import_policy(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Checkpoint of skrl (.pt) or rl_games (.pth), or .onnx.")
-    ],
-    robot: Annotated[str, typer.Option(metavar="R", help="The robot that it was trained for.")],
-    task: Annotated[str, typer.Option(metavar="T", help="The task that it was trained for.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the bundle.")],
+    file: Annotated[Path, argument("FILE", "Checkpoint of skrl (.pt) or rl_games (.pth), or .onnx.")],
+    robot: Annotated[str, option("R", "The robot that it was trained for.")],
+    task: Annotated[str, option("T", "The task that it was trained for.")],
+    out: Annotated[Path, option("DIR", "Folder of the bundle.")],
     format: Annotated[
-        str | None,
-        typer.Option(metavar="F", help="skrl, rl_games or onnx; by default what the file holds."),
+        str | None, option("F", "skrl, rl_games or onnx; by default what the file holds.")
     ] = None,
-    hz: Annotated[
-        float | None,
-        typer.Option(metavar="HZ", min=0.01, help="Command rate; the robot's own by default."),
-    ] = None,
+    hz: Annotated[float | None, option("HZ", "Command rate; the robot's own by default.", min=0.01)] = None,
     activation: Annotated[
         str | None,
-        typer.Option(
-            metavar="A",
-            help="Between the layers of a checkpoint, such as elu; by default from params/agent.yaml of its run.",
+        option(
+            "A",
+            "Between the layers of a checkpoint, such as elu; by default from params/agent.yaml of its run.",
         ),
     ] = None,
     output_activation: Annotated[
-        str | None,
-        typer.Option(metavar="A", help="After the last layer, none or tanh; by default likewise."),
+        str | None, option("A", "After the last layer, none or tanh; by default likewise.")
     ] = None,
 ) -> None:
     """Import a policy with RoboRAN's observation: network, golden vectors of the original, and passport.
@@ -67,16 +59,12 @@ def import_policy(
         command="fulmar " + " ".join(sys.argv[1:]),
     )
     Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
-    output.print(
+    write_line(
         f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · "
-        f"{passport.training['imported_from']} · {passport.sha256[:12]}",
-        markup=False,
-        soft_wrap=True,
+        f"{passport.training['imported_from']} · {passport.sha256[:12]}"
     )
     if passport.action == "on_off":
-        console.print(
+        log_line(
             f"its actions open {', '.join(passport.actuator_names)}, in this order. RoboRAN's FloatingPlatform numbers "
-            "other nozzles than RANS's platform: give the robot whose nozzles it was trained with.",
-            markup=False,
-            soft_wrap=True,
+            "other nozzles than RANS's platform: give the robot whose nozzles it was trained with."
         )

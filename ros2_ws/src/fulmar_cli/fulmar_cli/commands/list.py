@@ -1,4 +1,4 @@
-"""`fulmar list`: what there is."""
+"""`fulmar list`: names of robots, tasks, controllers and other files."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_bringup.console import log_line, output, print_json, write_line
+from fulmar_cli.commands.arguments import JsonOption, argument
 from fulmar_core.errors import FAILED, FulmarError, UnknownNameError
 from fulmar_core.paths import config_names
 
@@ -20,14 +20,14 @@ FAMILIES = (
 def list_names(
     family: Annotated[
         str | None,
-        typer.Argument(
-            metavar="[robots|tasks|controllers|systems|policies|goals|hardware|scenarios|estimators]",
-            help="All by default.",
+        argument(
+            "[robots|tasks|controllers|systems|policies|goals|hardware|scenarios|estimators]",
+            "All by default.",
         ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the robots, tasks, controllers, policies, scenarios and files of other kinds there are.
+    """List robots, tasks, controllers, policies, scenarios and other files by name.
 
     Your own come with them: FULMAR_CONFIGS names folders that have `robots/`, `tasks/` and so on.
 
@@ -51,7 +51,7 @@ def list_names(
     else:
         _show(found)
     for error in errors:
-        console.print(f"{error['family']}: {error['error']}", markup=False, soft_wrap=True)
+        log_line(f"{error['family']}: {error['error']}")
     if errors:
         raise typer.Exit(FAILED)
 
@@ -61,7 +61,7 @@ def _show(found: dict[str, dict[str, str]]) -> None:
         output.print(f"{name}", style="bold")
         width = max((len(entry) for entry in entries), default=0)
         for entry, title in entries.items():
-            output.print(f"  {entry:<{width}}  {title}".rstrip(), markup=False, soft_wrap=True)
+            write_line(f"  {entry:<{width}}  {title}".rstrip())
 
 
 def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
@@ -74,8 +74,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
     from hardware_drivers.settings import load_hardware
-    from policy_server.controllers import CONTROLLERS
-    from policy_server.shipped import policies_directory, shipped_policies
+    from policy_server.controllers import CONTROLLERS, policies_directory, shipped_policies
 
     if family == "policies":
         folder = policies_directory()

@@ -8,32 +8,24 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_bringup.console import console, log_line, print_json, write_line
+from fulmar_cli.commands.arguments import JsonOption, argument, flag, option
 from fulmar_core.errors import FAILED, ConfigError, did_you_mean
 
 
 def policies(
     names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Bundles such as kingfisher_go_to_pose; all."),
+        list[str] | None, argument("[NAME]...", "Bundles such as kingfisher_go_to_pose; all.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the bundles; the shipped ones by default.")
-    ] = None,
-    runs: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run folders.")] = Path(
-        "runs/policies"
-    ),
-    anew: Annotated[
-        bool,
-        typer.Option("--anew", help="From the beginning, also what is made; it is kept beside its run."),
-    ] = False,
+    out: Annotated[Path | None, option("DIR", "Folder of the bundles; the shipped ones by default.")] = None,
+    runs: Annotated[Path, option("DIR", "Folder of the run folders.")] = Path("runs/policies"),
+    anew: Annotated[bool, flag("--anew", "Make all anew; what exists is moved beside its run.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make the shipped policies of configs/policies.yaml: train, judge in MuJoCo, export.
+    """Make the shipped policies of configs/policies.yaml: train, evaluate in MuJoCo, export.
 
-    A bundle that was made from the same robot, task, scenario, settings, seed and updates is left as it is; a run that
-    was broken off is resumed. So the command can be repeated until everything is there. The same seed and updates make
+    A bundle that was made from the same robot, task, scenario, settings, seed and updates is left as it is; an
+    interrupted run is resumed. So the command can be repeated until everything exists. The same seed and updates make
     the same weights on the same kind of processor.
 
     Try:
@@ -43,10 +35,10 @@ def policies(
     fulmar policies kingfisher_go_to_pose --anew
     """
     from fulmar_core.provenance import git_revision
-    from policy_server.shipped import policies_directory
+    from policy_server.controllers import policies_directory
     from training.executors import LocalExecutor
-    from training.job_bars import JobBars
     from training.policies import expected_s, is_made, load_policy_table, make_policies, policy_job, set_aside
+    from training.progress import JobBars
 
     table = load_policy_table()
     known = [policy.name for policy in table.policies]
@@ -69,9 +61,11 @@ def policies(
     minutes = expected_s(missing, table.at_once) / 60.0
     for job in jobs if anew else []:
         if aside := set_aside(job):
-            console.print(f"{job.name}: the old one is in {aside}", markup=False, soft_wrap=True)
-    console.print(f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the judging")
-    with JobBars(missing) as bars:
+            log_line(f"{job.name}: the old one is in {aside}")
+    console.print(
+        f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the evaluation"
+    )
+    with JobBars([job.name for job in missing]) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
     if as_json:
         print_json({"policies": lines})
@@ -83,10 +77,8 @@ def policies(
 
 def _print_lines(lines: list[dict[str, Any]]) -> None:
     width = max(len(line["policy"]) for line in lines)
-    output.print(f"{'policy':<{width}}  success  needed", markup=False)
+    write_line(f"{'policy':<{width}}  success  needed")
     for line in lines:
         success = "   -   " if line["success"] is None else f"{line['success']:7.3f}"
         note = "" if line["good"] else f"  {line.get('error', 'too low')}"
-        output.print(
-            f"{line['policy']:<{width}}  {success}  {line['needed']:6.2f}{note}", markup=False, soft_wrap=True
-        )
+        write_line(f"{line['policy']:<{width}}  {success}  {line['needed']:6.2f}{note}")

@@ -1,4 +1,4 @@
-"""`fulmar swap`: go on with another policy, while a robot is driven by one."""
+"""`fulmar swap`: replace the policy of a running robot."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import output, print_json
-from fulmar_cli.commands.arguments import JsonOption
+from fulmar_bringup.console import print_json, write_line
+from fulmar_cli.commands.arguments import JsonOption, argument
 from fulmar_core.errors import FAILED
 from fulmar_core.paths import config_names
 from fulmar_core.robot_name import checked_name
@@ -17,17 +17,15 @@ FIND_S, LOAD_S = 5.0, 20.0
 
 
 def swap(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Name of the running robot: its type, or its --name.")
-    ],
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A policy bundle, on the robot's own disk.")],
+    robot: Annotated[str, argument("ROBOT", "Name of the running robot: its type, or its --name.")],
+    folder: Annotated[Path, argument("DIR", "A policy bundle, on the robot's own disk.")],
     as_json: JsonOption = False,
 ) -> None:
-    """Let a running robot go on with another policy.
+    """Replace the policy of a running robot.
 
     It is loaded and warmed up beside the one that runs, and takes over between two commands. A bundle that is damaged,
-    for another robot, task or rate, or not signed where that is asked for, is refused, and the policy that runs goes
-    on. Exit code 1 then.
+    for another robot, task or rate, or not signed where a signature is required, is refused, and the running policy
+    goes on. Exit code 1 then.
 
     Try:
 
@@ -44,6 +42,6 @@ def swap(
     if as_json:
         print_json({"robot": robot, "policy": sent, "done": done, "said": said})
     else:
-        output.print(said, markup=False)
+        write_line(said)
     if not done:
         raise typer.Exit(FAILED)

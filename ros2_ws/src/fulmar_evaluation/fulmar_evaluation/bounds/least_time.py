@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_evaluation.bounds.chain import solve_chain
-from fulmar_evaluation.bounds.reach import log_barrier
-from fulmar_evaluation.bounds.waypoint_course import (
+from fulmar_evaluation.bounds.disc_tour import (
     P0,
     P1,
     V0,
     V1,
-    Course,
+    DiscTour,
     H,
     Limit,
     Links,
@@ -23,6 +22,7 @@ from fulmar_evaluation.bounds.waypoint_course import (
     links_of,
     stop_and_go,
 )
+from fulmar_evaluation.bounds.reachable_set import log_barrier
 
 _WEIGHTS = np.array([0.3, 0.03, 0.003, 0.0003, 0.0001])  # of the barrier, one after the other [time]
 _CENTRED = 0.3  # a weight is done with when Newton's step promises less than this share of it
@@ -30,7 +30,7 @@ _MOST_STEPS = 100  # few episodes need more than 60: discs that overlap, where d
 _MOST_HALVINGS = 40
 
 
-def least_times(course: Course, plan: Plan | None = None) -> np.ndarray:
+def least_times(tour: DiscTour, plan: Plan | None = None) -> np.ndarray:
     """Times at which a time-optimal plan touches each disc.
 
     The whole time is minimised over the states at the discs and the durations between them, with the barrier
@@ -38,21 +38,21 @@ def least_times(course: Course, plan: Plan | None = None) -> np.ndarray:
     the barrier can cost is taken off, so times are rather too short than too long.
 
     Args:
-        course: The discs.
+        tour: The discs.
         plan: Where to begin instead, inside all limits; it is overwritten.
 
     Returns:
-        Times in the units of the course, shape (goals, E); those of discs that do not count are NaN.
+        Times in the units of the tour, shape (goals, E); those of discs that do not count are NaN.
     """
-    plan, weight = _descend(course, plan or stop_and_go(course))
-    active = course.active
+    plan, weight = _descend(tour, plan or stop_and_go(tour))
+    active = tour.active
     times = np.cumsum(np.where(active, plan.durations, 0.0), axis=0)
     total = times[-1]
-    shorter = np.maximum(total - weight * course.constraints, 0.0) / np.maximum(total, 1e-12)
+    shorter = np.maximum(total - weight * tour.constraints, 0.0) / np.maximum(total, 1e-12)
     return np.asarray(np.where(active, times * shorter, np.nan))
 
 
-def _descend(course: Course, plan: Plan) -> tuple[Plan, np.ndarray]:
+def _descend(tour: DiscTour, plan: Plan) -> tuple[Plan, np.ndarray]:
     """Lower each episode's barrier; `plan` is overwritten. Gives it and the last weight that was done with, (E,)."""
     level = np.zeros(plan.durations.shape[1], dtype=int)
     damping = np.zeros(len(level))
@@ -60,7 +60,7 @@ def _descend(course: Course, plan: Plan) -> tuple[Plan, np.ndarray]:
         running = np.flatnonzero(level < len(_WEIGHTS))
         if running.size == 0:
             break
-        part, weight, here = course.of(running), _WEIGHTS[level[running]], plan.of(running)
+        part, weight, here = tour.of(running), _WEIGHTS[level[running]], plan.of(running)
         step = _newton_step(part, here, weight, damping[running])
         found = _search(part, here, step, weight)
         plan.write(running, here)
@@ -79,9 +79,9 @@ class _Step:
     definite: np.ndarray  # (E,) whether it is a step at all
 
 
-def _search(course: Course, plan: Plan, step: _Step, weight: np.ndarray) -> np.ndarray:
-    """Halve the step until the cost falls (Armijo's rule); moves `plan`, tells where that was possible."""
-    before = _cost(course, plan, weight)
+def _search(tour: DiscTour, plan: Plan, step: _Step, weight: np.ndarray) -> np.ndarray:
+    """Halve the step until the cost falls (Armijo's rule); moves `plan`, returns where that was possible."""
+    before = _cost(tour, plan, weight)
     size = np.ones(len(weight))
     todo = np.flatnonzero(step.definite)
     for _ in range(_MOST_HALVINGS):
@@ -89,7 +89,7 @@ def _search(course: Course, plan: Plan, step: _Step, weight: np.ndarray) -> np.n
             plan.states[:, :, todo] + size[todo] * step.states[:, :, todo],
             plan.durations[:, todo] + size[todo] * step.durations[:, todo],
         )
-        after = _cost(course.of(todo), trial, weight[todo])
+        after = _cost(tour.of(todo), trial, weight[todo])
         good = after <= before[todo] + 1e-4 * size[todo] * step.slope[todo]
         plan.write(todo[good], trial.of(good))
         todo = todo[~good]
@@ -101,10 +101,10 @@ def _search(course: Course, plan: Plan, step: _Step, weight: np.ndarray) -> np.n
     return found
 
 
-def _cost(course: Course, plan: Plan, weight: np.ndarray) -> np.ndarray:
+def _cost(tour: DiscTour, plan: Plan, weight: np.ndarray) -> np.ndarray:
     """Time and barrier, shape (E,); infinite outside the limits."""
-    barrier, others = all_slacks(course, plan)
-    active = course.active
+    barrier, others = all_slacks(tour, plan)
+    active = tour.active
     kept = np.logical_and.reduce([slack > 0.0 for slack in (*barrier, *others)]) | ~active
     with np.errstate(invalid="ignore", divide="ignore"):
         logs = np.sum([np.log(slack) for slack in barrier], axis=0)
@@ -112,12 +112,12 @@ def _cost(course: Course, plan: Plan, weight: np.ndarray) -> np.ndarray:
     return np.where(np.all(kept, axis=0), np.sum(terms, axis=0), np.inf)
 
 
-def _newton_step(course: Course, plan: Plan, weight: np.ndarray, damping: np.ndarray) -> _Step:
+def _newton_step(tour: DiscTour, plan: Plan, weight: np.ndarray, damping: np.ndarray) -> _Step:
     """Newton's step with the durations eliminated link by link, and the states by `solve_chain`."""
-    links, active = links_of(course, plan), course.active
+    links, active = links_of(tour, plan), tour.active
     with np.errstate(all="ignore"):
         gradient, hessian = _reach_model(plan, links)
-        for limit in limits(course, plan, links):
+        for limit in limits(tour, plan, links):
             _add(gradient, hessian, limit)
     gradient = np.where(active, weight * gradient, 0.0)
     hessian = np.where(active, weight * hessian, 0.0)

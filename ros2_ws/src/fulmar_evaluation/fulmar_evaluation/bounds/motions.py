@@ -52,9 +52,6 @@ def motions_of(robot: Robot) -> Motions | None:
     tighter circle, is left out. Wheels: the limits of the drive, for cars also the friction of the tyres; they speed up
     and stop by their slew, or by their motors' force if that is less.
 
-    Args:
-        robot: The robot.
-
     Returns:
         What it can hold; None for robots that move in all directions, or that nothing in the water slows down.
     """

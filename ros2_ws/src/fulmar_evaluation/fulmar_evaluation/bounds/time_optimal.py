@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from fulmar_evaluation.bounds.disc_tour import DiscTour
 from fulmar_evaluation.bounds.least_time import least_times
 from fulmar_evaluation.bounds.visits import Bound, Route, route_of
-from fulmar_evaluation.bounds.waypoint_course import Course
 
 _BATCH = 512  # episodes at once: what a core's cache likes
 _LEG_TIME = 1.28  # guess: times the root of a leg's length over the acceleration
@@ -91,10 +91,10 @@ def _progress(
     goals, todo = guess.copy(), np.arange(len(episodes))
     while todo.size:
         number = goals[todo]
-        course = Course(
+        tour = DiscTour(
             start[todo].T, route.centres(episodes[todo], int(number.max())), number, radius, top_speed
         )
-        times = np.concatenate((np.zeros((1, len(todo))), least_times(course)))
+        times = np.concatenate((np.zeros((1, len(todo))), least_times(tour)))
         last, before = (np.take_along_axis(times, (number - i)[None], axis=0)[0] for i in (0, 1))
         reached = last <= duration
         late[todo] = np.where(reached, late[todo], number)

@@ -12,12 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_evaluation.bounds.coarse_plan import coarse_plans
-from fulmar_evaluation.bounds.fine_plan import refined
 from fulmar_evaluation.bounds.leg_table import LegTable, leg_table, table_scale
 from fulmar_evaluation.bounds.motions import Motions
 from fulmar_evaluation.bounds.top_speed import top_speed_bound
-from fulmar_evaluation.bounds.turn_course import TurnCourse
+from fulmar_evaluation.bounds.turn_plans import TurnTour, coarse_plans, refined
 from fulmar_evaluation.bounds.visits import Bound, Route, route_of
 
 _BATCH = 256  # episodes at once
@@ -39,15 +37,15 @@ def turn_limited_bound(
     measured, not proven. All times are taken shorter by what this may cost (`Motions.shorter`), so that means over
     episodes err towards too many goals:
 
-    - Hulls that lose time at stops 5 %: twice as fine a grid finds 3 % more in 16 courses (22 % in the worst), and the
-      better of both 4 %; in the first 48 judged episodes of kingfisher 0.8 % (22 %) and 2.1 %. Several radii cost
+    - Hulls that lose time at stops 5 %: twice as fine a grid finds 3 % more in 16 tours (22 % in the worst), and the
+      better of both 4 %; in the first 48 evaluated episodes of kingfisher 0.8 % (22 %) and 2.1 %. Several radii cost
       1.5 %, against linear programming. That a turning hull slides sideways (`motions`) makes it slower, but its circle
       tighter, 1.53 m and not 1.67 m: with it those 48 episodes have 1.3 % more.
-    - Others 2 %. On two wheels two finer grids find 0.2 % and 0.4 % more goals in 32 courses of a minute (5 % in the
+    - Others 2 %. On two wheels two finer grids find 0.2 % and 0.4 % more goals in 32 tours of a minute (5 % in the
       worst), and optimal control (multiple shooting) finds 0.7 % fewer in 12 of them.
 
     The bound at top speed holds besides. What the relaxation gives away is at most what is missing to drives that
-    optimal control found with all the dynamics, inertia and slew, and that the core's batch repeats: in judged episodes
+    optimal control found with all the dynamics, inertia and slew, and that the core's batch repeats: in episodes
     of go_through_positions they reach 0.97 of turtlebot2's bound (12 episodes) and 0.87 of kingfisher's (9).
 
     One thing is not relaxed: a hull that is faster than it can hold in a turn keeps some of that speed for a while. It
@@ -84,8 +82,8 @@ def turn_limited_bound(
         for begin in range(0, len(order), _BATCH):
             some = order[begin : begin + _BATCH]
             centres = route.centres(some, int(most[some].max())).transpose(2, 0, 1)
-            course = TurnCourse(route.start[some], None if yaw is None else yaw[some], centres, radius)
-            progress[some] = _progress(course, motions, table, budget, route)
+            tour = TurnTour(route.start[some], None if yaw is None else yaw[some], centres, radius)
+            progress[some] = _progress(tour, motions, table, budget, route)
     fastest = top_speed_bound(
         route.start, route.waypoints, radius=radius, top_speed=motions.ahead, duration_s=duration_s, loop=loop
     )
@@ -93,18 +91,16 @@ def turn_limited_bound(
     return Bound(np.floor(progress).astype(int), progress)
 
 
-def _progress(
-    course: TurnCourse, motions: Motions, table: LegTable, duration: float, route: Route
-) -> np.ndarray:
+def _progress(tour: TurnTour, motions: Motions, table: LegTable, duration: float, route: Route) -> np.ndarray:
     """Go up and down in the number of waypoints until one is in time and the next is late."""
-    coarse = coarse_plans(course, table, 1.1 * duration)
-    count = len(course.start)
+    coarse = coarse_plans(tour, table, 1.1 * duration)
+    count = len(tour.start)
     in_time, late, share = np.zeros(count, dtype=int), np.full(count, coarse.goals + 1), np.zeros(count)
     goals = np.clip(np.sum(coarse.times <= duration, axis=1) + 1, 1, coarse.goals)
     todo = np.arange(count)
     while todo.size:
         number = goals[todo]
-        part = course.of(todo, int(number.max()))
+        part = tour.of(todo, int(number.max()))
         _, times = refined(part, motions, coarse.plan_to(todo, number), number)
         last, before = (np.take_along_axis(times, (number - i)[:, None], axis=1)[:, 0] for i in (0, 1))
         reached = last <= duration

@@ -1,9 +1,10 @@
-"""Commands that must not be carried out: invalid, late, or from a second node."""
+"""Faults of commands: invalid, late, from a second node, or over a bad cable."""
 
 from __future__ import annotations
 
 import math
 import threading
+import time
 from dataclasses import replace
 
 import rclpy
@@ -12,17 +13,17 @@ from sensor_msgs.msg import JointState
 
 from fulmar_core.robot import Robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
-from fulmar_evaluation.faults.fault_injector import delayed
-from fulmar_evaluation.faults.fault_result import STAYS_S, Outcome, stopped
+from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment, delayed
 from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.two_hosts import CUT, LOSSY, why_not
 from fulmar_ros.qos import publisher_qos
 
 STRANGER_S = 0.02  # between its commands
 # Until nodes on one computer know of a new publisher, and for the look of a tenth of a second
 DISCOVERY_S = 0.3
-COMMANDS = Surroundings(spoilt=None)
+DRIVES_S = 8.0  # forty commands at 5 Hz
+COMMANDS = FaultEnvironment(intercepted=None)
 
 
 def commands_not_a_number(live: LiveSystem) -> Outcome:
@@ -47,7 +48,7 @@ def commands_late(live: LiveSystem) -> Outcome:
     """Each command comes long after its observation: nobody knows any more whether it would still be right."""
     since_s = live.until_it_moves()
     limit_s = live.silenced_s
-    live.spoiler.spoil = delayed(math.ceil((limit_s + STAYS_S / 4.0) / live.beat_s))
+    live.injector.change = delayed(math.ceil((limit_s + STAYS_S / 4.0) / live.beat_s))
     return stopped(live, since_s, limit_s)
 
 
@@ -82,7 +83,7 @@ def _nonsense(live: LiveSystem, names: list[str], values: list[float]) -> Outcom
     """Nonsense must not feed the watchdog, nor reach an actuator."""
     message = _message(live, names, values)
     since_s = live.until_it_moves()
-    live.spoiler.spoil = lambda _good: message
+    live.injector.change = lambda _good: message
     return stopped(live, since_s, live.silenced_s)
 
 
@@ -98,10 +99,34 @@ def _without_names(robot: Robot) -> str:
     return "a Twist has neither names nor a length" if command_wire(robot) is VELOCITY_COMMAND else ""
 
 
+def cable_cut(live: LiveSystem) -> Outcome:
+    """Nothing passes any more, in either direction."""
+    since_s = live.until_it_moves()
+    live.hosts.cable.quality = CUT
+    return stopped(live, since_s, live.silenced_s)
+
+
+def cable_lossy(live: LiveSystem) -> Outcome:
+    """A tenth of all frames is lost, and the others are 10 to 30 ms late, in both directions."""
+    since_s = live.until_it_moves()
+    live.hosts.cable.quality = LOSSY
+    time.sleep(DRIVES_S)
+    said = f"driven for {DRIVES_S:g} s without a pause"
+    return went_on(live, since_s, detected_by="", reaction=said, correct=True)
+
+
+def _without_two_hosts(_robot: Robot) -> str:
+    return why_not()
+
+
 COMMAND_FAULTS = (
     Fault(commands_not_a_number, COMMANDS),
     Fault(commands_of_wrong_length, COMMANDS, _without_names),
     Fault(commands_with_wrong_names, COMMANDS, _without_names),
     Fault(commands_late, COMMANDS),
     Fault(commands_from_another_node),
+)
+CABLE_FAULTS = (
+    Fault(cable_cut, FaultEnvironment(two_hosts=True), _without_two_hosts),
+    Fault(cable_lossy, FaultEnvironment(two_hosts=True), _without_two_hosts),
 )

@@ -1,14 +1,107 @@
-"""A fault: what is done, to which system, and for whom it has a meaning."""
+"""A fault, and the result of doing it to a live system."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
-from fulmar_evaluation.faults.fault_environment import USUAL, Surroundings
-from fulmar_evaluation.faults.fault_result import Outcome
-from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment
+from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
+from fulmar_evaluation.faults.observer import wait_for
+
+WORDS_S = 2.0  # a node says what is wrong within a second, on a machine that has time for it
+STAYS_S = 1.0  # what is safe must stay so
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a system made of a fault."""
+
+    detected_by: str  # the node that said first what is wrong; empty if nobody did
+    reaction: str  # in its own words
+    passed: bool
+    # From the fault to the last moment at which anything moved; None: it went on [s].
+    time_to_safe_s: float | None = None
+    limit_s: float | None = None  # None: the robot is to go on [s]
+    recorder_away: tuple[float, float] | None = None  # from when to when the fault kept it from its work [s]
+
+
+@dataclass(frozen=True)
+class FaultResult:
+    """One line of the report."""
+
+    name: str
+    detected_by: str  # as of `Outcome`
+    reaction: str
+    time_to_safe_s: float | None
+    limit_s: float | None
+    data_lost: int | None  # messages that came and are not in the bag; None: the fault could not be done
+    bag_intact: bool | None  # it opens, and has no gap while its recorder could work; None: same
+    passed: bool
+
+    @property
+    def status(self) -> str:
+        """For people."""
+        return "not done" if self.bag_intact is None else "passed" if self.passed else "FAILED"
+
+
+def stopped(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:
+    """Whether a robot that moved got safe in time, stayed so, and somebody said why.
+
+    Args:
+        live: The system.
+        since_s: When the fault was done, on the monotonic clock [s].
+        limit_s: The longest time to the safe state [s].
+
+    Raises:
+        NothingShown: Nothing moved any more when the fault was done.
+    """
+    observer = live.observer
+    wait_for(lambda: time.monotonic() > since_s + limit_s + STAYS_S, limit_s + 2.0 * STAYS_S)
+    applied = observer.applied_since(since_s)
+    unsafe = [received_s for received_s, moves in applied if moves]
+    if not unsafe:
+        raise NothingShown("nothing moved when the fault was done, so it shows nothing")
+    safe = [received_s for received_s, moves in applied if not moves and received_s > unsafe[-1]]
+    time_s = safe[0] - since_s if safe else None
+    wait_for(lambda: observer.complaint_since(since_s) is not None, WORDS_S)
+    word = observer.complaint_since(since_s)
+    passed = time_s is not None and time_s <= limit_s and word is not None
+    return Outcome(word.who if word else "", word.text if word else "", passed, time_s, limit_s)
+
+
+def went_on(
+    live: LiveSystem,
+    since_s: float,
+    *,
+    detected_by: str,
+    reaction: str,
+    correct: bool,
+    recorder_away: tuple[float, float] | None = None,
+) -> Outcome:
+    """Whether a robot went on, without a pause as long as its watchdog, and the right thing was said.
+
+    Args:
+        live: The system.
+        since_s: When the fault was done, some time ago [s].
+        detected_by: Who said it; empty if nobody did.
+        reaction: What was said.
+        correct: Whether that is what had to be said.
+        recorder_away: As of `Outcome`.
+    """
+    words = live.observer.statements_since(since_s - WORDS_S)  # with one from before, to compare with
+    trips = {word.values.get("watchdog_trips", "") for word in words if word.who == "plant"}
+    moved = any(moves for _, moves in live.observer.applied_since(since_s))
+    wrong = [] if moved else ["the robot stood still"]
+    wrong += (
+        []
+        if len(trips) == 1
+        else [f"the watchdog tripped (trips reported: {', '.join(sorted(trips)) or 'none'})"]
+    )
+    said = "; ".join([*wrong, reaction])
+    return Outcome(detected_by, said, correct and not wrong, recorder_away=recorder_away)
 
 
 def possible(_robot: Robot) -> str:
@@ -21,7 +114,7 @@ class Fault:
     """One line of the suite's table."""
 
     do: Callable[[LiveSystem], Outcome]
-    about: Surroundings = USUAL
+    about: FaultEnvironment = USUAL
     # Why a robot, or this machine, cannot have it; empty if it can.
     why_not: Callable[[Robot], str] = possible
     begins: bool = True  # whether the system is under way when it is done

@@ -1,31 +1,85 @@
-"""The system that a fault is done to, where it is another than the usual one."""
+"""The system that a fault is done to, and the relay that changes messages on their way."""
 
 from __future__ import annotations
 
 import shutil
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
 
 from fulmar_bringup.planning import RunRequest, plan_run
-from fulmar_core.topics import ODOMETRY, Wire
-from policy_server.shipped import shipped_policy
+from fulmar_core.topics import COMMAND, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
+from fulmar_ros.qos import publisher_qos, subscriber_qos
+from policy_server.controllers import shipped_policy
+
+KINDS = {ODOMETRY: Odometry, MOCAP: PoseStamped, COMMAND: JointState, VELOCITY_COMMAND: TwistStamped}
+Injection = Callable[[Any], Any]  # a message to what is passed on in its place, or to None
+
+
+def source_of(wire: Wire) -> str:
+    """Where messages of a wire come from before they are passed on."""
+    return f"original/{wire.name}"
+
+
+def unchanged(message: Any) -> Any:
+    """As it came."""
+    return message
+
+
+def lost(_message: Any) -> None:
+    """Nothing passes."""
+
+
+def delayed(periods: int) -> Injection:
+    """Everything comes later, by so many messages."""
+    waiting: deque[Any] = deque()
+
+    def change(message: Any) -> Any:
+        waiting.append(message)
+        return waiting.popleft() if len(waiting) > periods else None
+
+    return change
+
+
+class FaultInjector:
+    """Passes messages on; `change` changes each, or swallows it by returning None."""
+
+    def __init__(self, node: Node, wire: Wire) -> None:
+        """Begin as if it were not there."""
+        self.change: Injection = unchanged
+        kind, reliable = KINDS[wire], wire.delivery != "best_effort"
+        self._publisher = node.create_publisher(kind, wire.name, publisher_qos(wire))
+        node.create_subscription(
+            kind, source_of(wire), self._pass, subscriber_qos(wire, reliable=reliable, depth=10)
+        )
+
+    def _pass(self, message: Any) -> None:
+        changed = self.change(message)
+        if changed is not None:
+            self._publisher.publish(changed)
+
 
 FAR_M = 6.0  # the robot is under way for seconds
 CORNERS_M = ((FAR_M, 0.0), (FAR_M, 1.0))  # where a node of goals sends it
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """What is unusual about a system; the usual one has an e-stop, and its odometry may be spoilt."""
+class FaultEnvironment:
+    """What is unusual about a system; the usual one has an e-stop, and its odometry may be intercepted."""
 
     guards: Mapping[str, Any] = field(default_factory=dict)  # beside the e-stop
-    spoilt: Wire | None = ODOMETRY  # the wire that passes through the spoiler; None: the robot's commands
-    answers_pass: bool = False  # the robot's commands, too, pass through a spoiler, of their own
-    by_goal_node: bool = False  # a node of its own tells goals from a file
+    # The wire that passes through the injector; None: the robot's commands.
+    intercepted: Wire | None = ODOMETRY
+    answers_pass: bool = False  # the robot's commands, too, pass through a injector, of their own
+    by_goal_node: bool = False  # a goal node publishes goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     scenario: str = "nominal"
     emulated: bool = False  # a driver drives an emulated device
@@ -33,10 +87,10 @@ class Surroundings:
     bundle: Callable[[Path], None] | None = None  # what is done to the bundle before the start
 
 
-USUAL = Surroundings()
+USUAL = FaultEnvironment()
 
 
-def request_of(robot: str, record: Path, about: Surroundings = USUAL) -> RunRequest:
+def request_of(robot: str, record: Path, about: FaultEnvironment = USUAL) -> RunRequest:
     """A robot that has far to go, with an e-stop.
 
     Args:

@@ -13,10 +13,8 @@ from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.safety.input_gate import FROZEN_AFTER
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
-from fulmar_evaluation.faults.fault_injector import Spoil, delayed, lost
-from fulmar_evaluation.faults.fault_result import STAYS_S, Outcome, stopped
+from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment, Injection, delayed, lost
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_ros.convert import stamp_of
 
@@ -27,37 +25,37 @@ EPOCH_S = 6.0  # in which it is seen whether a robot goes on
 BACK_NS = 1_000_000  # so little, with each message, that it is no jump of time
 
 
-def _spoilt(live: LiveSystem, spoil: Spoil, detection_s: float) -> Outcome:
-    """Spoil every message from now on; the controller commands what is safe with its next beat."""
+def _intercept(live: LiveSystem, change: Injection, detection_s: float) -> Outcome:
+    """Change every message from now on; the controller commands what is safe with its next beat."""
     since_s = live.until_it_moves()
-    live.spoiler.spoil = spoil
+    live.injector.change = change
     return stopped(live, since_s, detection_s + live.corrected_s)
 
 
-def _changed(change: Callable[[Any], None]) -> Spoil:
-    def spoil(message: Any) -> Any:
+def _changed(change: Callable[[Any], None]) -> Injection:
+    def changed(message: Any) -> Any:
         change(message)
         return message
 
-    return spoil
+    return changed
 
 
 def odometry_silent(live: LiveSystem) -> Outcome:
     """Nothing comes any more."""
-    return _spoilt(live, lost, live.watchdog_s)
+    return _intercept(live, lost, live.watchdog_s)
 
 
 def odometry_frozen(live: LiveSystem) -> Outcome:
     """The same measurement with new stamps."""
     kept: list[Odometry] = []
 
-    def spoil(message: Odometry) -> Odometry:
+    def change(message: Odometry) -> Odometry:
         kept.append(kept[0] if kept else copy.deepcopy(message))
         frozen = copy.deepcopy(kept[0])
         frozen.header.stamp = message.header.stamp
         return frozen
 
-    return _spoilt(live, spoil, (FROZEN_AFTER + 1) * live.tick_s)
+    return _intercept(live, change, (FROZEN_AFTER + 1) * live.tick_s)
 
 
 def odometry_not_a_number(live: LiveSystem) -> Outcome:
@@ -66,7 +64,7 @@ def odometry_not_a_number(live: LiveSystem) -> Outcome:
     def change(message: Odometry) -> None:
         message.twist.twist.linear.x = math.nan
 
-    return _spoilt(live, _changed(change), live.tick_s)
+    return _intercept(live, _changed(change), live.tick_s)
 
 
 def odometry_in_a_wrong_frame(live: LiveSystem) -> Outcome:
@@ -75,7 +73,7 @@ def odometry_in_a_wrong_frame(live: LiveSystem) -> Outcome:
     def change(message: Odometry) -> None:
         message.header.frame_id = "map"
 
-    return _spoilt(live, _changed(change), live.tick_s)
+    return _intercept(live, _changed(change), live.tick_s)
 
 
 def odometry_with_a_wrong_quaternion(live: LiveSystem) -> Outcome:
@@ -84,7 +82,7 @@ def odometry_with_a_wrong_quaternion(live: LiveSystem) -> Outcome:
     def change(message: Odometry) -> None:
         message.pose.pose.orientation.w += 1.0
 
-    return _spoilt(live, _changed(change), live.tick_s)
+    return _intercept(live, _changed(change), live.tick_s)
 
 
 def odometry_out_of_order(live: LiveSystem) -> Outcome:
@@ -95,20 +93,20 @@ def odometry_out_of_order(live: LiveSystem) -> Outcome:
         first.append(stamp_ns(message.header.stamp))
         message.header.stamp = stamp_of(first[0] - BACK_NS * len(first))
 
-    return _spoilt(live, _changed(change), live.tick_s)
+    return _intercept(live, _changed(change), live.tick_s)
 
 
 def odometry_late(live: LiveSystem) -> Outcome:
-    """Everything comes later by the same time, longer than the robot may be blind; it is judged before that is over."""
+    """Everything comes later by the same time, which is longer than the robot may be blind."""
     limit_s = live.watchdog_s + live.corrected_s
     late_s = limit_s + STAYS_S + MARGIN_S
-    return _spoilt(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
+    return _intercept(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
 
 
 def odometry_dated_back(live: LiveSystem) -> Outcome:
     """Its stamps jump back, and no clock did: for the plant, answers to them come far too late."""
     since_s = _until_mid_way(live)
-    live.spoiler.spoil = _stamped(-BACKWARD_NS)
+    live.injector.change = _stamped(-BACKWARD_NS)
     # What was measured just before is answered with the next beat, and that answer counts.
     outcome = stopped(live, since_s, live.silenced_s + live.beat_s)
     epoch, _ = _epoch(live, since_s)
@@ -128,15 +126,15 @@ def time_jump_backwards(live: LiveSystem) -> Outcome:
 def _jump(live: LiveSystem, by_ns: int) -> Outcome:
     """A new epoch begins, in words, and the robot goes on in it."""
     since_s = _until_mid_way(live)
-    live.spoiler.spoil, live.answers.spoil = _stamped(by_ns), _stamped(-by_ns)
+    live.injector.change, live.answers.change = _stamped(by_ns), _stamped(-by_ns)
     time.sleep(EPOCH_S)
     epoch, mode = _epoch(live, since_s)
-    told = epoch not in ("", "0")
+    reported = epoch not in ("", "0")
     goes_on = mode == "active" and any(
-        moved for _, moved in live.witness.applied_since(since_s + EPOCH_S / 2.0)
+        moved for _, moved in live.observer.applied_since(since_s + EPOCH_S / 2.0)
     )
     said = f"epoch {epoch} begins; {'goes on' if goes_on else mode}"
-    return Outcome("controller" if told else "", said, told and goes_on)
+    return Outcome("controller" if reported else "", said, reported and goes_on)
 
 
 def _until_mid_way(live: LiveSystem) -> float:
@@ -146,7 +144,7 @@ def _until_mid_way(live: LiveSystem) -> float:
     return time.monotonic()
 
 
-def _stamped(by_ns: int) -> Spoil:
+def _stamped(by_ns: int) -> Injection:
     def change(message: Any) -> None:
         message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
 
@@ -154,8 +152,8 @@ def _stamped(by_ns: int) -> Spoil:
 
 
 def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
-    """The epoch that the controller has told since then, and what it was doing in it."""
-    words = [word for word in live.witness.words_since(since_s) if "epoch" in word.values]
+    """The epoch that the controller has reported since then, and what it was doing in it."""
+    words = [word for word in live.observer.statements_since(since_s) if "epoch" in word.values]
     return (words[-1].values["epoch"], words[-1].values["mode"]) if words else ("", "silent")
 
 
@@ -173,5 +171,5 @@ INPUT_FAULTS = (
             odometry_dated_back,
         )
     ),
-    *(Fault(do, Surroundings(answers_pass=True)) for do in (time_jump_forwards, time_jump_backwards)),
+    *(Fault(do, FaultEnvironment(answers_pass=True)) for do in (time_jump_forwards, time_jump_backwards)),
 )

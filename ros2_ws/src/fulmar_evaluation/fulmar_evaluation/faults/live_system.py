@@ -33,9 +33,8 @@ from fulmar_core.topics import (
     Wire,
     command_wire,
 )
-from fulmar_evaluation.faults.fault_environment import USUAL, Surroundings
-from fulmar_evaluation.faults.fault_injector import Spoiler, source_of
-from fulmar_evaluation.faults.observer import Witness, wait_for
+from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment, FaultInjector, source_of
+from fulmar_evaluation.faults.observer import RunObserver, wait_for
 from fulmar_evaluation.faults.two_hosts import TwoHosts
 from fulmar_ros.runtime import spinning
 
@@ -47,7 +46,7 @@ class NothingShown(RunFailed):
 
 
 class LiveSystem:
-    """Recorder, plant, e-stop, controller, and a bystander who hears them."""
+    """Recorder, plant, e-stop, controller, and an observer of them."""
 
     def __init__(
         self,
@@ -55,7 +54,7 @@ class LiveSystem:
         group: ProcessGroup,
         overseer: Supervisor,
         bystander: Node,
-        about: Surroundings,
+        about: FaultEnvironment,
         hosts: TwoHosts | None,
     ) -> None:
         """Hold the parts together."""
@@ -63,9 +62,9 @@ class LiveSystem:
         self.bystander, self._request, self._overseer, self._hosts = bystander, request, overseer, hosts
         robot = load_robot(self.plan.robot)
         self.robot = robot
-        self.witness = Witness(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
-        self.spoiler = Spoiler(bystander, about.spoilt or command_wire(robot))
-        self._answers = Spoiler(bystander, command_wire(robot)) if about.answers_pass else None
+        self.observer = RunObserver(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
+        self.injector = FaultInjector(bystander, about.intercepted or command_wire(robot))
+        self._answers = FaultInjector(bystander, command_wire(robot)) if about.answers_pass else None
         self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz
         self.watchdog_s = default_timeout(self.beat_s)
         actuators = robot.actuators
@@ -85,7 +84,7 @@ class LiveSystem:
         return self._hosts
 
     @property
-    def answers(self) -> Spoiler:
+    def answers(self) -> FaultInjector:
         """What commands pass through, beside the measurements; they must."""
         assert self._answers is not None
         return self._answers
@@ -125,7 +124,7 @@ class LiveSystem:
         Raises:
             NothingShown: They stay off.
         """
-        if not wait_for(self.witness.moves, MOVING_S):
+        if not wait_for(self.observer.moves, MOVING_S):
             raise NothingShown(f"the robot did not move within {MOVING_S:g} s; the fault would show nothing")
         return time.monotonic()
 
@@ -136,7 +135,7 @@ class LiveSystem:
 
 @contextlib.contextmanager
 def live_system(
-    request: RunRequest, about: Surroundings = USUAL, hosts: TwoHosts | None = None
+    request: RunRequest, about: FaultEnvironment = USUAL, hosts: TwoHosts | None = None
 ) -> Iterator[LiveSystem]:
     """The processes of a system, which `begin` sets on its way to its goal; ended at the end.
 
@@ -170,7 +169,7 @@ def live_system(
         raise RunFailed(f"the bystander failed: {errors[0]!r}") from errors[0]
 
 
-def _specs(request: RunRequest, about: Surroundings, robot: Robot, wires: Path) -> list[NodeSpec]:
+def _specs(request: RunRequest, about: FaultEnvironment, robot: Robot, wires: Path) -> list[NodeSpec]:
     plan = request.plan
     rows = system_rows(plan, record={"directory": str(request.record)}, wires_folder=wires)
     specs = [
@@ -178,9 +177,9 @@ def _specs(request: RunRequest, about: Surroundings, robot: Robot, wires: Path) 
         *([teleop_spec(plan.robot, name=plan.name, keyboard=False)] if about.by_hand else []),
     ]
     commands = command_wire(robot)
-    spoilt = [about.spoilt or commands, *([commands] if about.answers_pass else [])]
-    sources = {_publisher_of(wire, plan): {wire.name: source_of(wire)} for wire in spoilt}
-    # Of a spoilt topic this process alone is the subscriber.
+    intercepted = [about.intercepted or commands, *([commands] if about.answers_pass else [])]
+    sources = {_publisher_of(wire, plan): {wire.name: source_of(wire)} for wire in intercepted}
+    # Of a intercepted topic this process alone is the subscriber.
     return [
         replace(
             spec,

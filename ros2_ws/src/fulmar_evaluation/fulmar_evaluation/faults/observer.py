@@ -1,19 +1,24 @@
-"""What a robot does and what its nodes say of it, with the times at which a bystander hears it."""
+"""Records of a live system: what an observer receives, and what the bag kept of it."""
 
 from __future__ import annotations
 
+import math
 import re
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from fulmar_bags.contents import open_bag
+from fulmar_bags.decode import stamps_ns
 from fulmar_bags.message_reader import stamp_ns
+from fulmar_core.errors import BagError
 from fulmar_core.robot import Robot
 from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire
 from fulmar_ros.qos import subscriber_qos
@@ -23,10 +28,10 @@ NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)
-class Word:
+class Statement:
     """Something that a node said of itself."""
 
-    heard_s: float  # monotonic clock [s]
+    received_s: float  # monotonic clock [s]
     who: str  # plant, controller, estimator, estop
     level: str  # ok, warn or error
     text: str
@@ -38,16 +43,16 @@ class Word:
         return None if self.level == "ok" else (self.who, NUMBER.sub("#", self.text))
 
 
-class Witness:
+class RunObserver:
     """Listens, from a node that spins in a thread of its own."""
 
     def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
-        """Listen to what actuators do, on the wire that tells it, and to the health of every node."""
+        """Subscribe to what actuators do, on a wire, and to the health of every node."""
         self.wire = wire
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
-        self._applied: list[tuple[float, int, bool]] = []  # heard [s], stamp [ns], whether it moves
-        self._words: list[Word] = []
+        self._applied: list[tuple[float, int, bool]] = []  # received [s], stamp [ns], whether it moves
+        self._words: list[Statement] = []
         listen = node.create_subscription
         listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))
         for health in (DIAGNOSTICS, STATUS):
@@ -67,7 +72,7 @@ class Witness:
                 values = {pair.key: pair.value for pair in status.values}
                 who = status.name.partition(": ")[2]
                 self._words.append(
-                    Word(now_s, who, levels.get(status.level, "error"), status.message, values)
+                    Statement(now_s, who, levels.get(status.level, "error"), status.message, values)
                 )
 
     def moves(self) -> bool:
@@ -78,28 +83,28 @@ class Witness:
     def applied_since(self, since_s: float) -> list[tuple[float, bool]]:
         """When something was applied, and whether it moved the robot."""
         with self._lock:
-            return [(heard_s, moves) for heard_s, _, moves in self._applied if heard_s >= since_s]
+            return [(received_s, moves) for received_s, _, moves in self._applied if received_s >= since_s]
 
-    def heard(self) -> tuple[np.ndarray, np.ndarray]:
+    def received(self) -> tuple[np.ndarray, np.ndarray]:
         """When something was applied, and its stamps, shapes (n,) [s] and int64 [ns]."""
         with self._lock:
-            times = np.array([heard_s for heard_s, _, _ in self._applied], dtype=float)
+            times = np.array([received_s for received_s, _, _ in self._applied], dtype=float)
             return times, np.array([stamp for _, stamp, _ in self._applied], dtype=np.int64)
 
-    def words_since(self, since_s: float) -> list[Word]:
+    def statements_since(self, since_s: float) -> list[Statement]:
         """What was said from then on."""
         with self._lock:
-            return [word for word in self._words if word.heard_s >= since_s]
+            return [word for word in self._words if word.received_s >= since_s]
 
-    def complaint_since(self, since_s: float) -> Word | None:
+    def complaint_since(self, since_s: float) -> Statement | None:
         """The first thing that a node said from then on which was wrong, and not its last word before."""
-        return first_complaint(self.words_since(0.0), since_s)
+        return first_complaint(self.statements_since(0.0), since_s)
 
 
-def first_complaint(words: list[Word], since_s: float) -> Word | None:
+def first_complaint(words: list[Statement], since_s: float) -> Statement | None:
     """The first thing that is wrong from a time on, and was not some node's last word before it."""
-    standing = {word.who: word.complaint for word in words if word.heard_s < since_s}.values()
-    new = (word for word in words if word.heard_s >= since_s and word.complaint is not None)
+    standing = {word.who: word.complaint for word in words if word.received_s < since_s}.values()
+    new = (word for word in words if word.received_s >= since_s and word.complaint is not None)
     return next((word for word in new if word.complaint not in standing), None)
 
 
@@ -111,3 +116,49 @@ def wait_for(condition: Callable[[], bool], timeout_s: float) -> bool:
             return False
         time.sleep(0.005)
     return True
+
+
+TORN_S = 1.0  # a recorder that dies takes no more than so much with it
+IN_FLIGHT_S = 0.1  # so long before it hangs a message may be sent that it has not taken yet
+
+
+@dataclass(frozen=True)
+class BagEvidence:
+    """The bag beside what was received."""
+
+    lost: int  # messages that came and are not in it
+    intact: bool  # it opens, and lacks nothing of the time in which its recorder could work
+    words: str = ""  # what is wrong; empty if nothing is
+
+
+def bag_evidence(record: Path, observer: RunObserver, away: tuple[float, float] | None) -> BagEvidence:
+    """Compare a bag with what an observer received.
+
+    Args:
+        record: The bag, as it lies there after everybody has ended.
+        observer: Received what actuators did.
+        away: From when to when a fault kept the recorder from its work; for ever, where it ended it [s].
+    """
+    received_s, received_ns = observer.received()
+    from_s, to_s = away or (math.inf, math.inf)
+    dead = away is not None and math.isinf(to_s)
+    if dead:  # what comes after its end is nobody's loss
+        received_s, received_ns = received_s[received_s < from_s], received_ns[received_s < from_s]
+    from_s, to_s = from_s - (TORN_S if dead else IN_FLIGHT_S), to_s + IN_FLIGHT_S
+    try:
+        bag = open_bag(record)
+    except BagError as error:
+        return BagEvidence(len(received_ns), False, str(error))
+    found = stamps_ns(bag.of(observer.wire))
+    if found is None or not len(found):
+        return BagEvidence(len(received_ns), False, f"it has nothing of {observer.wire.name}")
+    # A recorder may find the plant a little later than the bystander did.
+    missing = (received_ns >= found.min()) & ~np.isin(received_ns, found)
+    gaps = int(np.sum(missing & ~((received_s >= from_s) & (received_s < to_s))))
+    dropped = sum((bag.recording.get("dropped") or {}).values())
+    problems = [
+        *([f"lacks {gaps} of {observer.wire.name}"] if gaps else []),
+        *([f"its recorder dropped {dropped}"] if dropped and not dead else []),
+        *(() if dead else bag.warnings),
+    ]
+    return BagEvidence(int(np.sum(missing)) + dropped, not problems, "; ".join(problems))

@@ -13,9 +13,8 @@ from std_msgs.msg import String
 from fulmar_core.errors import RunFailed
 from fulmar_core.policy_bundle import NETWORK, Passport, read_golden, read_passport, write_bundle
 from fulmar_core.topics import SWAP
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
-from fulmar_evaluation.faults.fault_result import STAYS_S, Outcome, went_on
+from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, went_on
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.qos import publisher_qos
@@ -70,7 +69,7 @@ def bundle_refused(live: LiveSystem) -> Outcome:
         ended = str(error).startswith("controller ended with")
         live.start_plant_alone()
         time.sleep(STAYS_S)
-        applied = live.witness.applied_since(began_s)
+        applied = live.observer.applied_since(began_s)
         stands = bool(applied) and not any(moves for _, moves in applied)
         said = live.group.last_words("controller").replace(live.plan.policy, "the bundle")
         who = "controller" if ended else ""
@@ -82,15 +81,15 @@ def bundle_refused_with_fallback(live: LiveSystem) -> Outcome:
     """The bundle is damaged and a classical controller stands in for it: it drives, and says why."""
     since_s = live.until_it_moves()
     time.sleep(STAYS_S)
-    words = [word for word in live.witness.words_since(since_s) if word.who == "controller"]
+    words = [word for word in live.observer.statements_since(since_s) if word.who == "controller"]
     why = words[-1].values.get("fell_back", "") if words else ""
     said = why.replace(live.plan.policy, "the bundle")
-    return went_on(live, since_s, detected_by="controller" if why else "", reaction=said, told=bool(why))
+    return went_on(live, since_s, detected_by="controller" if why else "", reaction=said, correct=bool(why))
 
 
 POLICY_FAULTS = (
-    Fault(bundle_refused, Surroundings(bundle=flip_a_byte), begins=False),
-    Fault(bundle_refused_with_fallback, Surroundings({"fallback": "classical"}, bundle=flip_a_byte)),
+    Fault(bundle_refused, FaultEnvironment(bundle=flip_a_byte), begins=False),
+    Fault(bundle_refused_with_fallback, FaultEnvironment({"fallback": "classical"}, bundle=flip_a_byte)),
     Fault(swap_to_the_same_policy),
     Fault(swap_to_a_wrong_hash),
     Fault(swap_to_another_robot),
@@ -124,10 +123,10 @@ def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
         publisher.publish(String(data=str(folder)))
 
         def said() -> str:
-            answers = [word.values.get("swap", "") for word in live.witness.words_since(since_s)]
+            answers = [word.values.get("swap", "") for word in live.observer.statements_since(since_s)]
             return next((text for text in reversed(answers) if str(folder) in text), "")
 
-        told = wait_for(lambda: said().startswith(("done", "refused")), ANSWER_S)
+        reported = wait_for(lambda: said().startswith(("done", "refused")), ANSWER_S)
         time.sleep(GOES_ON_S)
     finally:
         node.destroy_node()
@@ -135,7 +134,7 @@ def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
     return went_on(
         live,
         since_s,
-        detected_by="controller" if told else "",
+        detected_by="controller" if reported else "",
         reaction=answer,
-        told=answer.startswith(wanted),
+        correct=answer.startswith(wanted),
     )

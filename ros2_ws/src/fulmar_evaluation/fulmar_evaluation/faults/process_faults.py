@@ -13,12 +13,10 @@ from fulmar_bringup.system import DEFAULT_ESTIMATOR
 from fulmar_core.estimation.motion_filter import load_estimator
 from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_core.topics import MOCAP
-from fulmar_evaluation.faults.fault import Fault
-from fulmar_evaluation.faults.fault_environment import Surroundings
-from fulmar_evaluation.faults.fault_injector import lost
-from fulmar_evaluation.faults.fault_result import STAYS_S, WORDS_S, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
 from fulmar_evaluation.faults.live_system import LiveSystem
-from fulmar_evaluation.faults.observer import Word, wait_for
+from fulmar_evaluation.faults.observer import Statement, wait_for
 
 ESTOP_S = TIMEOUT_NS / 1e9
 PAUSE_S = 2.0
@@ -59,7 +57,7 @@ def mocap_lost(live: LiveSystem) -> Outcome:
     """No pose comes any more: the estimator bridges a gap of moments, and then says what it lacks."""
     bridge_s = load_estimator(DEFAULT_ESTIMATOR).bridge_s
     since_s = live.until_it_moves()
-    live.spoiler.spoil = lost
+    live.injector.change = lost
     return stopped(live, since_s, bridge_s + live.watchdog_s + live.corrected_s)
 
 
@@ -71,7 +69,7 @@ def signalled(live: LiveSystem, name: str, number: signal.Signals, limit_s: floa
 
 
 def plant_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the plant: no actuator is told anything any more, and the controller commands what is safe."""
+    """SIGKILL of the plant: no actuator receives anything any more, and the controller commands what is safe."""
     return _plant(live, signal.SIGKILL)
 
 
@@ -86,20 +84,22 @@ def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
     live.send("plant", number)
     limit_s = live.watchdog_s + live.beat_s + live.tick_s
     time.sleep(limit_s + STAYS_S)
-    wait_for(lambda: live.witness.complaint_since(since_s) is not None, WORDS_S)
-    word = live.witness.complaint_since(since_s)
-    last_s = max((heard_s for heard_s, _ in live.witness.applied_since(since_s)), default=since_s) - since_s
+    wait_for(lambda: live.observer.complaint_since(since_s) is not None, WORDS_S)
+    word = live.observer.complaint_since(since_s)
+    last_s = (
+        max((received_s for received_s, _ in live.observer.applied_since(since_s)), default=since_s) - since_s
+    )
     passed = word is not None and last_s <= limit_s
     return Outcome(word.who if word else "", word.text if word else "", passed, last_s, limit_s)
 
 
 def goals_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the node that tells goals: the robot goes to the place that it was told last."""
+    """SIGKILL of the goal node: the robot goes to the last goal that it received."""
     since_s = live.until_it_moves()
     live.send("goals", signal.SIGKILL)
     time.sleep(PAUSE_S)
     who, said = _launcher_on(live, "goals")
-    return went_on(live, since_s, detected_by=who, reaction=said, told=bool(who))
+    return went_on(live, since_s, detected_by=who, reaction=said, correct=bool(who))
 
 
 def recorder_killed(live: LiveSystem) -> Outcome:
@@ -111,7 +111,7 @@ def recorder_killed(live: LiveSystem) -> Outcome:
     time.sleep(PAUSE_S)
     who, said = _launcher_on(live, "recorder")
     return went_on(
-        live, since_s, detected_by=who, reaction=said, told=bool(who), recorder_away=(away_s, math.inf)
+        live, since_s, detected_by=who, reaction=said, correct=bool(who), recorder_away=(away_s, math.inf)
     )
 
 
@@ -123,7 +123,9 @@ def recorder_hangs(live: LiveSystem) -> Outcome:
     live.send("recorder", signal.SIGCONT)
     away = since_s, time.monotonic()
     time.sleep(PAUSE_S)
-    return went_on(live, since_s, detected_by="", reaction="control goes on", told=True, recorder_away=away)
+    return went_on(
+        live, since_s, detected_by="", reaction="control goes on", correct=True, recorder_away=away
+    )
 
 
 def disk_full(live: LiveSystem) -> Outcome:
@@ -141,7 +143,7 @@ def disk_full(live: LiveSystem) -> Outcome:
         since_s,
         detected_by=word.who if word else "",
         reaction=said,
-        told=word is not None,
+        correct=word is not None,
         recorder_away=(away_s, math.inf),
     )
 
@@ -154,8 +156,8 @@ def _launcher_on(live: LiveSystem, name: str) -> tuple[str, str]:
     return "launcher", f"{ended.text}; control goes on"
 
 
-def _complaint(live: LiveSystem, since_s: float) -> Word | None:
-    words = [word for word in live.witness.words_since(since_s) if word.who == "recorder"]
+def _complaint(live: LiveSystem, since_s: float) -> Statement | None:
+    words = [word for word in live.observer.statements_since(since_s) if word.who == "recorder"]
     return next((word for word in words if word.level != "ok"), None)
 
 
@@ -173,8 +175,8 @@ PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
 ESTIMATED = {"estimator": DEFAULT_ESTIMATOR}
 PROCESS_FAULTS = (
     *map(Fault, PLAIN),
-    Fault(goals_killed, Surroundings(by_goal_node=True)),
-    Fault(estimator_killed, Surroundings(ESTIMATED)),
-    Fault(estimator_hangs, Surroundings(ESTIMATED)),
-    Fault(mocap_lost, Surroundings(ESTIMATED, spoilt=MOCAP)),
+    Fault(goals_killed, FaultEnvironment(by_goal_node=True)),
+    Fault(estimator_killed, FaultEnvironment(ESTIMATED)),
+    Fault(estimator_hangs, FaultEnvironment(ESTIMATED)),
+    Fault(mocap_lost, FaultEnvironment(ESTIMATED, intercepted=MOCAP)),
 )

@@ -13,32 +13,26 @@ from fulmar_bringup.domains import environment, reserved_domains
 from fulmar_bringup.system import Guards, default_hardware, modules_of
 from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.robot import load_robot
-from fulmar_evaluation.faults.bag_evidence import Kept, kept_of
-from fulmar_evaluation.faults.bearing_faults import BEARING_FAULTS
-from fulmar_evaluation.faults.command_faults import COMMAND_FAULTS
-from fulmar_evaluation.faults.driver_faults import DRIVER_FAULTS
-from fulmar_evaluation.faults.estop_faults import ESTOP_FAULTS
-from fulmar_evaluation.faults.fault import Fault
+from fulmar_evaluation.faults.command_faults import CABLE_FAULTS, COMMAND_FAULTS
+from fulmar_evaluation.faults.fault import Fault, FaultResult, Outcome
 from fulmar_evaluation.faults.fault_environment import request_of
-from fulmar_evaluation.faults.fault_result import Finding, Outcome
-from fulmar_evaluation.faults.hand_faults import HAND_FAULTS
+from fulmar_evaluation.faults.hardware_faults import HARDWARE_FAULTS
 from fulmar_evaluation.faults.input_faults import INPUT_FAULTS
 from fulmar_evaluation.faults.live_system import NothingShown, live_system
-from fulmar_evaluation.faults.network_faults import NETWORK_FAULTS
+from fulmar_evaluation.faults.observer import BagEvidence, bag_evidence
+from fulmar_evaluation.faults.operator_faults import OPERATOR_FAULTS
 from fulmar_evaluation.faults.policy_faults import POLICY_FAULTS
 from fulmar_evaluation.faults.process_faults import PROCESS_FAULTS
 from fulmar_evaluation.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
 
 EVERY = (
     *PROCESS_FAULTS,
-    *ESTOP_FAULTS,
-    *HAND_FAULTS,
-    *DRIVER_FAULTS,
-    *BEARING_FAULTS,
+    *OPERATOR_FAULTS,
+    *HARDWARE_FAULTS,
     *INPUT_FAULTS,
     *COMMAND_FAULTS,
     *POLICY_FAULTS,
-    *NETWORK_FAULTS,
+    *CABLE_FAULTS,
 )
 ATTEMPTS = 3  # a robot may stand still just when something is done to it
 
@@ -93,13 +87,8 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
     return tuple(needed)
 
 
-def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[Finding]:
+def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[FaultResult]:
     """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
-
-    Args:
-        robot: Whose system.
-        faults: From `faults_of`.
-        progress: Told how many are over.
 
     Raises:
         FulmarError: The robot has no policy to run.
@@ -116,8 +105,8 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
     return findings
 
 
-def _found(robot: str, fault: Fault) -> Finding:
-    """What came of a fault; whatever prevents it is told, and the others go on."""
+def _found(robot: str, fault: Fault) -> FaultResult:
+    """What came of a fault; whatever prevents it is reported, and the others go on."""
     problem = ""
     for _ in range(ATTEMPTS):
         with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
@@ -131,12 +120,12 @@ def _found(robot: str, fault: Fault) -> Finding:
             except Exception as error:  # noqa: BLE001 - one fault that cannot be done must not lose the others
                 problem = f"{type(error).__name__}: {error}"
                 break
-    return Finding(fault.name, "", problem, None, None, None, None, passed=False)
+    return FaultResult(fault.name, "", problem, None, None, None, None, passed=False)
 
 
-def _finding(fault: Fault, outcome: Outcome, kept: Kept) -> Finding:
+def _finding(fault: Fault, outcome: Outcome, kept: BagEvidence) -> FaultResult:
     words = "; ".join(text for text in (outcome.reaction, kept.words and f"bag: {kept.words}") if text)
-    return Finding(
+    return FaultResult(
         fault.name,
         outcome.detected_by,
         words,
@@ -148,7 +137,7 @@ def _finding(fault: Fault, outcome: Outcome, kept: Kept) -> Finding:
     )
 
 
-def _done(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, Kept]:
+def _done(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, BagEvidence]:
     if not fault.about.two_hosts:
         return _do(robot, fault, folder, None)
     # In a process of its own: the middleware asks once in a process which networks there are.
@@ -156,15 +145,15 @@ def _done(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, Kept]:
         return pool.submit(_do_on_two_hosts, robot, fault, folder).result()
 
 
-def _do_on_two_hosts(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, Kept]:
+def _do_on_two_hosts(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, BagEvidence]:
     with environment(ACROSS), two_hosts() as hosts, inside(hosts.robot):
         return _do(robot, fault, folder, hosts)
 
 
-def _do(robot: str, fault: Fault, folder: Path, hosts: TwoHosts | None) -> tuple[Outcome, Kept]:
+def _do(robot: str, fault: Fault, folder: Path, hosts: TwoHosts | None) -> tuple[Outcome, BagEvidence]:
     request = request_of(robot, folder / "bag", fault.about)
     with live_system(request, fault.about, hosts) as live:
         if fault.begins:
             live.begin()
         outcome = fault.do(live)
-    return outcome, kept_of(request.record, live.witness, outcome.recorder_away)
+    return outcome, bag_evidence(request.record, live.observer, outcome.recorder_away)

@@ -31,7 +31,7 @@ TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454CA, 0x0002, 0x1000  # linux/if_tun.h
 CLONE_NEWNET = 0x40000000  # linux/sched.h
 NETNS = Path("/run/netns")  # where `ip netns` keeps them
 FRAME = 65536
-LOOK_S = 0.05  # how soon the cable hears that it shall end
+LOOK_S = 0.05  # how soon the cable notices that it shall end
 # What processes on them need in their environment: those of one machine else find each other's memory, past any cable.
 ACROSS = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
 _numbers = itertools.count()
@@ -115,9 +115,6 @@ def why_not() -> str:
 @contextlib.contextmanager
 def two_hosts(*, seed: int = 0) -> Iterator[TwoHosts]:
     """Make two hosts; everything of them is gone afterwards, also on errors. Processes on them need `ACROSS`.
-
-    Args:
-        seed: Of the frames' fates.
 
     Raises:
         RunFailed: They cannot be made; with what was said.

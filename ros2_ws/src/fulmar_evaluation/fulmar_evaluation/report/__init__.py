@@ -1,5 +1,5 @@
-"""One or several recorded runs as a page or a picture for people who see them for the first time."""
+"""Reports of recorded runs and of benchmarks: pages, plots and what writes them."""
 
-from fulmar_evaluation.report.writer import write_report
+from fulmar_evaluation.report.run_report import write_report
 
 __all__ = ["write_report"]

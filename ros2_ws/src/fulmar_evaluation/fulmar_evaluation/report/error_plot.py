@@ -1,4 +1,4 @@
-"""How a run went over time, by what its task asks: errors of place, heading and motion, or targets reached."""
+"""Errors of position, heading and motion over time, or targets reached, as the task asks."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator
 
 from fulmar_core.tasks.terms import Tolerance
-from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
-from fulmar_evaluation.report.view import View, judged
-from fulmar_evaluation.run_evaluation import Judgement
+from fulmar_evaluation.report.drawing import ANGLES, LENGTHS, limit_line, log_scale
+from fulmar_evaluation.report.run_view import View, evaluated
+from fulmar_evaluation.report.style import FAINT, quiet_grid
+from fulmar_evaluation.run_evaluation import RunResult
 
-LENGTHS = {0.001: "1 mm", 0.01: "1 cm", 0.1: "10 cm", 1.0: "1 m", 10.0: "10 m"}
-ANGLES = {0.01: "0.01°", 0.1: "0.1°", 1.0: "1°", 10.0: "10°", 100.0: "100°"}
 SPEEDS = {0.001: "1 mm/s", 0.01: "1 cm/s", 0.1: "10 cm/s", 1.0: "1 m/s", 10.0: "10 m/s"}
 TURN_RATES = {0.01: "0.01°/s", 0.1: "0.1°/s", 1.0: "1°/s", 10.0: "10°/s", 100.0: "100°/s"}
 
@@ -27,45 +26,30 @@ class Strip:
     label: str
     marks: dict[float, str]  # of the scale
     lowest: float
-    values: Callable[[Judgement], np.ndarray]
+    values: Callable[[RunResult], np.ndarray]
     tolerance: Callable[[Tolerance], float]  # 0: there is none
-    limit: str  # what stands beside the line of the tolerance
+    unit: str  # of the tolerance
 
 
 STRIPS = (
+    Strip("distance to goal", LENGTHS, 2e-3, lambda r: r.run.position_error[0], lambda t: t.position, "m"),
     Strip(
-        "distance to goal",
-        LENGTHS,
-        2e-3,
-        lambda j: j.run.position_error[0],
-        lambda t: t.position,
-        "{:g} m",
+        "heading error", ANGLES, 2e-2, lambda r: _deg(r.run.heading_error[0]), lambda t: t.heading_deg, "°"
     ),
-    Strip(
-        "heading error",
-        ANGLES,
-        2e-2,
-        lambda j: np.abs(np.rad2deg(j.run.heading_error[0])),
-        lambda t: t.heading_deg,
-        "{:g}°",
-    ),
-    Strip(
-        "velocity error",
-        SPEEDS,
-        2e-3,
-        lambda j: j.run.velocity_error[0],
-        lambda t: t.velocity,
-        "{:g} m/s",
-    ),
+    Strip("velocity error", SPEEDS, 2e-3, lambda r: r.run.velocity_error[0], lambda t: t.velocity, "m/s"),
     Strip(
         "turn rate error",
         TURN_RATES,
         2e-2,
-        lambda j: np.abs(np.rad2deg(j.run.yaw_rate_error[0])),
+        lambda r: _deg(r.run.yaw_rate_error[0]),
         lambda t: t.yaw_rate_deg,
-        "{:g}°/s",
+        "°/s",
     ),
 )
+
+
+def _deg(angle: np.ndarray) -> np.ndarray:
+    return np.asarray(np.abs(np.rad2deg(angle)))
 
 
 def strips(runs: Sequence[View]) -> list[Strip]:
@@ -73,7 +57,7 @@ def strips(runs: Sequence[View]) -> list[Strip]:
     return [
         strip
         for strip in STRIPS
-        if any(not np.isnan(strip.values(judgement)).all() for _, judgement in judged(runs))
+        if any(not np.isnan(strip.values(result)).all() for _, result in evaluated(runs))
     ] or list(STRIPS[:2])
 
 
@@ -87,11 +71,11 @@ def draw_progress(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> No
     for axes in rows[:-1]:
         axes.tick_params(labelbottom=False)
     rows[-1].set_xlabel("time [s]")
-    for _, judgement in judged(runs)[:1]:
-        hold_s = judgement.task.tolerance.hold_s
-        if hold_s > 0.0 and not judgement.counts:
+    for _, result in evaluated(runs)[:1]:
+        hold_s = result.task.tolerance.hold_s
+        if hold_s > 0.0 and not result.counts:
             rows[0].text(
-                0.5 * (judgement.window_start_s + judgement.duration_s),
+                0.5 * (result.window_start_s + result.duration_s),
                 1.02,
                 f"last {hold_s:g} s",
                 transform=rows[0].get_xaxis_transform(),
@@ -104,15 +88,15 @@ def draw_progress(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> No
 
 def counting(runs: Sequence[View]) -> bool:
     """Whether the task of the runs counts targets."""
-    return any(judgement.counts for _, judgement in judged(runs))
+    return any(result.counts for _, result in evaluated(runs))
 
 
 def _reached(axes: Axes, runs: Sequence[View]) -> None:
-    for run, judgement in judged(runs):
-        axes.step(judgement.time_s, judgement.run.goals[0], where="post", color=run.colour, label=run.label)
-        required = judgement.task.required
+    for run, result in evaluated(runs):
+        axes.step(result.time_s, result.run.goals[0], where="post", color=run.colour, label=run.label)
+        required = result.task.required
         if required is not None:
-            _limit(axes, required, f"{required} make a success")
+            limit_line(axes, required, f"{required} make a success")
     quiet_grid(axes)
     _span(axes, runs)
     axes.set_ylim(bottom=0.0)
@@ -129,29 +113,22 @@ def _top(axes: Axes, strip: Strip, limits: list[float]) -> float:
 
 
 def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
-    for run, judgement in judged(runs):
-        axes.plot(judgement.time_s, strip.values(judgement), color=run.colour, linewidth=1.2, label=run.label)
+    for run, result in evaluated(runs):
+        axes.plot(result.time_s, strip.values(result), color=run.colour, linewidth=1.2, label=run.label)
     quiet_grid(axes)
     _span(axes, runs)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(FixedLocator(list(strip.marks)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: strip.marks.get(value, "")))
-    axes.yaxis.set_minor_locator(NullLocator())
-    limits = [strip.tolerance(judgement.task.tolerance) for _, judgement in judged(runs)[:1]]
+    log_scale(axes.yaxis, strip.marks)
+    limits = [strip.tolerance(result.task.tolerance) for _, result in evaluated(runs)[:1]]
     axes.set_ylim(strip.lowest, _top(axes, strip, limits))
     axes.set_ylabel(strip.label)
-    for _, judgement in judged(runs):
-        if not judgement.counts:
-            axes.axvspan(judgement.window_start_s, judgement.duration_s, color=FAINT, alpha=0.12, linewidth=0)
+    for _, result in evaluated(runs):
+        if not result.counts:
+            axes.axvspan(result.window_start_s, result.duration_s, color=FAINT, alpha=0.12, linewidth=0)
     for limit in limits:
         if limit > 0.0:
-            _limit(axes, limit, f"tolerance {strip.limit.format(limit)}")
+            space = " " if strip.unit.startswith("m") else ""
+            limit_line(axes, limit, f"tolerance {limit:g}{space}{strip.unit}")
 
 
 def _span(axes: Axes, runs: Sequence[View]) -> None:
-    axes.set_xlim(0.0, max((judgement.duration_s for _, judgement in judged(runs)), default=1.0))
-
-
-def _limit(axes: Axes, value: float, label: str) -> None:
-    axes.axhline(value, color=INK, linestyle=DASHED, linewidth=1.0)
-    axes.text(0.005, value, label, transform=axes.get_yaxis_transform(), va="bottom", fontsize=8.5, color=INK)
+    axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))

@@ -1,16 +1,17 @@
-"""The report as one self-contained HTML page."""
+"""One HTML page that needs nothing from the network, built from paragraphs, tables and plots."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from datetime import datetime
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from html import escape
+from typing import Any
 
-from fulmar_evaluation.report.plots import Picture
+from matplotlib.figure import Figure
+
 from fulmar_evaluation.report.style import FAINT, INK, PAPER, as_svg
-from fulmar_evaluation.report.view import View
-from fulmar_evaluation.report.words import rule, table, verdict
 
+_REM_PER_INCH = 6.7  # so that a figure of full width fills the page of a benchmark
 STYLE = f"""
 :root {{ --ink: {INK}; --faint: #6b7280; --paper: {PAPER}; --card: #f4f5f7; --rule: #e3e5e9;
   color-scheme: light dark }}
@@ -24,11 +25,11 @@ h1 {{ font-size: 1.6rem; line-height: 1.2; margin: 0 0 .3rem }}
 h2 {{ font-size: 1.1rem; margin: 2.6rem 0 .4rem }}
 p {{ margin: .4rem 0 }}
 .faint, figcaption, td small {{ color: var(--faint); font-size: .9rem }}
-.verdicts {{ display: grid; gap: .8rem; margin: 1.4rem 0 .8rem;
+.results {{ display: grid; gap: .8rem; margin: 1.4rem 0 .8rem;
   grid-template-columns: repeat(auto-fit, minmax(16rem, 1fr)) }}
-.verdict {{ background: var(--card); border-left: .3rem solid var(--run); border-radius: .5rem;
+.result {{ background: var(--card); border-left: .3rem solid var(--run); border-radius: .5rem;
   padding: .9rem 1.1rem }}
-.verdict b {{ font-size: 1.25rem }}
+.result b {{ font-size: 1.25rem }}
 .scroll {{ overflow-x: auto }}
 table {{ border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }}
 th, td {{ padding: .4rem .6rem; border-bottom: 1px solid var(--rule); text-align: right;
@@ -43,110 +44,88 @@ figure svg text {{ font-family: system-ui, sans-serif !important }}
 code {{ font-size: .85rem; overflow-wrap: anywhere }}
 dt {{ margin-top: .7rem }} dd {{ margin: 0 }}
 """
+BENCHMARK_STYLE = """
+body { max-width: 64rem }
+h2 { font-size: 1.35rem; border-top: 1px solid var(--rule); padding-top: 1.6rem }
+h3 { font-size: 1.05rem; margin: 2rem 0 .4rem }
+td.good { color: #15803d; font-weight: 600 } td.bad { color: #d6336c; font-weight: 600 }
+@media (prefers-color-scheme: dark) { td.good { color: #5fcf8a } td.bad { color: #ff7aa2 } }
+nav { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem } nav a { color: inherit }
+.result { --run: var(--faint); margin: 1.2rem 0 }
+figure svg { min-width: min(40rem, var(--wide)); max-width: var(--wide) }
+"""
 
 
-def page(runs: Sequence[View], drawn: Sequence[Picture], title: str, mark: str) -> str:
-    """Lay out the page.
+@dataclass(frozen=True)
+class Plot:
+    """A drawn figure with its title and a caption for somebody who has never seen one."""
+
+    title: str
+    caption: str
+    figure: Figure
+    name: str = ""  # of its file, where it gets one
+
+
+Part = str | Plot  # of a page: an element of HTML, or a plot
+
+
+def html_page(
+    title: str, parts: Iterable[Part], *, style: str = "", mark: str = "", heading: str = "h2"
+) -> str:
+    """Build a page; call inside `house_style`.
 
     Args:
-        runs: The runs, in the order of the columns.
-        drawn: Pictures from `pictures`.
-        title: Heading of the page.
-        mark: Of the runs, from `sources.source_mark`.
-
-    Returns:
-        HTML that needs nothing from anywhere else.
+        title: Of the page.
+        parts: What follows the title, in order.
+        style: Rules beside `STYLE`.
+        mark: Of the runs, from `writer.source_mark`, where there are any.
+        heading: Tag of the titles of plots.
     """
-    body = [
-        f"<h1>{escape(title)}</h1>",
-        f'<p class="faint">{escape(_subtitle(runs))}</p>',
-        f'<div class="verdicts">{"".join(map(_verdict, runs))}</div>',
-        f'<p class="faint">{escape(rule(runs))}</p>',
-        *(_warning(run) for run in runs if run.record.warnings),
-        *(_beliefs(run) for run in runs if run.summary["beliefs"]),
-        "<h2>In figures</h2>",
-        _table(runs),
-        *map(_figure, drawn),
-        "<h2>Where this comes from</h2>",
-        f"<dl>{''.join(map(_origin, runs))}</dl>",
-    ]
+    body = [part if isinstance(part, str) else _plot(part, heading) for part in parts]
+    source = f'<meta name="fulmar-source" content="{escape(mark)}">' if mark else ""
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<meta name="fulmar-source" content="{escape(mark)}">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>\n"
-        + "\n".join(body)
+        f"{source}<title>{escape(title)}</title><style>{STYLE}{style}</style></head><body>\n"
+        + "\n".join([f"<h1>{escape(title)}</h1>", *body])
         + "\n</body></html>\n"
     )
 
 
-def _subtitle(runs: Sequence[View]) -> str:
-    first = runs[0]
-    parts = [str(first.summary["robot"] or "unknown robot").replace("_", " ")]
-    if first.judgement is not None:
-        parts.append(first.judgement.task.title)
-    parts.append(f"{first.summary['backend']} backend")
-    if len(first.record.motion):
-        parts.append(datetime.fromtimestamp(float(first.record.motion.log_s[0])).strftime("%-d %B %Y, %H:%M"))
-    return " · ".join(parts)
-
-
-def _run_colour(run: View) -> str:
-    return f'style="--run: {run.colour}"'
-
-
-def _name(run: View) -> str:
-    return f'<span class="dot"></span>{escape(run.label)}'
-
-
-def _verdict(run: View) -> str:
-    word, sentence = verdict(run)
-    text = f"{_name(run)}<br><b>{word}</b><p>{escape(sentence)}</p>"
-    return f'<div class="verdict" {_run_colour(run)}>{text}</div>'
-
-
-def _warning(run: View) -> str:
-    lines = "; ".join(run.record.warnings[:5])
-    return f'<p class="faint">{escape(run.label)}: part of the bag could not be read. {escape(lines)}</p>'
-
-
-def _beliefs(run: View) -> str:
-    return f"<p>{_name(run)}: at the end of the run, {escape(run.summary['beliefs'])}.</p>"
-
-
-def _table(runs: Sequence[View]) -> str:
-    heads = "".join(
-        f'<th {_run_colour(run)}><span class="dot"></span>{escape(run.label)}</th>' for run in runs
-    )
-    rows = "".join(
-        f"<tr><td>{escape(what)}{f'<small>{escape(why)}</small>' if why else ''}</td>"
-        + "".join(f"<td>{escape(cell)}</td>" for cell in cells)
-        + "</tr>"
-        for what, why, cells in table(runs)
-    )
-    return f'<div class="scroll"><table><tr><th></th>{heads}</tr>{rows}</table></div>'
-
-
-def _figure(picture: Picture) -> str:
+def _plot(plot: Plot, heading: str) -> str:
+    wide = f"--wide: {_REM_PER_INCH * plot.figure.get_figwidth():.1f}rem"
     return (
-        f"<h2>{escape(picture.title)}</h2><figure>{as_svg(picture.figure)}</figure>"
-        f'<p class="faint">{escape(picture.caption)}</p>'
+        f'<{heading}>{escape(plot.title)}</{heading}><figure style="{wide}">{as_svg(plot.figure)}</figure>'
+        f'<p class="faint">{escape(" ".join(plot.caption.split()))}</p>'
     )
 
 
-def _origin(run: View) -> str:
-    info = run.record.info
-    lines = [f"<code>{escape(str(info['command']))}</code>"] if info.get("command") else []
-    if info.get("name") not in (None, "", info.get("robot")):
-        lines.append(escape(f"{info['name']}, a {info.get('robot')}"))
-    lines.append(
-        f"bag <code>{escape(str(run.record.path))}</code>, seed {escape(str(info.get('seed', '–')))}"
-    )
-    versions = [f"Fulmar {info['fulmar_version']}"] if info.get("fulmar_version") else []
-    versions += [f"revision {info['git_revision']}"] if info.get("git_revision") else []
-    sha256 = run.record.controller.get("sha256")
-    versions += [f"controller SHA-256 {str(sha256)[:16]}"] if sha256 else []
-    lines.append(escape(", ".join(versions)))
-    return f"<dt {_run_colour(run)}>{_name(run)}</dt>" + "".join(
-        f'<dd class="faint">{line}</dd>' for line in lines if line
-    )
+def faint(*lines: str) -> list[str]:
+    """A paragraph of small print for each line."""
+    return [f'<p class="faint">{escape(line)}</p>' for line in lines]
+
+
+def table(heads: Sequence[str], rows: Iterable[str]) -> str:
+    """A table of heads and rows that are HTML already; wide ones scroll."""
+    return f'<div class="scroll"><table><tr>{"".join(heads)}</tr>{"".join(rows)}</table></div>'
+
+
+def cells(texts: Iterable[str], tag: str = "td") -> str:
+    """Cells of a table, from plain texts."""
+    return "".join(f"<{tag}>{escape(text)}</{tag}>" for text in texts)
+
+
+def headline(text: str) -> str:
+    """The result of a benchmark in one sentence."""
+    return f'<div class="result"><b>{escape(text)}</b></div>'
+
+
+def origin(document: dict[str, Any], file: str) -> list[str]:
+    """Section on where the figures of a benchmark come from."""
+    command = f'<p class="faint"><code>{escape(document["command"])}</code></p>'
+    revision = f", revision {document['git_revision']}" if document["git_revision"] else ""
+    return [
+        "<h2>Where this comes from</h2>",
+        *([command] if document["command"] else []),
+        *faint(f"Fulmar {document['fulmar_version']}{revision}. All figures are in {file}."),
+    ]

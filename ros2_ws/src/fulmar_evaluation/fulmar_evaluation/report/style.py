@@ -1,6 +1,6 @@
-"""Colours, type and axes that every picture shares.
+"""Colours, type and axes that every plot shares.
 
-Pictures in a page are drawn once and serve light and dark screens: what is drawn in INK, FAINT or PAPER
+Plots in a page are drawn once and serve light and dark screens: what is drawn in INK, FAINT or PAPER
 becomes a colour of the page's style sheet.
 """
 
@@ -32,24 +32,14 @@ OTHER_COLOURS = ("#8d62d9", "#3f9e4d", "#b8860b", "#5f7a8c")
 
 _RC = {
     "font.family": "sans-serif",
-    "font.size": 9.5,
-    "axes.titlesize": 9.5,
-    "axes.labelsize": 9.5,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize"), 9.5),
+    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.labelcolor", "ytick.labelcolor"), INK),
+    **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color", "grid.color"), FAINT),
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
     "axes.facecolor": "none",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
     "axes.linewidth": 0.8,
-    "text.color": INK,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "grid.color": FAINT,
     "grid.alpha": 0.22,
     "grid.linewidth": 0.6,
-    "legend.frameon": False,
     "legend.borderaxespad": 0.2,
     "lines.linewidth": 1.6,
     "lines.solid_capstyle": "round",
@@ -67,11 +57,7 @@ def house_style() -> Iterator[None]:
 
 
 def colours(controllers: Sequence[str]) -> list[str]:
-    """One colour for each run; two runs of one controller differ.
-
-    Args:
-        controllers: Name of the controller of each run.
-    """
+    """One colour for each run; two runs of one controller differ."""
     spare = iter(OTHER_COLOURS * (1 + len(controllers) // len(OTHER_COLOURS)))
     taken: list[str] = []
     for name in controllers:
@@ -106,7 +92,7 @@ def as_svg(figure: Figure) -> str:
 
 
 def as_png(figure: Figure, mark: str = "", *, dpi: int = 130) -> bytes:
-    """A figure as a picture file on white, with the mark of `report.sources` where one is given."""
+    """A figure as an image on white, with the mark of `report.writer` where one is given."""
     stream = BytesIO()
     metadata = {"Source": mark} if mark else {}
     figure.savefig(stream, format="png", dpi=dpi, facecolor="white", metadata=metadata)

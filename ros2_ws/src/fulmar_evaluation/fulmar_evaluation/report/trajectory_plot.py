@@ -9,42 +9,42 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from fulmar_core.rotation import yaw_of
+from fulmar_evaluation.report.drawing import draw_body, draw_discs, draw_goal, spaced
+from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
-from fulmar_evaluation.report.view import View, judged
-from fulmar_evaluation.run_evaluation import Judgement
+from fulmar_evaluation.run_evaluation import RunResult
 
 OUTLINES = 5  # of the body along the path
 CLOSE_UP = 2.4  # half width of the close look, in tolerances
 
 
 def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
-    """Paths, start, targets, what stands about, and the outline of the body at some instants."""
+    """Paths, start, targets, obstacles, and the outline of the body at some instants."""
     quiet_grid(axes)
     axes.set_aspect("equal")
-    for order, (run, judgement) in enumerate(judged(runs)):
+    for order, (run, result) in enumerate(evaluated(runs)):
         motion = run.record.motion
-        xy = motion.position[judgement.samples, :2]
+        xy = motion.position[result.samples, :2]
         axes.plot(*xy.T, color=run.colour, label=run.label, zorder=4)
-        radius = judgement.robot.body.radius
-        for index in _instants(xy):
-            yaw = float(yaw_of(motion.quat_xyzw[judgement.samples[index]]))
-            _body(axes, xy[index], yaw, radius, run.colour)
+        radius = result.robot.body.radius
+        for index in spaced(xy, OUTLINES):
+            yaw = float(yaw_of(motion.quat_xyzw[result.samples[index]]))
+            draw_body(axes, np.append(xy[index], yaw), result.robot.body, run.colour)
         if order == 0:
             _word(axes, "start", xy[0], radius, va="bottom")
-            for x, y, disc in run.record.obstacles:
-                axes.add_patch(Circle((x, y), disc, facecolor=FAINT, alpha=0.55, linewidth=0, zorder=3))
-        for x, y, _ in (pose.T for pose in judgement.things.values()):
+            draw_discs(axes, run.record.obstacles)
+        for x, y, _ in (pose.T for pose in result.things.values()):
             axes.plot(x, y, color=run.colour, linestyle=DASHED, linewidth=1.2, zorder=4)
             axes.plot(x[-1], y[-1], "s", color=run.colour, markersize=5, zorder=6)
-        if order == 0 and len(judgement.path):
-            axes.plot(*judgement.path.T, color=INK, linestyle=DASHED, linewidth=0.8, zorder=3)
-        if judgement.counts:
-            _waypoints(axes, judgement, named=order == 0)
-        elif has_place(judgement):
-            for target in _given(judgement):
-                _goal(axes, judgement, target, radius)
+        if order == 0 and len(result.path):
+            axes.plot(*result.path.T, color=INK, linestyle=DASHED, linewidth=0.8, zorder=3)
+        if result.counts:
+            _waypoints(axes, result, named=order == 0)
+        elif has_place(result):
+            for target in _given(result):
+                draw_goal(axes, target, result.task.tolerance, arrow=1.6 * radius)
             if order == 0:
-                _word(axes, "goal", judgement.targets[-1, :2], -radius, va="top")
+                _word(axes, "goal", result.targets[-1, :2], -radius, va="top")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     axes.margins(0.1)
@@ -55,14 +55,14 @@ def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
     quiet_grid(axes)
     axes.set_aspect("equal")
     half_cm = 15.0
-    for run, judgement in judged(runs):
-        tolerance_cm = 100.0 * judgement.task.tolerance.position
+    for run, result in evaluated(runs):
+        tolerance_cm = 100.0 * result.task.tolerance.position
         half_cm = CLOSE_UP * tolerance_cm
-        places = run.record.motion.position[judgement.samples, :2]
-        if judgement.task.subject in judgement.things:
-            places = judgement.things[judgement.task.subject][:, :2]
-        x, y = 100.0 * (places - judgement.targets[-1, :2]).T
-        late = judgement.time_s >= judgement.window_start_s
+        places = run.record.motion.position[result.samples, :2]
+        if result.task.subject in result.things:
+            places = result.things[result.task.subject][:, :2]
+        x, y = 100.0 * (places - result.targets[-1, :2]).T
+        late = result.time_s >= result.window_start_s
         axes.plot(x, y, color=run.colour, linewidth=1.0, alpha=0.35)
         axes.plot(x[late], y[late], color=run.colour, linewidth=1.8)
         axes.plot(x[-1], y[-1], "o", color=run.colour, markersize=5, markeredgecolor=PAPER, zorder=5)
@@ -74,9 +74,9 @@ def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
     axes.set_title("close to the goal")
 
 
-def has_place(judgement: Judgement) -> bool:
+def has_place(result: RunResult) -> bool:
     """Whether the goal is one place in the world."""
-    return judgement.task.goal_topic in ("goal_pose", "goal_point")
+    return result.task.goal_topic in ("goal_pose", "goal_point")
 
 
 def _word(axes: Axes, text: str, place: np.ndarray, away: float, *, va: str) -> None:
@@ -86,15 +86,15 @@ def _word(axes: Axes, text: str, place: np.ndarray, away: float, *, va: str) -> 
     axes.plot(x, y + 1.5 * away, linestyle="none")
 
 
-def _waypoints(axes: Axes, judgement: Judgement, *, named: bool) -> None:
+def _waypoints(axes: Axes, result: RunResult, *, named: bool) -> None:
     """Every waypoint with its number; those that were reached are filled."""
-    reached = int(judgement.run.goals[0, -1])
-    radius = judgement.task.tolerance.position
-    axes.plot(*judgement.targets[:, :2].T, color=FAINT, linestyle=DASHED, linewidth=0.7, zorder=1)
-    for number, (x, y, yaw) in enumerate(judgement.targets, start=1):
+    reached = int(result.run.goals[0, -1])
+    radius = result.task.tolerance.position
+    axes.plot(*result.targets[:, :2].T, color=FAINT, linestyle=DASHED, linewidth=0.7, zorder=1)
+    for number, (x, y, yaw) in enumerate(result.targets, start=1):
         fill = FAINT if number <= reached else PAPER
         axes.add_patch(Circle((x, y), radius, facecolor=fill, edgecolor=INK, linewidth=1.0, zorder=6))
-        if judgement.task.tolerance.heading_deg > 0.0:
+        if result.task.tolerance.heading_deg > 0.0:
             tip = np.array([x + 2.5 * radius * np.cos(yaw), y + 2.5 * radius * np.sin(yaw)])
             axes.plot([x, tip[0]], [y, tip[1]], color=INK, linewidth=1.0, zorder=6)
         if named:
@@ -103,40 +103,7 @@ def _waypoints(axes: Axes, judgement: Judgement, *, named: bool) -> None:
             )
 
 
-def _instants(xy: np.ndarray) -> list[int]:
-    """Samples that are evenly spaced along the path."""
-    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))))
-    return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], OUTLINES))).clip(0, len(xy) - 1).tolist()
-
-
-def _body(axes: Axes, centre: np.ndarray, yaw: float, radius: float, colour: str) -> None:
-    axes.add_patch(Circle(tuple(centre), radius, facecolor=colour, alpha=0.10, zorder=2))
-    axes.add_patch(
-        Circle(tuple(centre), radius, fill=False, edgecolor=colour, alpha=0.6, linewidth=0.9, zorder=3)
-    )
-    nose = centre + radius * np.array([np.cos(yaw), np.sin(yaw)])
-    axes.plot(*np.stack((centre, nose)).T, color=colour, linewidth=1.4, alpha=0.8, zorder=3)
-
-
-def _given(judgement: Judgement) -> np.ndarray:
+def _given(result: RunResult) -> np.ndarray:
     """Every place that was a goal at some time, in their order, shape (k, 3)."""
-    changed = np.any(np.diff(judgement.aims, axis=0, prepend=np.nan) != 0.0, axis=1)
-    return judgement.aims[changed]
-
-
-def _goal(axes: Axes, judgement: Judgement, target: np.ndarray, radius: float) -> None:
-    x, y, yaw = target
-    tolerance = judgement.task.tolerance
-    axes.add_patch(
-        Circle((x, y), tolerance.position, facecolor=PAPER, edgecolor=INK, linewidth=1.0, zorder=6)
-    )
-    if tolerance.heading_deg > 0.0:
-        tip = (x + 1.6 * radius * np.cos(yaw), y + 1.6 * radius * np.sin(yaw))
-        axes.plot(*tip, linestyle="none")  # makes room: arrows beyond the axes are not drawn
-        axes.annotate(
-            "",
-            tip,
-            (x, y),
-            arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0},
-            zorder=7,
-        )
+    changed = np.any(np.diff(result.aims, axis=0, prepend=np.nan) != 0.0, axis=1)
+    return result.aims[changed]

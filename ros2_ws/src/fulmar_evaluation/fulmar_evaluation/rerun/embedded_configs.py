@@ -1,4 +1,4 @@
-"""What a bag carries along of a robot, task or scenario that nobody knows here."""
+"""Robots, tasks, scenarios and the calibration that a bag embeds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bags.contents import Bag, open_bag
+from fulmar_bringup.bag_origin import CALIBRATION
 from fulmar_bringup.domains import environment
+from fulmar_core.calibration import VARIABLE
 from fulmar_core.controllers.classical import entry_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import OWN_FOLDERS, config_names
@@ -69,3 +71,15 @@ def knowing_what_they_carry(bags: Mapping[Path, Mapping[str, Any]]) -> Iterator[
     """The same for bags that are not open, by their records; only those with something unknown are opened."""
     with knowing_what_it_carries(*(open_bag(path) for path, info in bags.items() if unknown(info))):
         yield
+
+
+@contextlib.contextmanager
+def calibrated_as(bag: Bag) -> Iterator[None]:
+    """Load robots, here and in children, with the calibration that a bag carries along, or with none if it has none."""
+    with tempfile.TemporaryDirectory(prefix="fulmar_calibration_") as scratch:
+        path = Path(scratch) / CALIBRATION
+        carried = bag.attachments.get(CALIBRATION)
+        if carried is not None:
+            path.write_bytes(carried)
+        with environment({VARIABLE: str(path) if carried is not None else ""}):
+            yield

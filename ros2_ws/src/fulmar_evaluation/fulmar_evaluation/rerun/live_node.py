@@ -97,7 +97,7 @@ def rerun_through_node(
             f"{bag.path}: others recorded it, and a node takes odometry in its own frames only. Use --through direct."
         )
     if any(goal.index == ABSENT for goal in course.goals):
-        raise BagError("a node is told the recorded goals, and takes no --goal. Use --through direct.")
+        raise BagError("a node receives the recorded goals, and takes no --goal. Use --through direct.")
     if course.presses or course.settings.estop:
         raise BagError(
             f"{bag.path}: its e-stop goes by the clock on the wall, not by steps. Use --through direct."
@@ -131,7 +131,7 @@ def rerun_through_node(
 
 
 @dataclass
-class _Heard:
+class _Received:
     """What the node has said, by stamp [ns]."""
 
     changed: threading.Condition = field(default_factory=threading.Condition)
@@ -163,14 +163,14 @@ def _exchange(
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node("plant", namespace=namespace)
-        heard = _Heard()
-        wires = _Wires(node, course, heard)
+        received = _Received()
+        wires = _Wires(node, course, received)
 
         def fail(error: Exception) -> None:
-            heard.error = error
+            received.error = error
 
         with spinning(node, fail):
-            return _feed(raw, course, group, wires, heard)
+            return _feed(raw, course, group, wires, received)
     finally:
         rclpy.try_shutdown()
 
@@ -178,8 +178,8 @@ def _exchange(
 class _Wires:
     """Our endpoints: those of a plant and of an operator."""
 
-    def __init__(self, node: Node, course: ControlSteps, heard: _Heard) -> None:
-        self._node, self._heard = node, heard
+    def __init__(self, node: Node, course: ControlSteps, received: _Received) -> None:
+        self._node, self._received = node, received
         goal = GOAL_WIRES[course.task.goal_topic]
         self.odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
         self.goal = node.create_publisher(TYPES[goal.name], goal.name, publisher_qos(goal))
@@ -192,46 +192,46 @@ class _Wires:
         self.applied = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
         wire = command_wire(course.robot)
         by_velocity = wire is VELOCITY_COMMAND
-        self._listen(TwistStamped if by_velocity else JointState, wire, self._hear_command)
-        self._listen(JointState, OBSERVATION, self._hear_observation)
-        self._listen(JointState, ACTION, self._hear_action)
-        self._listen(DiagnosticArray, STATUS, self._hear_status)
-        self._listen(String, METADATA, self._hear_metadata)
+        self._subscribe(TwistStamped if by_velocity else JointState, wire, self._on_command)
+        self._subscribe(JointState, OBSERVATION, self._on_observation)
+        self._subscribe(JointState, ACTION, self._on_action)
+        self._subscribe(DiagnosticArray, STATUS, self._on_status)
+        self._subscribe(String, METADATA, self._on_metadata)
 
-    def _listen(self, kind: type, wire: Any, callback: Callable[[Any], None]) -> None:
+    def _subscribe(self, kind: type, wire: Any, callback: Callable[[Any], None]) -> None:
         qos = subscriber_qos(wire, reliable=True, depth=DEPTH)
 
         def locked(message: Any) -> None:
-            with self._heard.changed:
+            with self._received.changed:
                 callback(message)
-                self._heard.changed.notify_all()
+                self._received.changed.notify_all()
 
         self._node.create_subscription(kind, wire.name, locked, qos)
 
-    def _hear_command(self, message: Any) -> None:
+    def _on_command(self, message: Any) -> None:
         if isinstance(message, TwistStamped):
             values = [message.twist.linear.x, message.twist.angular.z]
         else:
             values = list(message.effort)
-        self._heard.commands.setdefault(stamp_ns(message.header.stamp), np.array(values))
+        self._received.commands.setdefault(stamp_ns(message.header.stamp), np.array(values))
 
-    def _hear_observation(self, message: Any) -> None:
-        self._heard.names = tuple(message.name)
-        self._heard.observations[stamp_ns(message.header.stamp)] = np.array(message.position)
+    def _on_observation(self, message: Any) -> None:
+        self._received.names = tuple(message.name)
+        self._received.observations[stamp_ns(message.header.stamp)] = np.array(message.position)
 
-    def _hear_action(self, message: Any) -> None:
-        self._heard.actions[stamp_ns(message.header.stamp)] = np.array(message.effort)
+    def _on_action(self, message: Any) -> None:
+        self._received.actions[stamp_ns(message.header.stamp)] = np.array(message.effort)
 
-    def _hear_status(self, message: Any) -> None:
+    def _on_status(self, message: Any) -> None:
         for status in message.status:
-            self._heard.status = {pair.key: pair.value for pair in status.values}
+            self._received.status = {pair.key: pair.value for pair in status.values}
 
-    def _hear_metadata(self, message: Any) -> None:
-        self._heard.metadata = json_object(message.data) or {}
+    def _on_metadata(self, message: Any) -> None:
+        self._received.metadata = json_object(message.data) or {}
 
     @property
     def matched(self) -> bool:
-        """Whether the node hears our odometry, and we hear all that it says of a step."""
+        """Whether the node receives our odometry, and we receive all that it publishes of a step."""
         said = (OBSERVATION.name, ACTION.name)
         return bool(self.odometry.get_subscription_count()) and all(
             self._node.count_publishers(name) for name in said
@@ -239,26 +239,26 @@ class _Wires:
 
 
 def _feed(
-    raw: dict[str, list[bytes]], course: ControlSteps, group: ProcessGroup, wires: _Wires, heard: _Heard
+    raw: dict[str, list[bytes]], course: ControlSteps, group: ProcessGroup, wires: _Wires, received: _Received
 ) -> tuple[Answers, str | None]:
     def wait(condition: Callable[[], bool], limit_s: float, what: str) -> None:
         until = time.monotonic() + limit_s
-        with heard.changed:
-            while not heard.changed.wait_for(condition, 0.05):
-                if heard.error is not None:
-                    raise RunFailed(f"the replay failed: {heard.error!r}") from heard.error
+        with received.changed:
+            while not received.changed.wait_for(condition, 0.05):
+                if received.error is not None:
+                    raise RunFailed(f"the replay failed: {received.error!r}") from received.error
                 end = group.ended()
                 if end is not None:
                     raise RunFailed(f"{end.text}; its own words are above")
                 if time.monotonic() > until:
                     raise RunFailed(f"the controller node {what} within {limit_s:g} s")
 
-    wait(lambda: wires.matched and bool(heard.metadata), START_TIMEOUT_S, "did not get ready")
+    wait(lambda: wires.matched and bool(received.metadata), START_TIMEOUT_S, "did not get ready")
     time.sleep(SETTLE_S)
     wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].value)))
     every = {name: getattr(course, name) for name in ("goals", "obstacles", "bearing")}
     every |= {thing.wire.name: course.things[thing.name] for thing in course.task.things}
-    told = {name: course.before(each) for name, each in every.items()}
+    messages = {name: course.before(each) for name, each in every.items()}
     applied_at = np.searchsorted(
         course.applied.stamp_ns, course.stamp_ns
     )  # the first state of each step or after it
@@ -268,9 +268,9 @@ def _feed(
     acted = np.zeros(count, dtype=bool)
     for step in range(count):
         stamp = int(course.stamp_ns[step])
-        _tell(step, told, raw, wires, wait, heard, streamed=course.settings.goals_streamed)
+        _publish(step, messages, raw, wires, wait, received, streamed=course.settings.goals_streamed)
         data = raw["odometry"][int(course.sample[step])]
-        answered = _answered(heard, stamp)
+        answered = _answered(received, stamp)
         until = time.monotonic() + ANSWER_TIMEOUT_S
         while not answered:
             if time.monotonic() > until:
@@ -278,27 +278,27 @@ def _feed(
                     f"the controller node did not answer step {step} within {ANSWER_TIMEOUT_S:g} s"
                 )
             wires.odometry.publish(data)
-            with heard.changed:
-                answered = heard.changed.wait_for(heard.command_to(stamp), RESEND_S)
+            with received.changed:
+                answered = received.changed.wait_for(received.command_to(stamp), RESEND_S)
             if not answered and group.ended() is not None:
                 wait(lambda: False, 0.0, "ended")
         expects = bool(course.acted[step])
-        with heard.changed:
-            both = heard.changed.wait_for(heard.reasons_for(stamp), REASONING_S if expects else 0.0)
-        commands[step] = heard.commands[stamp]
-        _tell_applied(course, step, applied_at, commands[step], wires)
+        with received.changed:
+            both = received.changed.wait_for(received.reasons_for(stamp), REASONING_S if expects else 0.0)
+        commands[step] = received.commands[stamp]
+        _publish_applied(course, step, applied_at, commands[step], wires)
         if both:
             acted[step] = True
-            shown[step], actions[step] = heard.observations[stamp], heard.actions[stamp]
-    terms = len(heard.names)
+            shown[step], actions[step] = received.observations[stamp], received.actions[stamp]
+    terms = len(received.names)
     observations = np.array([np.full(terms, np.nan) if row is None else row for row in shown])
     answers = Answers(
-        observations.reshape(count, terms), heard.names, actions, commands, acted, tuple([""] * count)
+        observations.reshape(count, terms), received.names, actions, commands, acted, tuple([""] * count)
     )
-    return answers, heard.metadata.get("sha256")
+    return answers, received.metadata.get("sha256")
 
 
-def _tell_applied(
+def _publish_applied(
     course: ControlSteps, step: int, applied_at: np.ndarray, answer: np.ndarray, wires: _Wires
 ) -> None:
     """Publish what the actuators did from a step to the next as recorded; the answer where that is not known."""
@@ -310,9 +310,9 @@ def _tell_applied(
         wires.applied.publish(write.write(answer, int(course.stamp_ns[step])))
 
 
-def _answered(heard: _Heard, stamp: int) -> bool:
-    with heard.changed:
-        return stamp in heard.commands
+def _answered(received: _Received, stamp: int) -> bool:
+    with received.changed:
+        return stamp in received.commands
 
 
 def _raw_messages(bag: Bag, course: ControlSteps, odometry: str | None) -> dict[str, list[bytes]]:
@@ -325,28 +325,25 @@ def _raw_messages(bag: Bag, course: ControlSteps, odometry: str | None) -> dict[
     }
 
 
-def _tell(
+def _publish(
     step: int,
-    told: dict[str, dict[int, list[Received]]],
+    messages: dict[str, dict[int, list[Received]]],
     raw: dict[str, list[bytes]],
     wires: _Wires,
     wait: Callable[[Callable[[], bool], float, str], None],
-    heard: _Heard,
+    received: _Received,
     *,
     streamed: bool,
 ) -> None:
-    """Publish what was told before a step, as the very bytes that were recorded, and wait until it is known."""
-    publishers = {
-        "bearing": wires.bearing,
-        "obstacles": wires.obstacles,
-        "goals": wires.goal,
-        **wires.things,
-    }
+    """Publish what was received before a step, as the very bytes that were recorded, and wait until the node has it."""
+    publishers = {"bearing": wires.bearing, "obstacles": wires.obstacles, "goals": wires.goal, **wires.things}
     echoes = {"obstacles": "obstacles_stamp_ns", "goals": "goal_stamp_ns"}
     for name, publisher in publishers.items():
-        for each in told[name].get(step, ()):
+        for each in messages[name].get(step, ()):
             publisher.publish(raw[name][each.index])
             if name == "bearing":
                 flush([publisher], FLUSH_S)  # its state has no stamp: it must come before the odometry
             if name in echoes and not (streamed and name == "goals"):
-                wait(heard.echo_of(echoes[name], each.stamp_ns), START_TIMEOUT_S, f"did not take its {name}")
+                wait(
+                    received.echo_of(echoes[name], each.stamp_ns), START_TIMEOUT_S, f"did not take its {name}"
+                )

@@ -28,7 +28,7 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
 )
 from fulmar_evaluation.rerun.replay_controllers import answers_of
-from fulmar_evaluation.rerun.rerun_result import judge_answers
+from fulmar_evaluation.rerun.rerun_result import compare_answers
 
 STEPS = 100  # control steps of each
 SEED = 11
@@ -71,14 +71,11 @@ REFERENCES = (
 
 
 def record_reference(reference: Reference, folder: Path) -> Path:
-    """Run through the deployed nodes in MuJoCo, and keep what a controller was told and answered.
+    """Run through the deployed nodes in MuJoCo, and keep what a controller received and answered.
 
     Args:
         reference: What to run.
         folder: Where the reference bags are; an older one of the same name is replaced.
-
-    Returns:
-        The bag.
 
     Raises:
         RunFailed: The run did not come to its end.
@@ -145,7 +142,8 @@ def _write_kept(bag: Bag, folder: Path, task: Task) -> None:
     )
     by_name = {topic.name: topic for _, topic in topics}
     for log, name, index in every:
-        writer.write(name, by_name[name].data[index], log_ns=log)
+        topic = by_name[name]
+        writer.write(name, topic.data[index], log_ns=log, publish_ns=topic.publish_ns[index])
     writer.close()
 
 
@@ -157,20 +155,17 @@ def _stamps(topic: Topic) -> list[int]:
 def check_reference(path: Path) -> list[Field]:
     """Run a reference bag again, from its odometry on: gates, observations, actions, commands.
 
-    Args:
-        path: The bag.
-
     Returns:
         Every field, with where it differs.
 
     Raises:
         BagError: The bag cannot be read whole.
     """
-    from policy_server.shipped import shipped_policy
+    from policy_server.controllers import shipped_policy
 
     bag = open_bag(path)
     course = control_steps_of(bag)
     name = str((bag.info or {}).get("controller"))
     folder = shipped_policy(course.robot.name, course.task.name) if name == "policy" else None
     answers, _ = answers_of(course, name, str(folder or ""), "odometry")
-    return judge_answers(course, answers, TOLERANCES)
+    return compare_answers(course, answers, TOLERANCES)

@@ -1,4 +1,4 @@
-"""The controllers that go through a recorded run again: the one that is asked, its fallback, and who took over."""
+"""The controllers that go through a recorded run again: the chosen one, its fallback, and who took over."""
 
 from __future__ import annotations
 

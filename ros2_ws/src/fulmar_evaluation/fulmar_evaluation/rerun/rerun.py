@@ -120,7 +120,8 @@ class _Rerun:
             course.task,
             settings,
             ControllerSwitch(
-                Standby(controller, "", ""), warm_up(fallback, course.robot, course.task) if fallback else None
+                Standby(controller, "", ""),
+                warm_up(fallback, course.robot, course.task) if fallback else None,
             ),
             self._estop,
             gate=InputGate(course.robot.limits, frozen_after=0),
@@ -146,17 +147,17 @@ class _Rerun:
         changes = course.before(course.changes) if self._load else {}
         guard.loop.controller.reset()
         for step in range(count):
-            for told in obstacles.get(step, ()):
-                guard.take_obstacles(told.value, told.stamp_ns)
+            for message in obstacles.get(step, ()):
+                guard.take_obstacles(message.value, message.stamp_ns)
             for name, poses in things.items():
-                for told in poses.get(step, ()):
-                    guard.take_thing(name, told.value, told.stamp_ns)
-            for told in bearing.get(step, ()):
-                guard.take_bearing(bool(told.value))
-            for told in goals.get(step, ()):
-                guard.take_goal(told.value, told.stamp_ns, told.log_ns)
-            for told in changes.get(step, ()):
-                guard.switch.propose(self._successor(*told.value))
+                for message in poses.get(step, ()):
+                    guard.take_thing(name, message.value, message.stamp_ns)
+            for message in bearing.get(step, ()):
+                guard.take_bearing(bool(message.value))
+            for message in goals.get(step, ()):
+                guard.take_goal(message.value, message.stamp_ns, message.log_ns)
+            for message in changes.get(step, ()):
+                guard.switch.propose(self._successor(*message.value))
             guard.switch_controller()
             reasons[step], inputs = self._inputs(step)
             if inputs is not None:

@@ -1,5 +1,5 @@
-"""The findings of DRIFT's benchmark as a page with pictures."""
+"""The result of the benchmark as a page with plots."""
 
-from fulmar_benchmarks.drift.report.writer import write_report
+from fulmar_benchmarks.drift.report.sections import write_report
 
 __all__ = ["write_report"]

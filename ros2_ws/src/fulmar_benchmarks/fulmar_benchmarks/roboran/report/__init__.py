@@ -1,5 +1,5 @@
-"""The findings of a benchmark as a page with pictures, for people who see them for the first time."""
+"""The result of the benchmark as a page with plots."""
 
-from fulmar_benchmarks.roboran.report.writer import write_report
+from fulmar_benchmarks.roboran.report.sections import write_report
 
 __all__ = ["write_report"]

@@ -1,46 +1,112 @@
-"""The pictures of each task, each with words for somebody who has never seen one."""
+"""Report of the benchmark: its sections, tables and plots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.roboran.campaign import Findings
-from fulmar_benchmarks.roboran.report.curve_plot import curve_of, draw_curves
-from fulmar_benchmarks.roboran.report.headline_plot import draw_headline
-from fulmar_benchmarks.roboran.report.map_plot import draw_map
-from fulmar_benchmarks.roboran.report.path_plot import draw_paths
-from fulmar_benchmarks.roboran.report.scene_plot import draw_courses, draw_scenes_with_obstacles
-from fulmar_benchmarks.roboran.report.spread_plot import draw_spreads
-from fulmar_benchmarks.roboran.report.time_plot import draw_errors_over_time, draw_goals_over_time
-from fulmar_benchmarks.roboran.report.velocity_plot import draw_velocities
+from fulmar_benchmarks.cells import MARKS, spoken
+from fulmar_benchmarks.roboran.campaign import CampaignResult
+from fulmar_benchmarks.roboran.cells import conclusion, head, missing, notes, rows
+from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
+from fulmar_benchmarks.roboran.report.path_plots import (
+    draw_paths,
+    draw_scenes_with_obstacles,
+    draw_waypoint_paths,
+)
+from fulmar_benchmarks.roboran.report.spread_plots import draw_map, draw_spreads
+from fulmar_benchmarks.roboran.report.time_plots import (
+    curve_of,
+    draw_curves,
+    draw_errors_over_time,
+    draw_goals_over_time,
+    draw_velocities,
+)
 from fulmar_benchmarks.roboran.report.view import View, views
+from fulmar_core.figures import FIGURES, SUCCESS
 from fulmar_core.metrics import counts_targets
-from fulmar_evaluation.report.plots import Picture
+from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table
+from fulmar_evaluation.report.style import house_style
+from fulmar_evaluation.report.writer import write_benchmark
 
 Add = Callable[[str, str, str, Figure], None]  # name of the file, title, caption
 
 
-def headline(findings: Findings) -> Picture:
-    """All pairs at a glance; call inside `house_style`."""
+def write_report(result: CampaignResult, out: Path) -> Path:
+    """Write the page and its plots into a folder; returns the page."""
+    with house_style():
+        return write_benchmark(out, "Fulmar beside RoboRAN", _parts(result))
+
+
+def _parts(result: CampaignResult) -> list[Part]:
+    document = result.document
+    tasks = dict.fromkeys(entry["task"] for entry in document["pairs"])
+    robots = ", ".join(spoken(robot) for robot in dict.fromkeys(e["robot"] for e in document["pairs"]))
     caption = """
     The further right, the better. A filled dot is our success in the core's batch, a diamond the same in MuJoCo,
     where nothing was trained; both should lie right of the upright stroke, which is what is required. The grey ring
     is what the thesis reports, with its spread over training seeds. Where waypoints are counted, ours is the share
     of what physics allows; the thesis reports no such share."""
-    return Picture("At a glance", _words(caption), draw_headline(findings.document))
+    parts: list[Part] = [
+        *faint(
+            f"{robots}: learned and classical controllers on the tasks of the El-Hariry thesis, chapter 4"
+        ),
+        headline(conclusion(document)),
+        "<nav>" + "".join(f'<a href="#{task}">{escape(spoken(task))}</a>' for task in tasks) + "</nav>",
+        Plot("At a glance", caption, draw_glance(document), "at_a_glance"),
+        *faint(*notes(document)),
+    ]
+    for task in tasks:
+        parts.append(f'<h2 id="{task}">{escape(spoken(task))}</h2>')
+        parts += _table(task, [entry for entry in document["pairs"] if entry["task"] == task])
+        parts += _plots(result, task)
+    return [
+        *parts,
+        "<h2>What the figures mean</h2>",
+        f"<dl>{_meanings(document)}</dl>",
+        *origin(document, "roboran.json"),
+    ]
 
 
-def pictures_of(findings: Findings, task: str) -> list[tuple[str, Picture]]:
-    """Pictures of one task with the names of their files; call inside `house_style`."""
-    runs = views(findings, task)
+def _table(task: str, entries: Sequence[dict[str, Any]]) -> list[str]:
+    shown = [entry for entry in entries if entry["ways"]]
+    lines = faint(*(missing(entry) for entry in entries if missing(entry)))
+    if not shown:
+        return lines
+    heads = cells(["", *map(head, shown)], "th")
+    body = (
+        f"<tr>{cells([row.title])}"
+        + "".join(
+            f'<td class="{cell.tone}">{escape(cell.text + MARKS[cell.tone])}</td>' for cell in row.cells
+        )
+        + "</tr>"
+        for row in rows(task, shown)
+    )
+    return [table([heads], body), *lines]
+
+
+def _meanings(document: dict[str, Any]) -> str:
+    """Of the figures that are in the document."""
+    used = {name for entry in document["pairs"] for way in entry["ways"].values() for name in way}
+    entries = [("success", SUCCESS)]
+    entries += [(figure.title, figure.meaning) for name, figure in FIGURES.items() if name in used]
+    return "".join(
+        f'<dt>{escape(title)}</dt><dd class="faint">{escape(meaning)}</dd>' for title, meaning in entries
+    )
+
+
+def _plots(result: CampaignResult, task: str) -> list[Plot]:
+    runs = views(result, task)
     if not runs:
         return []
-    drawn: list[tuple[str, Picture]] = []
+    drawn: list[Plot] = []
 
     def add(name: str, title: str, caption: str, figure: Figure) -> None:
-        drawn.append((f"{task}_{name}", Picture(title, _words(caption), figure)))
+        drawn.append(Plot(title, caption, figure, f"{task}_{name}"))
 
     learned = [run for run in runs if curve_of(run)]
     if learned:
@@ -48,7 +114,7 @@ def pictures_of(findings: Findings, task: str) -> list[tuple[str, Picture]]:
             "learning",
             "How fast it was learned",
             """
-            Success on held-out episodes each time the learner was checked, over the wall-clock of training on two
+            Success on held-out episodes each time the learner was evaluated, over the wall-clock of training on two
             cores. Dashed: what is required of the finished policy. A curve that rises steeply and stays up is good.""",
             draw_curves(learned),
         )
@@ -66,12 +132,12 @@ def pictures_of(findings: Findings, task: str) -> list[tuple[str, Picture]]:
         "map",
         "Where it is hard",
         """
-        The mean share of the bound over how far apart an episode's waypoints are and how sharply its course turns:
+        The mean share of the bound over how far apart an episode's waypoints are and how sharply its path turns:
         the darker a field, the more is left to gain."""
         if shares
         else f"""
         The share of failed episodes over {"the last wanted velocity" if tracks else "where they begin"}. Pale fields
-        have no failures, white ones too few episodes; a dark corner tells what the controller cannot do. The number
+        have no failures, white ones too few episodes; a dark corner is where the controller fails. The number
         above each panel counts all failures; where it is small, single episodes make the colours.""",
         draw_map(runs),
     )
@@ -92,11 +158,11 @@ def _to_a_place(runs: list[View], add: Add) -> None:
     turned = runs[0].task.tolerance.heading_deg > 0.0
     add(
         "paths",
-        "The ways, seen from above",
+        "Paths, seen from above",
         f"""
         The first {len(runs[0].main.paths)} episodes, moved {"and turned " if turned else ""}so that all goals lie in
         the middle{", with the wanted heading along the arrow" if turned else ""}. Dots are starts, the small circle is
-        the tolerance. Red ways do not end well.""",
+        the tolerance. Red paths do not end well.""",
         draw_paths(runs),
     )
     _errors(runs, add)
@@ -105,10 +171,10 @@ def _to_a_place(runs: list[View], add: Add) -> None:
 def _with_obstacles(runs: list[View], add: Add) -> None:
     add(
         "paths",
-        "Around what stands in the way",
+        "Around obstacles",
         """
         Of each robot two episodes: above one with many obstacles that went well, below one that did not, if there is
-        one (red). Grey discs are obstacles; the pale outlines show the robot along its way, the stroke inside where
+        one (red). Grey discs are obstacles; the pale outlines show the robot along its path, the stroke inside where
         it is heading.""",
         draw_scenes_with_obstacles(runs),
     )
@@ -131,19 +197,19 @@ def _with_velocities(runs: list[View], add: Add) -> None:
 def _with_waypoints(runs: list[View], add: Add) -> None:
     add(
         "paths",
-        "The courses, seen from above",
+        "Waypoints, seen from above",
         """
         Of each robot the episode that is nearest to its own median. Waypoints are visited in the order of their
         numbers, round after round; a circle is as near as counts, coloured if it was reached. The pale outlines show
-        the robot along its way.""",
-        draw_courses(runs),
+        the robot along its path.""",
+        draw_waypoint_paths(runs),
     )
     add(
         "time",
         "Waypoints over time",
         """
         The line is the median of all episodes, the dark band holds the middle half of them and the pale band nine in
-        ten. Up to the dashed line the share of the bound is judged; the triangle is that bound, the ring what the
+        ten. Up to the dashed line the share of the bound counts; the triangle is that bound, the ring what the
         thesis counts in its 1,000 control steps.""",
         draw_goals_over_time(runs),
     )
@@ -159,7 +225,3 @@ def _errors(runs: list[View], add: Add) -> None:
         ten. {logarithmic}Dashed is the tolerance, which success demands throughout the shaded window at the end.""",
         draw_errors_over_time(runs),
     )
-
-
-def _words(text: str) -> str:
-    return " ".join(text.split())

@@ -1,4 +1,4 @@
-"""One robot at one task made ready for drawing: its outcomes, name and colour."""
+"""One robot at one task prepared for drawing: its results, name and colour."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.cells import head
-from fulmar_benchmarks.outcomes import Judged
-from fulmar_benchmarks.roboran.campaign import Findings
+from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.roboran.campaign import CampaignResult
+from fulmar_benchmarks.roboran.cells import head
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
+from fulmar_evaluation.report.drawing import columns
 from fulmar_evaluation.report.style import INK, OTHER_COLOURS
 
-WIDTH = 9.2  # of a picture [inch]
-# A robot keeps its colour from picture to picture; each is readable on white and on near-black.
+# A robot keeps its colour from plot to plot; each is readable on white and on near-black.
 ROBOT_COLOURS = {"floating_platform": "#3b7ddd", "kingfisher": "#1a9e84", "turtlebot2": "#d9780f"}
 
 
@@ -28,7 +28,7 @@ class View:
 
     entry: dict[str, Any]  # of the document
     training: dict[str, Any]  # how the policy was made; empty for a classical controller
-    outcomes: dict[str, Judged]  # by way
+    outcomes: dict[str, PairResult]  # by way
     colour: str
 
     @property
@@ -37,7 +37,7 @@ class View:
         return head(self.entry)
 
     @property
-    def main(self) -> Judged:
+    def main(self) -> PairResult:
         """What is drawn where one way is enough: the batch, if there is one."""
         return next(iter(self.outcomes.values()))
 
@@ -57,7 +57,7 @@ class View:
         return float(self.main.about["control_dt"])
 
 
-def views(findings: Findings, task: str) -> list[View]:
+def views(findings: CampaignResult, task: str) -> list[View]:
     """Pairs of one task that have figures: of each robot its policy, else its classical controller."""
     chosen: dict[str, View] = {}
     spare = iter(OTHER_COLOURS)
@@ -78,19 +78,18 @@ def panels(
         runs: The pairs.
         height: Of the whole figure [inch].
         rows: Panels of each pair.
-        lines: That `told` will write below the title.
+        lines: That `note` will write below the title.
         options: For `Figure.subplots`.
 
     Returns:
         The figure, and its axes of shape (rows, pairs).
     """
-    figure = Figure(figsize=(WIDTH * min(1.0, (len(runs) + 0.4) / 3.4), height), layout="constrained")
-    axes = figure.subplots(rows, len(runs), squeeze=False, **options)
+    figure, axes = columns(len(runs), height, rows, **options)
     for one, run in zip(axes[0], runs, strict=True):
         one.set_title(run.label, color=run.colour, fontweight="bold", loc="left", pad=5.0 + 13.0 * lines)
     return figure, axes
 
 
-def told(axes: Axes, text: str) -> None:
+def note(axes: Axes, text: str) -> None:
     """Write a line between a panel and its title."""
     axes.text(0.0, 1.015, text, transform=axes.transAxes, fontsize=8.5, va="bottom", color=INK)

@@ -1,0 +1,225 @@
+"""The document as rows of cells, and as tables in a terminal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from fulmar_benchmarks.cells import BAD, GOOD, NOTHING, Cell, spoken
+
+LAWS = {"lqr": "LQR", "polar": "polar law", "line_of_sight": "line of sight", "pure_pursuit": "pure pursuit"}
+WAYS = {"batch": "batch", "mujoco": "MuJoCo", "ros": "ROS"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity of several pairs."""
+
+    title: str
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One figure beside the thesis' own."""
+
+    title: str
+    unit: str
+    figure: str  # of `fulmar_core.figures`
+    thesis: str  # key of an entry's `thesis`; empty: it has none
+    digits: int
+    factor: float = 1.0  # from our unit to this one
+
+
+_COMMON = (Quantity("control deviation", "", "control_deviation", "control_variation", 2),)
+_TO_A_PLACE = (
+    Quantity("final distance", "m", "final_position_error_m", "final_distance", 3),
+    Quantity("time to target", "s", "time_to_target_s", "time_to_target_s", 1),
+    *_COMMON,
+)
+QUANTITIES = {
+    "go_to_position": _TO_A_PLACE,
+    "go_to_pose": (
+        _TO_A_PLACE[0],
+        Quantity("heading error", "°", "final_heading_error_deg", "heading_error", 2),
+        *_TO_A_PLACE[1:],
+    ),
+    "track_velocities": (
+        Quantity("velocity error", "m/s", "velocity_error_m_s", "velocity_error", 3),
+        Quantity(
+            "turn-rate error", "rad/s", "yaw_rate_error_deg_s", "yaw_rate_error", 3, 0.017453292519943295
+        ),
+        Quantity("settling time", "s", "settling_time_s", "", 1),
+        *_COMMON,
+    ),
+    "go_through_positions": (
+        Quantity("goals in 60 s", "", "goals_reached", "", 2),
+        Quantity("bound in 60 s", "", "goals_bound", "", 2),
+        Quantity("bound at top speed in 60 s", "", "goals_at_top_speed", "", 2),
+        Quantity("share of that", "", "share_at_top_speed", "", 3),
+        Quantity("goals in 1,000 steps", "", "goals_in_1000_steps", "goals", 2),
+        Quantity("goals in 100 s", "", "goals_in_100_s", "goals", 2),
+        *_COMMON,
+    ),
+    "go_to_position_with_obstacles": (
+        _TO_A_PLACE[0],
+        Quantity("collided", "", "collided", "", 3),
+        *_TO_A_PLACE[1:],
+    ),
+}
+
+
+def head(entry: dict[str, Any]) -> str:
+    """Title of a pair's column."""
+    name = spoken(entry["robot"])
+    if entry["kind"] == "policy":
+        return name
+    return f"{name}, {entry['kind'] if entry['law'] is None else LAWS.get(entry['law'], 'classical')}"
+
+
+def missing(entry: dict[str, Any]) -> str:
+    """Why a pair has no figures, or not all; empty where nothing is missing."""
+    return "" if entry["status"] == "judged" else f"{head(entry)}: {entry['status']}: {entry['reason']}"
+
+
+def rows(task: str, entries: list[dict[str, Any]]) -> list[Row]:
+    """Every quantity of a task, a cell for each pair; figures are means of its first way."""
+    figure = "share of the bound" if task == "go_through_positions" else "success"
+    ways = [way for way in WAYS if any(way in entry["ways"] for entry in entries)]
+    table = [Row(f"{figure}, {WAYS[way]}", tuple(_judged(entry, way) for entry in entries)) for way in ways]
+    table += [
+        Row("required", tuple(_required(entry) for entry in entries)),
+        Row("thesis: success", tuple(_thesis_success(entry) for entry in entries)),
+        Row("batch and MuJoCo apart by", tuple(_gap(entry) for entry in entries)),
+        Row(
+            "batch, of MuJoCo's episodes",
+            tuple(Cell(_number(entry["judged_in_batch_on_mujocos_episodes"], 3)) for entry in entries),
+        ),
+        Row("trained in, on two cores", tuple(_training(entry) for entry in entries)),
+    ]
+    for quantity in QUANTITIES.get(task, _COMMON):
+        unit = f" [{quantity.unit}]" if quantity.unit else ""
+        table.append(Row(quantity.title + unit, tuple(_beside(entry, quantity) for entry in entries)))
+    return [row for row in table if any(cell.text not in ("", NOTHING) for cell in row.cells)]
+
+
+def _checks(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    return {check["name"]: check for check in entry["verdicts"]}
+
+
+def _judged(entry: dict[str, Any], way: str) -> Cell:
+    return Cell(_number(entry["judged"].get(way), 3), _tone(_checks(entry).get(way)))
+
+
+def _required(entry: dict[str, Any]) -> Cell:
+    check = _checks(entry).get("batch")
+    return Cell("" if check is None else f"≥ {check['limit']:.2f}")
+
+
+def _thesis_success(entry: dict[str, Any]) -> Cell:
+    thesis = entry["thesis"]
+    return Cell("" if thesis["success"] is None else f"{thesis['success']:.2f} ± {thesis['success_std']:.2f}")
+
+
+def _gap(entry: dict[str, Any]) -> Cell:
+    check = _checks(entry).get("batch_minus_mujoco")
+    if check is None and {"batch", "mujoco"} <= set(entry["judged"]):
+        return Cell(_number(abs(entry["judged"]["batch"] - entry["judged"]["mujoco"]), 3))
+    return Cell(_number(None if check is None else check["measured"], 3), _tone(check))
+
+
+def _training(entry: dict[str, Any]) -> Cell:
+    ours, theirs = entry["training_s"], entry["thesis"]["training_min"]
+    if ours is None:
+        return Cell(NOTHING)
+    text = f"{ours:.0f} s" if theirs is None else f"{ours:.0f} s ({60.0 * theirs:.0f} s)"
+    return Cell(text, _tone(_checks(entry).get("training_s")))
+
+
+def _beside(entry: dict[str, Any], quantity: Quantity) -> Cell:
+    way: dict[str, Any] = next(iter(entry["ways"].values()), {})
+    mean = way.get(quantity.figure, {}).get("mean")
+    if mean is None:
+        return Cell(NOTHING)
+    ours, theirs = _number(quantity.factor * mean, quantity.digits), entry["thesis"].get(quantity.thesis)
+    return Cell(ours if theirs is None else f"{ours} ({theirs:.{min(quantity.digits, 2)}f})")
+
+
+def _tone(check: dict[str, Any] | None) -> str:
+    if check is None or check["met"] is None:
+        return ""
+    return GOOD if check["met"] else BAD
+
+
+def _number(value: float | None, digits: int) -> str:
+    return NOTHING if value is None else f"{value:.{digits}f}"
+
+
+_MARKS = {GOOD: "[green]{} ✓[/]", BAD: "[bold red]{} ✗[/]", "": "{}"}
+_PLACES = {"batch": "the batch", "mujoco": "MuJoCo", "ros": "ROS"}
+_WIDTH = 140  # where nobody looks at a terminal, lines need not fit one
+
+
+def print_tables(document: dict[str, Any], output: Console) -> None:
+    """Print one table a task, what the figures are, and the conclusion."""
+    width = None if output.is_terminal else _WIDTH
+    wide = output if width is None else Console(highlight=False, emoji=False, width=width)
+    for task in dict.fromkeys(entry["task"] for entry in document["pairs"]):
+        entries = [entry for entry in document["pairs"] if entry["task"] == task]
+        shown = [entry for entry in entries if entry["ways"]]
+        if shown:
+            wide.print(_table(task, shown))
+        for entry in entries:
+            if missing(entry):
+                wide.print(f"{spoken(task)}, {missing(entry)}", markup=False, style="yellow", soft_wrap=True)
+    for line in notes(document):
+        wide.print(line, markup=False, soft_wrap=True)
+    wide.print(conclusion(document), markup=False, soft_wrap=True)
+
+
+def conclusion(document: dict[str, Any]) -> str:
+    """One sentence on what was required and met."""
+    asked, met, open_ = document["asked"], document["met"], document["open"]
+    return f"{met} of {asked} pairs meet every requirement" + (
+        f"; {open_} could not be evaluated in full." if open_ else "."
+    )
+
+
+def notes(document: dict[str, Any]) -> list[str]:
+    """What one has to know to read the tables."""
+    ways = ", ".join(
+        f"{episodes:,} episodes in {_PLACES[way]}" for way, episodes in document["episodes"].items()
+    )
+    lines = [
+        f"{ways}; scenario {document['scenario']}, seed {document['seed']}. In brackets: the thesis (Tables 4.6 and "
+        "4.7, its times from control steps at 10 Hz; its control variation is another sum). Figures below the line of "
+        "training are means over the episodes of the first way."
+    ]
+    seen: dict[str, str] = {}
+    for entry in document["pairs"]:
+        for way in entry["ways"].values():
+            if "bound" in way:
+                seconds = f"1,000 steps are {way['thousand_steps_s']:g} s"
+                seen[spoken(entry["robot"])] = f"{way['bound']}; {seconds} at {way['control_hz']:g} Hz"
+    lines += [f"bound for {robot}: {rule}." for robot, rule in seen.items()]
+    compared = [entry for entry in document["pairs"] if entry["same_at_64_worlds"] is not None]
+    if compared:
+        same = sum(entry["same_at_64_worlds"] for entry in compared)
+        lines.append(
+            f"{same} of {len(compared)} pairs give the same numbers, bit for bit, in small batches as in large ones."
+        )
+    return lines
+
+
+def _table(task: str, entries: list[dict[str, Any]]) -> Table:
+    table = Table(title=spoken(task), title_justify="left")
+    table.add_column("")
+    for entry in entries:
+        table.add_column(head(entry), justify="right")
+    for row in rows(task, entries):
+        table.add_row(escape(row.title), *(_MARKS[cell.tone].format(cell.text) for cell in row.cells))
+    return table

@@ -1,0 +1,75 @@
+"""Values of options that are written as text: names, areas, goals and poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.safety.geofence import check_area
+
+Area = tuple[float, float, float, float]  # x_min, x_max, y_min, y_max [m]
+
+
+def read_names(text: str, family: str, known: Sequence[str]) -> tuple[str, ...]:
+    """Read names with commas between them, in the order of those known; `all` stands for every one.
+
+    Raises:
+        UnknownNameError: For the first that is not known.
+    """
+    names = {name.strip() for name in text.split(",") if name.strip()}
+    for name in sorted(names - {"all"}):
+        if name not in known:
+            raise UnknownNameError(family, name, known)
+    return tuple(name for name in known if name in names or "all" in names)
+
+
+def read_area(text: str | None) -> Area | None:
+    """Read `x_min,x_max,y_min,y_max` of --area [m].
+
+    Raises:
+        ConfigError: If it is not such an area.
+    """
+    wanted = "x_min,x_max,y_min,y_max in m with x_min < x_max and y_min < y_max, such as --area=-2,2,-1,1."
+
+    def is_area(values: tuple[float, ...]) -> bool:
+        check_area(values)
+        return True
+
+    return _read(text, "--area", wanted, is_area)
+
+
+def read_goal(text: str | None, option: str = "--goal") -> tuple[float, ...] | None:
+    """Read `x,y` or `x,y,deg`: x [m], y [m] and, for a pose, heading [deg].
+
+    Raises:
+        ConfigError: If it is not two or three finite numbers.
+    """
+    wanted = (
+        "two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
+        f"Example: {option} 1,-0.5 or {option} 1,-0.5,90"
+    )
+    return _read(text, option, wanted, lambda values: len(values) in (2, 3))
+
+
+def read_pose(text: str | None, option: str) -> tuple[float, float, float] | None:
+    """Read `x,y,deg`: x [m], y [m] and heading [deg].
+
+    Raises:
+        ConfigError: If it is not three finite numbers.
+    """
+    wanted = f"three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90"
+    return _read(text, option, wanted, lambda values: len(values) == 3)
+
+
+def _read(text: str | None, option: str, wanted: str, fits: Callable[[tuple[float, ...]], bool]) -> Any:
+    if text is None:
+        return None
+    try:
+        values = tuple(float(part) for part in text.split(","))
+        if all(map(math.isfinite, values)) and fits(values):
+            return values
+    except ValueError:  # of a part, or of `fits`
+        pass
+    raise ConfigError(f"{option} = '{text}' must be {wanted}")

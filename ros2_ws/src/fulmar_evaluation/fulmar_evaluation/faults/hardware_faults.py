@@ -1,0 +1,103 @@
+"""Faults of hardware: a late air bearing, a driver that dies or hangs."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Bool
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.robot import Robot
+from fulmar_core.safety.arbiter import BEARING_OFF
+from fulmar_core.topics import AIR_BEARING, TRUTH
+from fulmar_evaluation.faults.fault import Fault, Outcome
+from fulmar_evaluation.faults.fault_environment import FAR_M, FaultEnvironment
+from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.observer import wait_for
+from fulmar_evaluation.faults.process_faults import signalled
+from fulmar_ros.qos import subscriber_qos
+from hardware_drivers.settings import KingfisherNmea, Kobuki, hardware_of, load_hardware
+from sim_nodes.emulators import kingfisher, kobuki
+
+SCENARIO = "bearing_late"
+MARGIN_S = 5.0  # a run begins up to so long after everything is ready
+APART_S = 0.05  # two messages that were sent one after the other may come so long apart in the other order
+REACHED_M, WAY_S = 0.1, 40.0  # from the goal; a way of 6 m takes 15 s
+
+
+def bearing_late(live: LiveSystem) -> Outcome:
+    """Air comes 3 s after the start: no valve opens before it, and the goal is reached afterwards."""
+    air: list[tuple[float, bool]] = []
+    distance: list[float] = [math.inf]
+
+    def on_air(message: Bool) -> None:
+        air.append((time.monotonic(), bool(message.data)))
+
+    def on_truth(message: Odometry) -> None:
+        place = message.pose.pose.position
+        distance[0] = math.hypot(place.x - FAR_M, place.y)
+
+    subscribe, observer = live.bystander.create_subscription, live.observer
+    subscribe(Bool, AIR_BEARING.name, on_air, subscriber_qos(AIR_BEARING))
+    subscribe(Odometry, TRUTH.name, on_truth, subscriber_qos(TRUTH))
+    live.begin()
+    moved = wait_for(observer.moves, load_scenario(SCENARIO).bearing_late_s[1] + MARGIN_S)
+    off_s = next((received_s for received_s, on in air if not on), None)
+    on_s = next((received_s for received_s, on in air if on), math.inf)
+    first_s = next((received_s for received_s, moves in observer.applied_since(0.0) if moves), math.inf)
+    said = next((word for word in observer.statements_since(0.0) if word.text == BEARING_OFF), None)
+    if not moved or off_s is None or said is None:
+        return Outcome(
+            "", "no valve opened" if not moved else "nothing said that the air bearing is off", False
+        )
+    if first_s < on_s - APART_S:
+        return Outcome(said.who, f"valves opened {on_s - first_s:.2f} s before the air bearing was on", False)
+    reached = wait_for(lambda: distance[0] < REACHED_M, WAY_S)
+    words = (
+        f"{said.text} for {on_s - off_s:.1f} s, and no valve opens; then the goal is "
+        f"{'reached' if reached else f'missed by {distance[0]:.2f} m'}"
+    )
+    return Outcome(said.who, words, passed=reached)
+
+
+def _without_bearing(robot: Robot) -> str:
+    return "" if robot.air_bearing else f"'{robot.name}' has no air bearing"
+
+
+# What a device waits for its driver before it stops by itself [s].
+OWN_TIMEOUT_S = {Kobuki: kobuki.TIMEOUT_S, KingfisherNmea: kingfisher.TIMEOUT_S}
+REPORTS_S = 0.05  # an emulator moves and reports at its own rate
+
+
+def driver_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that owns the device: the device's own watchdog stops it."""
+    return _driver(live, signal.SIGKILL)
+
+
+def driver_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the same."""
+    return _driver(live, signal.SIGSTOP)
+
+
+def _driver(live: LiveSystem, number: signal.Signals) -> Outcome:
+    own_s = OWN_TIMEOUT_S[type(load_hardware(live.plan.hardware).driver)]
+    return signalled(live, "plant", number, own_s + live.tick_s + REPORTS_S)
+
+
+def _without_watchdog(robot: Robot) -> str:
+    files = hardware_of(robot.name)
+    if not files:
+        return f"there is no driver for '{robot.name}'"
+    if type(load_hardware(files[0]).driver) not in OWN_TIMEOUT_S:
+        return "its device has no watchdog of its own: only hardware can close the valves then"
+    return ""
+
+
+HARDWARE_FAULTS = (
+    Fault(driver_killed, FaultEnvironment(emulated=True), _without_watchdog),
+    Fault(driver_hangs, FaultEnvironment(emulated=True), _without_watchdog),
+    Fault(bearing_late, FaultEnvironment(scenario=SCENARIO), _without_bearing, begins=False),
+)

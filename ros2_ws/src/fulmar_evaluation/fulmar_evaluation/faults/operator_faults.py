@@ -1,0 +1,101 @@
+"""Faults of operator inputs: a volatile e-stop publisher, a teleoperation node that dies."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import rclpy
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Bool
+
+from fulmar_core.errors import RunFailed
+from fulmar_core.teleop import JoyLayout
+from fulmar_core.topics import ESTOP, JOY
+from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment
+from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.observer import wait_for
+from fulmar_ros.qos import publisher_qos
+
+DEFAULT_QOS = 10  # a depth alone: reliable and volatile
+NODES = 4  # plant, controller, e-stop node and recorder subscribe the e-stop
+MATCH_S = 10.0
+
+
+def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
+    """One message; the e-stop node, which goes on publishing, must not end it."""
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
+    try:
+        publisher = node.create_publisher(Bool, ESTOP.name, DEFAULT_QOS)
+        # A volatile publisher matches one of the two subscriptions of each node.
+        if not wait_for(lambda: publisher.get_subscription_count() >= NODES, MATCH_S):
+            raise RunFailed(f"fewer than {NODES} nodes subscribe {publisher.topic_name} within {MATCH_S:g} s")
+        since_s = live.until_it_moves()
+        # The very next tick may be safe: a state that still moves the robot must be on record, at most two ticks old.
+        wait_for(lambda: any(moves for _, moves in live.observer.applied_since(since_s)), STAYS_S)
+        publisher.publish(Bool(data=True))
+        return stopped(live, since_s, live.silenced_s)
+    finally:
+        node.destroy_node()
+
+
+GAMEPAD_S = 0.05  # between its messages
+TAKES_S = 10.0  # for a gamepad to be received, on a busy machine
+LAYOUT = JoyLayout()
+
+
+def teleop_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that carries a hand, while it drives."""
+    return _hand(live, signal.SIGKILL)
+
+
+def teleop_hangs(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the same."""
+    return _hand(live, signal.SIGSTOP)
+
+
+def _hand(live: LiveSystem, number: signal.Signals) -> Outcome:
+    """The robot stops, and the controller, which goes on commanding, does not get it back by that."""
+    live.until_it_moves()
+    with _held_gamepad(live):
+        if not wait_for(lambda: _commanded_by(live) == "person", TAKES_S):
+            raise RunFailed(f"the hand did not get the robot within {TAKES_S:g} s")
+        since_s = live.until_it_moves()
+        live.send("teleop", number)
+        return stopped(live, since_s, live.silenced_s)
+
+
+def _commanded_by(live: LiveSystem) -> str:
+    words = [word for word in live.observer.statements_since(0.0) if word.who == "plant"]
+    return words[-1].values.get("commanded_by", "") if words else ""
+
+
+@contextmanager
+def _held_gamepad(live: LiveSystem) -> Iterator[None]:
+    """A gamepad whose switch is held and whose stick is pushed ahead."""
+    axes, buttons = [0.0] * (max(LAYOUT.axes) + 1), [0] * (LAYOUT.give_back_button + 1)
+    axes[LAYOUT.ahead_axis], buttons[LAYOUT.deadman_button] = 1.0, 1
+    publisher = live.bystander.create_publisher(Joy, JOY.name, publisher_qos(JOY))
+    over = threading.Event()
+
+    def hold() -> None:
+        while not over.wait(GAMEPAD_S):
+            publisher.publish(Joy(axes=axes, buttons=buttons))
+
+    thread = threading.Thread(target=hold, name="gamepad", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+OPERATOR_FAULTS = (
+    Fault(estop_pressed_once_by_a_volatile_publisher),
+    Fault(teleop_killed, FaultEnvironment(by_hand=True)),
+    Fault(teleop_hangs, FaultEnvironment(by_hand=True)),
+)

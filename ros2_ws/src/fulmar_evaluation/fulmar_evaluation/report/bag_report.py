@@ -1,0 +1,171 @@
+"""Report of a bag that names no task: path, speed, actuator commands, delays and rates.
+
+Runs of Fulmar have a task and a goal; `run_report` draws them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fulmar_bags.contents import Bag
+from fulmar_bags.decode import TWIST, Odometries, Vectors, joint_vectors, odometries, twist_vectors
+from fulmar_bags.figures import describe
+from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
+from fulmar_evaluation.report.style import CONTROLLER_COLOURS, legend, quiet_grid
+from fulmar_evaluation.report.writer import write_document
+
+WIDTH = 6.2  # [inch]
+COLOUR = CONTROLLER_COLOURS["policy"]
+COMMANDS = {
+    "sensor_msgs/msg/JointState": lambda topic: joint_vectors(topic, "effort"),
+    "geometry_msgs/msg/TwistStamped": twist_vectors,
+    TWIST: twist_vectors,
+}
+MOST_ACTUATORS = 16
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One plot before it is drawn."""
+
+    title: str
+    caption: str
+    height: float  # [inch]
+    draw: Callable[[Axes], None]
+
+
+def write_bag_report(
+    bag: Bag, out: Path, odometry: str | None = None, *, note: str = "", force: bool = True
+) -> Path:
+    """Draw a bag.
+
+    Args:
+        bag: Any bag with odometry.
+        out: A `.html` page that works offline, or a `.png` image. Its folder is made.
+        odometry: Topic, where there are several.
+        note: A sentence for the page.
+        force: Replace whatever file is there; False: only a report of the same bag.
+
+    Raises:
+        BagError: The bag holds no odometry.
+        ConfigError: As `write_document` says.
+    """
+    topic = bag.odometry(odometry)
+    drawings, title = _drawings(bag, odometries(topic)), f"{bag.path.name}: {topic.name}"
+
+    def page(mark: str) -> str:
+        parts: list[Part] = [f"<p>{escape(note)}</p>"] if note else []
+        parts += [Plot(each.title, each.caption, _sheet([each], WIDTH)) for each in drawings]
+        return html_page(title, [*parts, *_rates(describe(bag)["topics"])], mark=mark)
+
+    return write_document(
+        out, [bag.path], page=page, sheet=lambda: _sheet(drawings, WIDTH + 1.0, title), force=force
+    )
+
+
+def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
+    time_s = (seen.stamp_ns - seen.stamp_ns[0]) / 1e9 if len(seen) else np.zeros(0)
+    speed = np.hypot(seen.twist[:, 0], seen.twist[:, 1])
+
+    def path(axes: Axes) -> None:
+        axes.plot(seen.pose[:, 0], seen.pose[:, 1], color=COLOUR)
+        if len(seen):
+            axes.plot(*seen.pose[0, :2], "o", color=COLOUR, fillstyle="none", label="begin")
+            axes.plot(*seen.pose[-1, :2], "o", color=COLOUR, label="end")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]")
+        legend(axes, loc="best")
+
+    def pace(axes: Axes) -> None:
+        axes.plot(time_s, speed, color=COLOUR, label="speed [m/s]")
+        axes.plot(time_s, seen.twist[:, 5], color=CONTROLLER_COLOURS["lqr"], label="turn rate [rad/s]")
+        axes.set_xlabel("time [s]")
+        legend(axes, loc="best", ncols=2)
+
+    def delay(axes: Axes) -> None:
+        late = (seen.log_ns - seen.stamp_ns).astype(float)
+        axes.plot(time_s, (late - late.min()) / 1e6 if len(late) else late, ".", ms=2.0, color=COLOUR)
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("delay [ms]")
+
+    found = [
+        Drawing("The path, seen from above", "As the odometry reports it.", 4.0, path),
+        Drawing("How fast", "Speed and turn rate in the body's frame.", 2.2, pace),
+    ]
+    for topic in bag.topics.values():
+        if topic.type in COMMANDS and len(topic):
+            vectors = COMMANDS[topic.type](topic)
+            if len(vectors) and 0 < len(vectors.names) <= MOST_ACTUATORS:
+                found.append(_actuators(topic.name, vectors, _seconds(vectors, seen, topic.type == TWIST)))
+    found.append(
+        Drawing(
+            "How late the odometry came", "Recorded minus stamped, beyond the quickest message.", 2.0, delay
+        )
+    )
+    return found
+
+
+def _seconds(vectors: Vectors, seen: Odometries, unstamped: bool) -> np.ndarray:
+    """Times of vectors since the first odometry; of those without stamps, by when both were recorded [s]."""
+    if not len(seen):
+        return (vectors.stamp_ns - vectors.stamp_ns[0]) / 1e9
+    if not unstamped:
+        return (vectors.stamp_ns - seen.stamp_ns[0]) / 1e9
+    logs, stamps = (times - times[0] for times in (seen.log_ns, seen.stamp_ns))
+    return np.interp(vectors.log_ns - seen.log_ns[0], logs, stamps) / 1e9
+
+
+def _actuators(name: str, vectors: Vectors, time_s: np.ndarray) -> Drawing:
+    largest = float(np.abs(vectors.values).max()) or 1.0
+
+    def draw(axes: Axes) -> None:
+        for row, label in enumerate(vectors.names):
+            level = len(vectors.names) - 1 - row
+            axes.step(
+                time_s, level + 0.4 * vectors.values[:, row] / largest, where="post", color=COLOUR, lw=0.9
+            )
+            axes.text(
+                -0.01, level, label, transform=axes.get_yaxis_transform(), ha="right", va="center", fontsize=7
+            )
+        axes.set_yticks([])
+        axes.set_xlabel("time [s]")
+
+    caption = f"The full height of a row is {largest:.3g}."
+    return Drawing(f"What the actuators did: {name}", caption, 0.8 + 0.28 * len(vectors.names), draw)
+
+
+def _sheet(drawings: Sequence[Drawing], width: float, title: str = "") -> Figure:
+    """Drawings below one another; with a title over the sheet, each has its own."""
+    heights = [drawing.height for drawing in drawings]
+    figure = Figure(figsize=(width, sum(heights)), layout="constrained")
+    axes = figure.subplots(len(drawings), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for one, drawing in zip(axes, drawings, strict=True):
+        drawing.draw(one)
+        one.set_title(drawing.title if title else "")
+        quiet_grid(one)
+    if title:
+        figure.suptitle(title, fontweight="bold")
+    return figure
+
+
+def _rates(topics: Sequence[dict[str, Any]]) -> list[str]:
+    """Counts, rates and gaps of the topics as a table."""
+
+    def number(value: float | None, digits: int) -> str:
+        return "–" if value is None else f"{value:.{digits}f}"
+
+    heads = cells(("topic", "messages", "rate [Hz]", "longest gap [s]"), "th")
+    rows = [
+        (topic["name"], str(topic["count"]), number(topic["rate_hz"], 2), number(topic["longest_gap_s"], 3))
+        for topic in topics
+    ]
+    return ["<h2>Rates</h2>", table([heads], (f"<tr>{cells(row)}</tr>" for row in rows))]

@@ -1,0 +1,43 @@
+"""Robots whose dead valves leave no pose to hold are asked for the place above all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from training.vec_env import BatchVecEnv
+from training.worlds import training_task
+
+ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
+UNCONTROLLABLE = load_scenario("drift_stranded")
+
+
+def rewards(task, scenario):
+    worlds = BatchVecEnv(ROBOT, task, scenario, worlds=16, seed=3)
+    worlds.reset()
+    return worlds.step(np.zeros((16, 8), dtype=np.int8))[1]
+
+
+def test_uncontrollable_robots_are_rewarded_by_their_own_weights():
+    meant = replace(TASK, reward_weights=TASK.stranded_weights, stranded_weights=None)
+    np.testing.assert_array_equal(rewards(TASK, UNCONTROLLABLE), rewards(meant, UNCONTROLLABLE))
+    plain = rewards(replace(TASK, stranded_weights=None), UNCONTROLLABLE)
+    assert np.abs(plain - rewards(meant, UNCONTROLLABLE)).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("task", "scenario"),
+    [
+        ("drift_go_to_pose", "drift_two_lost"),
+        ("go_to_pose", "drift_stranded"),
+        ("go_to_position", "drift_stranded"),
+    ],
+)
+def test_everyone_else_is_asked_for_what_the_task_says(task, scenario):
+    plain = load_task(task)
+    assert training_task(plain, load_scenario(scenario)) is plain
