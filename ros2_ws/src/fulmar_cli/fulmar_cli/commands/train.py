@@ -112,7 +112,7 @@ def _learn_once(job: Job, *, resumes: bool, as_json: bool) -> None:
             if (job.out / RUN_FILE).is_file() and (job.out / NETWORK_FILE).is_file():
                 log_line(f"to export the best policy so far: fulmar export {job.out} --out DIR")
             raise
-    parts = [record, record.get("specialist", {"steps": 0, "wall_s": 0.0})]
+    parts = [record, record.get("fallback_policy", {"steps": 0, "wall_s": 0.0})]
     steps, wall_s = (sum(part[key] for part in parts) for key in ("steps", "wall_s"))
     log_line(f"learned from {steps:,} steps in {wall_s:.0f} s; evaluating in MuJoCo")
     figures = evaluate_in_mujoco(job.out, episodes=job.episodes)
