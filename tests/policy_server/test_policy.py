@@ -82,14 +82,14 @@ def linear_network(
         helper.make_node("Greater", [names[2], "zero"], ["open"]),
         helper.make_node("Cast", ["open"], [names[1]], to=kind),
     ]
-    inputs = [helper.make_tensor_value_info(names[0], kind, [batch, inputs])]
+    takes = [helper.make_tensor_value_info(names[0], kind, [batch, inputs])]
     if extra:
-        inputs.append(helper.make_tensor_value_info("zero", kind, [1]))
+        takes.append(helper.make_tensor_value_info("zero", kind, [1]))
     constants = [numpy_helper.from_array(weights, "w")]
     if not extra:
         constants.append(numpy_helper.from_array(np.zeros(1, np.float32), "zero"))
     gives = [helper.make_tensor_value_info(name, kind, [batch, outputs]) for name in names[1:]]
-    graph = helper.make_graph(nodes, "g", inputs, gives, constants)
+    graph = helper.make_graph(nodes, "g", takes, gives, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
     observations = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
     logits, none = observations @ weights, np.zeros((4, 0), np.float32)
@@ -118,14 +118,14 @@ def counting_network(*, gives="next_memory", memory=2):
         numpy_helper.from_array(scale, "scale"),
         numpy_helper.from_array(np.float32(0.25), "quarter"),
     ]
-    inputs = [
+    takes = [
         helper.make_tensor_value_info("observation", kind, ["worlds", inputs]),
         helper.make_tensor_value_info("memory", kind, ["worlds", memory]),
     ]
-    outputs = [
+    results = [
         helper.make_tensor_value_info(name, kind, ["worlds", 2]) for name in ("command", "logits", gives)
     ]
-    graph = helper.make_graph(nodes, "g", inputs, outputs, constants)
+    graph = helper.make_graph(nodes, "g", takes, results, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
     seen = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
     before = np.random.default_rng(3).normal(size=(4, 2)).astype(np.float32)
@@ -266,7 +266,7 @@ def test_corrupted_bytes_are_refused(folder, name):
         ({"control_hz": 10.0}, "was trained at 10 Hz, but would run at 5 Hz"),
         ({"observation_names": TASK.observation_names[::-1]}, "observation 1 is"),
         ({"actuator_names": ROBOT.actuators.names[::-1]}, "actuator 1 is"),
-        ({"action": "continuous"}, "gives continuous commands, 'floating_platform' inputs on_off"),
+        ({"action": "continuous"}, "gives continuous commands, 'floating_platform' takes on_off"),
         ({"command_scale": (2.0,) * 8}, "was trained for full commands of [2.0,"),
         ({"format": 0}, "has format 0"),
     ],
@@ -294,7 +294,7 @@ def test_a_file_that_is_no_network_is_refused(folder):
         ({"names": ("obs", "command", "logits")}, "has no tensor 'observation', only obs"),
         ({"names": ("observation", "action", "logits")}, "has no tensor 'command', only action, logits"),
         ({"names": ("observation", "command", "scores")}, "has no tensor 'logits', only command, scores"),
-        ({"extra": True}, "inputs observation, zero; it must take 'observation' alone"),
+        ({"extra": True}, "takes observation, zero; it must take 'observation' alone"),
     ],
 )
 def test_a_network_of_another_shape_is_refused(folder, wrong, words):
@@ -396,8 +396,8 @@ def test_every_row_of_a_batch_has_a_memory_of_its_own(remembering):
     ("change", "words"),
     [
         ({"memory": 3}, "'memory' has shape ['worlds', 2], the passport needs (any number, 3)"),
-        ({"memory": 0}, "inputs observation, memory; it must take 'observation' alone"),
-        ({"action": "on_off"}, "gives on_off commands, 'turtlebot2' inputs continuous"),
+        ({"memory": 0}, "takes observation, memory; it must take 'observation' alone"),
+        ({"action": "on_off"}, "gives on_off commands, 'turtlebot2' takes continuous"),
     ],
 )
 def test_a_memory_or_a_kind_of_command_that_the_passport_does_not_tell_is_refused(remembering, change, words):
