@@ -1,4 +1,4 @@
-# `make help` shows what can be asked for. Nothing here is installed outside `.venv`.
+# `make help` shows what can be asked for. Nothing here is installed outside `.venv` and `.venv-peers`.
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -10,11 +10,15 @@ PYTEST_ARGS ?=
 
 VENV := .venv
 BIN := $(VENV)/bin
+# Outside programs that tests compare with: what they need may contradict our own locks.
+PEERS := .venv-peers
 RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
-# Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`.
+PEERS_LOCK := requirements-peers.lock
+# Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last one of .venv-peers.
 RUN_SIZE := 884
 DEV_SIZE := 7053
+PEERS_SIZE := 8452
 
 # A sourced ROS shell puts its own packages before those of .venv; the two must not mix.
 unexport PYTHONPATH
@@ -25,16 +29,18 @@ unexport PYTHONDONTWRITEBYTECODE
 key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
 RUN_STAMP := $(VENV)/.run-$(call key,$(RUN_LOCK))
 DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
+# Nothing of ours is installed beside the peers, so their lock alone counts.
+PEERS_STAMP := $(PEERS)/.peers-$(firstword $(shell cksum < $(PEERS_LOCK)))
 
 # Turns pip's long log into one line that counts: on a terminal it rewrites itself, in a log every tenth is kept.
-# Errors go past it unchanged.
+# Errors go past it unchanged. Arguments: lock, size [MiB], environment.
 define install_lock
 total=$$(grep -c '==' $(1)); \
 echo "Installing from $(1): at most $$total packages, exact versions, hashes checked."; \
 free=$$(df -BM --output=avail . | tail -n 1 | tr -dc 0-9); \
-echo "$(VENV) takes $(2) MiB; $$free MiB are free on this disk."; \
+echo "$(3) takes $(2) MiB; $$free MiB are free on this disk."; \
 if [ "$$free" -lt $(2) ]; then echo "Less is free than an install from nothing takes: make room, or stop with Ctrl-C." >&2; fi; \
-PYTHONUNBUFFERED=1 $(BIN)/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
+PYTHONUNBUFFERED=1 $(3)/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
 	--require-hashes -r $(1) | { \
 	seen=0; \
 	while read -r verb what rest; do case "$$verb" in \
@@ -63,15 +69,18 @@ setup: $(RUN_STAMP) ## Install what a robot or a simulation needs (no torch; 0.9
 .PHONY: dev
 dev: $(DEV_STAMP) ## Install everything, also for training and tests (6.9 GiB)
 
-$(VENV)/bin/python:
+.PHONY: peers
+peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.3 GiB)
+
+$(VENV)/bin/python $(PEERS)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
 		echo "'$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true), but Fulmar needs Python 3.11, 3.12 or 3.13." >&2; \
 		echo "Name one that you have: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
-	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+	@$(PYTHON) -m venv $(@:/bin/python=) || { rm -rf $(@:/bin/python=); \
 		echo "'$(PYTHON) -m venv' failed, see above. On Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 
 $(RUN_STAMP): | $(VENV)/bin/python
-	@$(call install_lock,$(RUN_LOCK),$(RUN_SIZE))
+	@$(call install_lock,$(RUN_LOCK),$(RUN_SIZE),$(VENV))
 	@$(install_fulmar)
 	@rm -f $(VENV)/.run-*
 	@touch $@
@@ -79,11 +88,19 @@ $(RUN_STAMP): | $(VENV)/bin/python
 
 # The development lock contains the run-time lock, version for version, so it sets both stamps.
 $(DEV_STAMP): | $(VENV)/bin/python
-	@$(call install_lock,$(DEV_LOCK),$(DEV_SIZE))
+	@$(call install_lock,$(DEV_LOCK),$(DEV_SIZE),$(VENV))
 	@$(install_fulmar)
 	@rm -f $(VENV)/.run-* $(VENV)/.dev-*
 	@touch $@ $(RUN_STAMP)
 	@echo "Ready: $(BIN)/fulmar, with training and the tools for tests"
+
+$(PEERS_STAMP): | $(PEERS)/bin/python
+	@$(PEERS)/bin/python -m pip install --disable-pip-version-check --no-input --quiet --require-hashes \
+		-r <(awk '/^pip==/, !/\\$$/' $(PEERS_LOCK))
+	@$(call install_lock,$(PEERS_LOCK),$(PEERS_SIZE),$(PEERS))
+	@rm -f $(PEERS)/.peers-*
+	@touch $@
+	@echo "Ready: $(PEERS), with the outside programs that tests compare with"
 
 .PHONY: demo
 demo: setup ## Run the floating platform with a policy, then with an LQR, over ROS 2
@@ -125,7 +142,7 @@ test: dev ## Run the tests, without those that take more than ten seconds
 	@$(call run_tests, and not slow)
 
 .PHONY: test-all
-test-all: dev ## Run every test
+test-all: dev peers ## Run every test
 	@$(call run_tests,)
 
 .PHONY: profile-step
@@ -152,17 +169,19 @@ ros-build: dev ## Build the ROS workspace with colcon, into ros2_ws/{build,insta
 
 # Universal: one file serves Python 3.11 to 3.13. Neither command nor index is written into it. Extras stay: pip before
 # 23.3 does not see that `coverage` is pinned where `coverage[toml]` is wanted, and takes the newest.
-compile = $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.11 --fork-strategy fewest \
+compile = $(BIN)/uv pip compile --universal --python-version 3.11 --fork-strategy fewest \
 	--generate-hashes --no-strip-extras --no-header --no-annotate --quiet
 
 .PHONY: lock
-lock: dev ## Make both locks anew (UPGRADE=1 takes the newest versions)
-	$(compile) $(if $(UPGRADE),--upgrade) --extra ros --extra sim --extra policy --extra bags --extra hardware \
+lock: dev ## Make the locks anew (UPGRADE=1 takes the newest versions)
+	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra ros --extra sim --extra policy --extra bags --extra hardware \
 		--extra view --group build --output-file $(RUN_LOCK)
-	$(compile) $(if $(UPGRADE),--upgrade) --all-extras --group dev --constraint $(RUN_LOCK) --output-file $(DEV_LOCK)
+	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --all-extras --group dev --constraint $(RUN_LOCK) \
+		--output-file $(DEV_LOCK)
+	$(compile) $(if $(UPGRADE),--upgrade) --group peers --output-file $(PEERS_LOCK)
 
 .PHONY: clean
-clean: ## Remove what was built and cached; .venv and runs/ stay
+clean: ## Remove what was built and cached; .venv, .venv-peers and runs/ stay
 	rm -rf build dist ros2_ws/build ros2_ws/install ros2_ws/log
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
-	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
+	find . -name __pycache__ -not -path './$(VENV)/*' -not -path './$(PEERS)/*' -prune -exec rm -rf {} +

@@ -16,8 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray
 from std_srvs.srv import SetBool
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.exit_codes import BAD_USAGE
+from fulmar_core.errors import BAD_USAGE, ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.air_bearing import SERVICE

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from fulmar_core.actuators.slowdown import slowdown
+from fulmar_core.actuators.actuation import slowdown
 from fulmar_core.backend import AirBearing, Sample
 from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError

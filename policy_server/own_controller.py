@@ -15,7 +15,7 @@ import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.errors import ConfigError
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.own_class import construct, load_class, settings_beside, source_of
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -51,11 +51,12 @@ class OwnController:
         )
         self._pair = robot.name, task.name
         estimator = getattr(self._own, "estimator", None)
-        if estimator is not None and not isinstance(estimator, Suspicion):
+        if estimator is not None and not isinstance(estimator, HealthSettings):
             raise ConfigError(
-                f"controller '{path}': 'estimator' is a {type(estimator).__name__}, it must be a Suspicion or None."
+                f"controller '{path}': 'estimator' is a {type(estimator).__name__}, "
+                "it must be a HealthSettings or None."
             )
-        self.estimator: Suspicion | None = estimator
+        self.estimator: HealthSettings | None = estimator
 
     def reset(self) -> None:
         """Reset the user's controller; see `Controller.reset`."""

@@ -18,9 +18,8 @@ from std_msgs.msg import Float32MultiArray
 
 from fulmar_core.backend import Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.exit_codes import FAILED
-from fulmar_core.priority import PLANT_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_core.errors import FAILED, ConfigError, UnknownNameError
+from fulmar_core.process import PLANT_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task

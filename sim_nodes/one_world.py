@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.counter_rng import uniform_from, words, world_keys
-from fulmar_core.disturbances.outside import outside_wrench, push_is_constant
-from fulmar_core.disturbances.world import FIELDS, World
+from fulmar_core.disturbances.world import FIELDS, World, outside_wrench, push_is_constant
 from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of

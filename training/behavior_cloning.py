@@ -137,7 +137,7 @@ class WrenchExpert:
     def actions(self, observations: np.ndarray) -> np.ndarray:
         """Shares of the wanted wrench; see `Expert`."""
         inputs = self._worlds.inputs()
-        now = self._law.frame.situation(inputs)
+        now = self._law.frame.body_state(inputs)
         if self._worlds.takes_disturbances:
             terms = inputs.observation.shape[1]
             now = replace(now, push=np.asarray(observations[:, terms : terms + len(PUSH_TERMS)], dtype=float))

@@ -73,7 +73,7 @@ class CompiledStep:
         Raises:
             ConfigError: The compiler fails.
         """
-        moving = parts_of(self._batch.moving())
+        moving = parts_of(self._batch.mutable_state())
         viewed = self._view({ASKED: command, EFFORT: effort} | moving)
         kernel = self._kernel()
         tensors = [tensor for one in viewed.values() for tensor in one.tensors]

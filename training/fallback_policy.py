@@ -14,7 +14,7 @@ import numpy as np
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import stranding_losses
+from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from training.network import DeployedNetwork, load_network
@@ -41,7 +41,7 @@ def fallback_settings(settings: TrainingSettings, robot: Robot, task: Task) -> T
     name = settings.fallback_policy.settings
     own = load_training_settings(robot, task, name)
     actuation = load_scenario(own.scenario).actuation
-    if not actuation.stranding or not stranding_losses(robot, actuation.failures):
+    if not actuation.stranding or not uncontrollable_losses(robot, actuation.failures):
         raise ConfigError(
             f"'fallback_policy': '{own.scenario}', the scenario of '{name}', must have 'stranding: true', and "
             f"'{robot.name}' thrusters whose loss makes it uncontrollable."
@@ -67,7 +67,7 @@ def load_fallback(run: Path, robot: Robot, settings: TrainingSettings) -> Fallba
         ConfigError: Its scenario is missing.
         FileNotFoundError: The run has left no network.
     """
-    lost = stranding_losses(robot, load_scenario(settings.scenario).actuation.failures)
+    lost = uncontrollable_losses(robot, load_scenario(settings.scenario).actuation.failures)
     losses = np.zeros((len(lost), len(robot.actuators.names)), dtype=np.float32)
     for row, which in zip(losses, lost, strict=True):
         row[list(which)] = 1.0

@@ -105,7 +105,7 @@ class _Trace:
         twin.take(moving_of(before))
         results = observed_step(twin, before[ASKED], effort=before[EFFORT])
         places = _Places(given, results)
-        for name, part in parts_of(twin.moving()).items():
+        for name, part in parts_of(twin.mutable_state()).items():
             if isinstance(part, float):
                 self.numbers[name] = part
             elif part is not before[name]:

@@ -152,7 +152,7 @@ class DeployedNetwork(nn.Module):
         self.choice_commands.copy_(torch.as_tensor(choice.commands))
         self.choice_slope.copy_(torch.as_tensor(choice.slope))
         self.choice_offset.copy_(torch.as_tensor(choice.offset))
-        self.choice_cost.copy_(torch.as_tensor(choice.gas))
+        self.choice_cost.copy_(torch.as_tensor(choice.valve_costs))
 
     def take_fallback(self, fallback: DeployedNetwork, losses: np.ndarray) -> None:
         """Copy the policy that acts where all valves of a row of `losses` are dead (1), shape (k, valves)."""

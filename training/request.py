@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.calibration import use_calibration
+from fulmar_core.counts import check_count, check_episodes
 from fulmar_core.errors import ConfigError
 from fulmar_core.provenance import git_revision
-from fulmar_core.robot import load_robot
+from fulmar_core.robot import load_robot, use_calibration
 from fulmar_core.tasks import load_task
 from training.executors import Executor, LocalExecutor
 from training.jobs import Job
@@ -70,6 +70,10 @@ def job_of(request: TrainingRequest) -> Job:
     if request.control_hz is not None:
         settings = replace(settings, control_hz=request.control_hz)
         settings.learner_of(load_robot(job.robot))  # rejects a rate that the robot cannot keep
+    robot = load_robot(job.robot)
+    hz = settings.control_hz or robot.timing.control_hz
+    check_count("--seeds", request.seeds)
+    check_episodes(robot, episodes=job.episodes, steps=round(load_task(job.task).episode_s * hz))
     if request.resume and request.seeds > 1:
         raise ConfigError(
             "--resume and --seeds exclude one another: resume the runs of a campaign one by one."

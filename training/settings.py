@@ -10,10 +10,9 @@ from typing import Literal
 
 import yaml
 
-from fulmar_core.config import load_config
+from fulmar_core.config import at_least_1, load_config, positive, shares
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
-from fulmar_core.ranges import at_least_1, positive, shares
 from fulmar_core.robot import Robot
 from fulmar_core.symmetry import Symmetry
 from fulmar_core.tasks import Task

@@ -16,8 +16,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.geofence import check_starts
 from fulmar_core.robot import Robot
+from fulmar_core.safety.geofence import check_starts
 from fulmar_core.seeds import EVALUATION_SEEDS
 from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint

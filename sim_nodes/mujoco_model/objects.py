@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from fulmar_core.dynamics.pushing import Block
+from fulmar_core.dynamics.contact import Block
 from sim_nodes.mujoco_model.scenery import FLOOR_BIT, THING_BIT
 
 HEIGHT = 1.0  # higher than any robot [m]

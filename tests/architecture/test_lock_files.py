@@ -9,13 +9,18 @@ from importlib.metadata import PackageNotFoundError, requires
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from packaging.version import Version
 
-RUN_LOCK, DEV_LOCK = "requirements.lock", "requirements-dev.lock"
-LOCKS = [RUN_LOCK, DEV_LOCK]
+RUN_LOCK, DEV_LOCK, PEERS_LOCK = "requirements.lock", "requirements-dev.lock", "requirements-peers.lock"
+LOCKS = [RUN_LOCK, DEV_LOCK, PEERS_LOCK]
 PYTHONS = ["3.11", "3.12", "3.13"]
 RUN_EXTRAS = ["ros", "sim", "policy", "bags", "hardware", "view"]
 DEV_EXTRAS = ["datasets", "train", "cluster", "wandb"]
-INSTALLED = [(RUN_LOCK, RUN_EXTRAS, ["build"]), (DEV_LOCK, [*RUN_EXTRAS, *DEV_EXTRAS], ["build", "dev"])]
+INSTALLED = [
+    (RUN_LOCK, RUN_EXTRAS, ["build"]),
+    (DEV_LOCK, [*RUN_EXTRAS, *DEV_EXTRAS], ["build", "dev"]),
+    (PEERS_LOCK, None, ["peers"]),
+]
 
 
 def entries(text):
@@ -55,9 +60,9 @@ def locks(repository):
 
 
 def wanted(project, extras, groups):
-    """Requirements of some extras and groups in pyproject.toml."""
-    texts = [*project["project"]["dependencies"]]
-    for extra in extras:
+    """Requirements of some extras and groups in pyproject.toml; extras None: without Fulmar itself."""
+    texts = [] if extras is None else [*project["project"]["dependencies"]]
+    for extra in extras or ():
         texts += project["project"]["optional-dependencies"][extra]
     for group in groups:
         texts += [text for text in project["dependency-groups"][group] if isinstance(text, str)]
@@ -88,7 +93,7 @@ def test_every_pin_is_exact_and_hashed(locks, name):
         assert all(re.fullmatch(r"sha256:[0-9a-f]{64}", digest.strip()) for digest in hashes), requirement
 
 
-@pytest.mark.parametrize(("name", "extras", "groups"), INSTALLED)
+@pytest.mark.parametrize(("name", "extras", "groups"), INSTALLED[:2])
 def test_a_pin_has_every_required_extra(project, locks, name, extras, groups):
     """Without it, pip before 23.3 selects the newest version of the extra, and then lacks its hash."""
     pinned = {canonicalize_name(requirement.name): requirement for requirement, _ in entries(locks[name])}
@@ -149,3 +154,12 @@ def test_the_development_lock_contains_the_run_time_lock(locks, python):
     # One .venv serves both: `make setup` must never move what `make dev` installed.
     run, dev = versions(locks[RUN_LOCK], python), versions(locks[DEV_LOCK], python)
     assert {name: dev.get(name) for name in run} == run
+
+
+@pytest.mark.parametrize("python", PYTHONS)
+def test_the_peers_may_contradict_our_own_lock_and_bring_a_pip_that_can_install_them(locks, python):
+    peers, dev = versions(locks[PEERS_LOCK], python), versions(locks[DEV_LOCK], python)
+    # As soon as they agree, one environment is enough.
+    assert peers["torch"] != dev["torch"]
+    assert Version(peers["pip"]) >= Version("23.3")
+    assert "fulmar" not in peers

@@ -13,6 +13,7 @@ TARGETS = {
     "help",
     "setup",
     "dev",
+    "peers",
     "demo",
     "train-demo",
     "profile-step",
@@ -33,7 +34,7 @@ echo "$*" >> calls.log
 case "$*" in
     *version_info*) exit {too_old} ;;
     --version) echo "Python {version}" ;;
-    "-m venv .venv") mkdir -p .venv/bin && cp "$0" .venv/bin/python ;;
+    "-m venv .venv"*) mkdir -p "$3/bin" && cp "$0" "$3/bin/python" ;;
     *"-m pip"*"-r "*) echo "Collecting numpy==2.0.0" ;;
 esac
 """
@@ -42,7 +43,8 @@ esac
 @pytest.fixture
 def make(repository, tmp_path):
     """Function that runs make in a folder with the set-up files only, without a real Python."""
-    for name in ("Makefile", "pyproject.toml", "requirements.lock", "requirements-dev.lock"):
+    locks = ("requirements.lock", "requirements-dev.lock", "requirements-peers.lock")
+    for name in ("Makefile", "pyproject.toml", *locks):
         shutil.copy(repository / name, tmp_path)
     environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
     environment.pop("PYTHON", None)
@@ -101,6 +103,26 @@ def test_a_development_setup_includes_the_run_time_setup(make, tmp_path):
     assert installs(tmp_path) == ["requirements-dev.lock"]
 
 
+def test_the_peers_get_an_environment_and_a_pip_of_their_own_once(make, tmp_path):
+    assert make("peers").returncode == make("peers").returncode == 0
+    asked = (tmp_path / "calls.log").read_text()
+    assert asked.count("-m venv .venv-peers") == 1
+    assert "--require-hashes" in asked
+    first, second = installs(tmp_path)
+    assert first.startswith("/dev/fd/"), "the pip of the lock comes first"
+    assert second == "requirements-peers.lock"
+    assert not (tmp_path / ".venv").exists()
+    with (tmp_path / "requirements-peers.lock").open("a") as lock:
+        lock.write("# another version\n")
+    assert make("peers").returncode == 0
+    assert installs(tmp_path)[2:] == [first, second]
+
+
+def test_every_test_needs_the_peers_and_the_quick_ones_do_not(make):
+    assert "requirements-peers.lock" in make("--dry-run", "test-all").stdout
+    assert "requirements-peers.lock" not in make("--dry-run", "test").stdout
+
+
 def test_a_failed_installation_is_repeated(make, tmp_path):
     make("setup")
     (tmp_path / "requirements.lock").write_text("# changed\n")
@@ -109,7 +131,7 @@ def test_a_failed_installation_is_repeated(make, tmp_path):
     assert make("-q", "setup").returncode != 0
 
 
-@pytest.mark.parametrize(("target", "size"), [("setup", 884), ("dev", 7053)])
+@pytest.mark.parametrize(("target", "size"), [("setup", 884), ("dev", 7053), ("peers", 8452)])
 @pytest.mark.parametrize("free", [100, 90_000])
 def test_size_and_free_disk_are_printed_before_an_installation(make, tmp_path, target, size, free):
     disk = tmp_path / "bin" / "df"
@@ -118,7 +140,8 @@ def test_size_and_free_disk_are_printed_before_an_installation(make, tmp_path, t
     disk.chmod(0o755)
     result = make(target, f"PATH={disk.parent}:{os.environ['PATH']}")
     assert result.returncode == 0
-    line = f".venv takes {size} MiB; {free} MiB are free on this disk."
+    folder = ".venv-peers" if target == "peers" else ".venv"
+    line = f"{folder} takes {size} MiB; {free} MiB are free on this disk."
     assert result.stdout.index(line) < result.stdout.index("Ready")
     assert ("make room" in result.stderr) == (free < size)
 

@@ -14,8 +14,7 @@ from rich.table import Table
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, UnknownNameError
 from hardware_drivers.settings import MavlinkBoat, load_hardware
 from tests.benchmarks.closed_loops import Campaign, Command, measure
 

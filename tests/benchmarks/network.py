@@ -14,8 +14,7 @@ from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.controller_settings import MOST_COPIES
-from fulmar_core.errors import ConfigError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, ConfigError
 from fulmar_evaluation.faults.two_hosts import ACROSS, Quality, two_hosts, why_not
 from tests.benchmarks.closed_loops import Campaign, Command, measure
 

@@ -14,7 +14,7 @@ from fulmar_core.controllers.classical import LAWS
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_in_float64
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.paths import config_names
 from fulmar_core.planar import at_rest
 from fulmar_core.policy_bundle import read_passport
@@ -116,7 +116,7 @@ def test_it_has_its_name_its_rate_and_asks_for_an_estimator_or_none(case):
     name, robot, _, controller = case
     assert controller.name == name
     assert controller.control_hz == robot.timing.control_hz
-    assert controller.estimator is None or isinstance(controller.estimator, Suspicion)
+    assert controller.estimator is None or isinstance(controller.estimator, HealthSettings)
 
 
 def test_each_robot_gets_the_command_that_it_would_get_alone(case, seen):

@@ -11,7 +11,7 @@ import pytest
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.dynamics.outline import outline_of
+from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.episode import draw_episode
 from fulmar_core.paths import config_names
 from fulmar_core.robot import Rolling, load_robot

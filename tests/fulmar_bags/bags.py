@@ -20,6 +20,16 @@ def word(text: str) -> bytes:
     return bytes(type_store().serialize_cdr(type_store().types[TYPE](text), TYPE))
 
 
+def publish_times(folder: Path) -> dict[str, int]:
+    """When each word of a bag was sent [ns]."""
+    found = {}
+    for path in bag_files(folder):
+        with path.open("rb") as stream:
+            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+            found |= {word.data: each.publish_time for _, _, each, word in reader.iter_decoded_messages()}
+    return found
+
+
 def words_by_rosbags(folder: Path) -> list[str]:
     with AnyReader([folder]) as reader:
         return [reader.deserialize(raw, c.msgtype).data for c, _, raw in reader.messages()]

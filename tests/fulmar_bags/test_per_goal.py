@@ -7,7 +7,7 @@ import pytest
 from fulmar_bags.per_goal import BagPerGoal
 from fulmar_bags.writer import BagWriter
 from fulmar_core.errors import BagError
-from tests.fulmar_bags.bags import INFO, START_NS, TOPIC, TYPE, word, words_by_rosbags
+from tests.fulmar_bags.bags import INFO, START_NS, TOPIC, TYPE, publish_times, word, words_by_rosbags
 
 GOAL, OBSTACLES, S = "/robot/goal", "/robot/obstacles", 1_000_000_000
 
@@ -59,6 +59,18 @@ def test_each_goal_has_its_bag_and_every_message_is_in_one(recording):
     assert sorted(second) == sorted(["wall", "second", "c"])
     assert (recording.bag.counts.messages, recording.bag.counts.on_disk) == (7, 7)
     assert (recording.bag.counts.files, recording.bag.waiting) == (2, 0)
+
+
+def test_a_goal_that_begins_a_bag_keeps_when_it_was_sent(recording):
+    for second, text in enumerate(("first", "second"), start=1):
+        recording.bag.write(
+            GOAL, word(text), log_ns=START_NS + second * S, publish_ns=START_NS + second * S - 7
+        )
+        recording.bag.tick(second)
+    recording.bag.close()
+    first, second = (publish_times(folder) for folder in sorted(recording.folder.iterdir()))
+    assert first == {"first": START_NS + S - 7, "second": START_NS + 2 * S - 7}
+    assert second == {"second": START_NS + 2 * S - 7}
 
 
 def test_a_disk_that_takes_no_new_bag_loses_nothing(recording):

@@ -16,7 +16,16 @@ from fulmar_bags.ring import BagRing
 from fulmar_bags.writer import BagWriter
 from fulmar_bags.writer_thread import BagThread
 from fulmar_core.errors import BagError
-from tests.fulmar_bags.bags import INFO, START_NS, TOPIC, TYPE, word, words_by_mcap, words_by_rosbags
+from tests.fulmar_bags.bags import (
+    INFO,
+    START_NS,
+    TOPIC,
+    TYPE,
+    publish_times,
+    word,
+    words_by_mcap,
+    words_by_rosbags,
+)
 
 GOAL, S = "/robot/goal", 1_000_000_000
 
@@ -75,6 +84,22 @@ def test_a_fault_writes_what_came_before_and_after_it(ring, folder):
     assert words_by_rosbags(folder) == words_by_mcap(folder) == expected
     with Reader(folder) as reader:
         assert reader.message_count == 6
+
+
+def test_what_a_fault_writes_keeps_when_it_was_sent(ring, folder):
+    def write(topic, text, second):
+        ring.write(topic, word(text), log_ns=START_NS + second * S, publish_ns=START_NS + second * S - 7)
+        ring.tick(second)
+
+    write(GOAL, "goal", 0)  # older than the memory when the fault comes
+    for second in range(1, 10):
+        write(TOPIC, f"word {second}", second)
+    write(TOPIC, "fault", 10)
+    write(TOPIC, "word 11", 11)
+    ring.close()
+    sent = publish_times(folder)
+    seconds = {"goal": 0, "word 7": 7, "word 8": 8, "word 9": 9, "fault": 10, "word 11": 11}
+    assert sent == {text: START_NS + second * S - 7 for text, second in seconds.items()}
 
 
 def test_a_fault_that_lasts_is_written_once_and_to_its_end(ring, folder):

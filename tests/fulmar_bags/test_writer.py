@@ -17,12 +17,14 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
+from fulmar_bags.contents import open_bag as open_recorded
 from fulmar_bags.message_types import type_store
 from fulmar_bags.metadata import read_information
 from fulmar_bags.recovery import recover
 from fulmar_bags.writer import BagWriter
 from fulmar_bags.writer_thread import BagThread
 from fulmar_core.errors import BagError
+from tests.fulmar_bags.bags import publish_times
 
 TOPIC, TYPE = "/robot/word", "std_msgs/msg/String"
 INFO = {"robot": "floating_platform", "goal": [0.0, 1.0, 90.0]}
@@ -140,6 +142,23 @@ def test_log_times_never_go_backwards(tmp_path):
             START_NS,
             START_NS + 1,
         ]
+
+
+def test_a_bag_keeps_when_a_message_was_sent_and_says_when_it_was_received_where_that_is_unknown(tmp_path):
+    bag = open_bag(tmp_path / "bag")
+    for number, sent_ns in enumerate((START_NS - 7, None, 0)):
+        bag.write(TOPIC, word(f"word {number}"), log_ns=START_NS, publish_ns=sent_ns)
+    bag.close()
+    sent = publish_times(tmp_path / "bag")
+    assert sent == {"word 0": START_NS - 7, "word 1": START_NS, "word 2": START_NS}
+    assert open_recorded(tmp_path / "bag").topics[TOPIC].publish_ns == list(sent.values())
+
+
+def test_the_thread_passes_on_when_a_message_was_sent(tmp_path):
+    thread = BagThread(open_bag(tmp_path / "bag"), on_error=print)
+    thread.put(TOPIC, word("word 0"), START_NS, START_NS - 7)
+    thread.stop()
+    assert publish_times(tmp_path / "bag") == {"word 0": START_NS - 7}
 
 
 def test_an_existing_bag_is_not_overwritten(tmp_path):

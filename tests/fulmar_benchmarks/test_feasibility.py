@@ -12,7 +12,7 @@ from fulmar_benchmarks.drift.bounds import approach_bound, can_hold_episodes
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
 from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import can_hold, hold_margin, stranding_losses
+from fulmar_core.holdability import can_hold, hold_margin, uncontrollable_losses
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
@@ -57,9 +57,9 @@ def test_of_two_lost_valves_those_that_leave_a_direction_or_a_way_to_turn_are_th
 
 
 def test_what_strands_a_robot_is_what_it_cannot_hold_a_pose_without():
-    assert set(stranding_losses(PLATFORM, 2)) == {pair for pair in PAIRS if not can_hold(PLATFORM, pair)}
-    assert stranding_losses(PLATFORM, 1) == ()
-    assert stranding_losses(load_robot("turtlebot2"), 1) == ()
+    assert set(uncontrollable_losses(PLATFORM, 2)) == {pair for pair in PAIRS if not can_hold(PLATFORM, pair)}
+    assert uncontrollable_losses(PLATFORM, 1) == ()
+    assert uncontrollable_losses(load_robot("turtlebot2"), 1) == ()
 
 
 @pytest.mark.parametrize("lost", [(), (0,), (5,), *PAIRS[::5]], ids=str)

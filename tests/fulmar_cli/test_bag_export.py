@@ -6,15 +6,18 @@ import csv
 import json
 
 import numpy as np
+import pyarrow.parquet as parquet
 import pytest
 from rosbags.rosbag2.enums import StoragePlugin
 from typer.testing import CliRunner
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import joint_vectors, odometries
+from fulmar_bags.lerobot import _table
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.main import app
 from fulmar_core.errors import BagError
+from fulmar_core.paths import OWN_FOLDERS, config_path
 from fulmar_core.topics import ACTION, COMMAND, OBSERVATION, ODOMETRY
 from tests.foreign_bag import write_foreign
 from tests.fulmar_cli.bag_commands import BAGS, POLICY, answer, ask
@@ -57,28 +60,77 @@ def test_messages_that_cannot_be_read_are_counted(tmp_path):
     assert "1 messages cannot be read as sensor_msgs/msg/LaserScan" in done.output
 
 
-def test_a_bag_with_a_hole_gives_two_episodes(tmp_path):
-    pytest.importorskip("pyarrow")
-    source = open_bag(POLICY)
-    bag = BagWriter(tmp_path / "bag", run_info=source.info)
+def copy_of(source, folder, *, keep=lambda name, index: True, attachments=None, **info):
+    """A bag with the messages of another one that are kept."""
+    bag = BagWriter(folder, run_info={**source.info, **info}, attachments=attachments)
     for topic in source.topics.values():
         bag.add_topic(topic.name, topic.type, "stream")
-    hole = source.of(OBSERVATION).name, source.of(ACTION).name, source.of(COMMAND).name
     every = sorted(
         (log, topic.name, i) for topic in source.topics.values() for i, log in enumerate(topic.log_ns)
     )
     for log, name, index in every:
-        if name not in hole or not 30 <= index < 40:
+        if keep(name, index):
             bag.write(name, source.topics[name].data[index], log_ns=log)
     bag.close()
-    done = export(tmp_path / "bag", "--to", "lerobot", "--out", tmp_path / "set")
+    return folder
+
+
+def info_of(dataset):
+    return json.loads((dataset / "meta/info.json").read_text())
+
+
+def episodes_of(dataset):
+    return parquet.read_table(dataset / "meta/episodes/chunk-000/file-000.parquet").to_pydict()
+
+
+def test_a_bag_with_a_hole_gives_two_episodes(tmp_path):
+    source = open_bag(POLICY)
+    hole = source.of(OBSERVATION).name, source.of(ACTION).name, source.of(COMMAND).name
+    bag = copy_of(source, tmp_path / "bag", keep=lambda name, index: name not in hole or not 30 <= index < 40)
+    done = export(bag, "--to", "lerobot", "--out", tmp_path / "set")
     assert "its 2 parts are episodes of their own" in done.output
-    lines = (tmp_path / "set/meta/episodes.jsonl").read_text().splitlines()
-    assert [json.loads(line)["length"] for line in lines] == [30, 60]
+    assert episodes_of(tmp_path / "set")["length"] == [30, 60]
+
+
+def test_a_dataset_names_the_robot_that_only_its_bag_knows(tmp_path, monkeypatch):
+    monkeypatch.delenv(OWN_FOLDERS, raising=False)
+    text = config_path("robots", "floating_platform").read_text()
+    carried = {"robot.yaml": text.replace("name: floating_platform", "name: mybot").encode()}
+    bag = copy_of(
+        open_bag(POLICY), tmp_path / "bag", attachments=carried, robot="mybot", name="floating_platform"
+    )
+    done = export(bag, "--to", "lerobot", "--out", tmp_path / "set")
+    assert done.exit_code == 0, done.exception
+    info = info_of(tmp_path / "set")
+    assert info["robot_type"] == "mybot"
+    assert info["features"]["action"]["names"] == [f"thruster_{number}" for number in range(1, 9)]
+
+
+def test_a_dataset_that_grows_beyond_a_file_goes_on_in_the_next_one(tmp_path, monkeypatch):
+    monkeypatch.setattr("fulmar_bringup.bags.lerobot.FILE_MB", 0)
+    monkeypatch.setattr("fulmar_bringup.bags.lerobot.CHUNK", 2)
+    answer("export", POLICY, POLICY, POLICY, "--to", "lerobot", "--out", tmp_path / "set")
+    data = tmp_path / "set/data"
+    files = [data / "chunk-000/file-000.parquet", data / "chunk-000/file-001.parquet"]
+    files += [data / "chunk-001/file-000.parquet"]
+    assert sorted(data.glob("*/*")) == files
+    assert [parquet.read_table(file)["episode_index"].unique().to_pylist() for file in files] == [
+        [0],
+        [1],
+        [2],
+    ]
+    rows = episodes_of(tmp_path / "set")
+    assert (rows["data/chunk_index"], rows["data/file_index"]) == ([0, 0, 1], [0, 1, 0])
+
+
+def test_a_vector_of_one_number_is_a_number_in_the_table():
+    one, two = np.ones((3, 1), dtype=np.float32), np.ones((3, 2), dtype=np.float32)
+    table = _table({"action": one, "observation.state": two})
+    assert table["action"].to_pylist() == [1.0, 1.0, 1.0]
+    assert table["observation.state"].to_pylist() == [[1.0, 1.0]] * 3
 
 
 def test_a_bag_of_others_is_no_dataset_and_no_option_is_named_that_there_is_not(tmp_path):
-    pytest.importorskip("pyarrow")
     bag = write_foreign(tmp_path / "bag", StoragePlugin.MCAP, count=5)
     told = str(export(bag, "--to", "lerobot", "--out", tmp_path / "set").exception)
     assert "others recorded it" in told
@@ -98,20 +150,20 @@ def test_tables_hold_every_number(tmp_path):
 
 
 def test_a_dataset_holds_an_episode_for_each_bag_and_a_frame_for_each_step(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
     answer("export", POLICY, POLICY, "--to", "lerobot", "--out", tmp_path / "set")
-    info = json.loads((tmp_path / "set/meta/info.json").read_text())
-    assert info["codebase_version"] == "v2.1"
+    info = info_of(tmp_path / "set")
+    assert info["codebase_version"] == "v3.0"
     assert (info["total_episodes"], info["total_frames"], info["fps"]) == (2, 200, 5)
-    path = info["data_path"].format(episode_chunk=0, episode_index=1)
+    path = info["data_path"].format(chunk_index=0, file_index=0)
     table = parquet.read_table(tmp_path / "set" / path)
     assert set(table.column_names) == set(info["features"])
     recorded = joint_vectors(open_bag(POLICY).of(ACTION), "effort").values
-    np.testing.assert_array_equal(np.array(table["action"].to_pylist()), recorded)
-    assert table["index"].to_pylist() == list(range(100, 200))
-    assert table["next.done"].to_pylist() == [False] * 99 + [True]
-    lines = (tmp_path / "set/meta/episodes.jsonl").read_text().splitlines()
-    assert [json.loads(line)["length"] for line in lines] == [100, 100]
+    np.testing.assert_array_equal(np.array(table["action"].to_pylist()), np.tile(recorded, (2, 1)))
+    assert table["index"].to_pylist() == list(range(200))
+    assert table["next.done"].to_pylist() == 2 * ([False] * 99 + [True])
+    rows = episodes_of(tmp_path / "set")
+    assert rows["length"] == [100, 100]
+    assert (rows["dataset_from_index"], rows["dataset_to_index"]) == ([0, 100], [100, 200])
     refused = ask(
         "export",
         POLICY,

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import re
 import sys
+from importlib.metadata import version
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from fulmar_bringup import robot_operator
-from fulmar_cli import diagnosis
 from fulmar_evaluation import run_outcome
 from tests.fulmar_cli.command_line import EVALUATE, RUN, SHIPPED
 
@@ -22,13 +19,19 @@ def test_the_doctor_names_the_extra_of_a_part_that_is_not_installed(fulmar, monk
     code, out, _ = fulmar("doctor", "--json")
     assert code == 1
     (finding,) = (each for each in json.loads(out)["findings"] if each["what"] == "matplotlib")
-    assert "'view'" in finding["advice"]
+    assert finding["level"] == "wrong"
+    assert "'view'" in finding["fix"]
+    assert finding["advice"] == finding["fix"]
 
 
 def test_without_a_command_the_help_is_shown_as_bad_usage(fulmar):
     code, out, err = fulmar()
     assert (code, out) == (2, "")
     assert err.lstrip().startswith("Usage: fulmar")
+
+
+def test_the_version_is_that_of_the_distribution(fulmar):
+    assert fulmar("--version") == (0, f"fulmar {version('fulmar')}\n", "")
 
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["bundle", "show", "--help"]])
@@ -124,12 +127,3 @@ def test_limits_of_a_run_reach_its_plan(fulmar, monkeypatch, tmp_path):
     with pytest.raises(PlannedError):
         fulmar(*RUN, "--area=-2,2,-1,1", "--max-run-time", "60")
     assert (guards[0].area, guards[0].max_run_time_s) == ((-2.0, 2.0, -1.0, 1.0), 60.0)
-
-
-@pytest.mark.parametrize("unfit", [[], ["/panel publishes std_msgs/msg/Int8 on /boat/estop"]])
-def test_the_doctor_names_publishers_that_do_not_reach_a_running_robot(monkeypatch, unfit):
-    person = SimpleNamespace(look_at_wires=lambda: ({"/boat"}, unfit))
-    monkeypatch.setattr(robot_operator, "operator", lambda: contextlib.nullcontext(person))
-    finding = diagnosis._wires()
-    assert finding.ok is not bool(unfit)
-    assert finding.found == (unfit[0] if unfit else "boat")

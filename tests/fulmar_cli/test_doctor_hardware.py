@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fulmar_cli.commands.doctor import mark
-from fulmar_cli.diagnosis import diagnose_hardware
+from fulmar_cli.diagnosis.devices import diagnose_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
 from hardware_drivers.devices import UNPROTECTED, own_watchdog
@@ -17,7 +16,7 @@ def test_every_file_without_a_watchdog_below_its_driver_is_a_warning_in_capitals
     for name in config_names("hardware"):
         unprotected = own_watchdog(load_hardware(name).driver) is None
         assert findings[name].found.startswith(UNPROTECTED) is unprotected
-        assert mark(findings[name]) == ("WARN" if unprotected else "ok  ")
+        assert findings[name].level == ("advice" if unprotected else "ok")
     assert all(finding.ok for finding in findings.values())
 
 
@@ -25,7 +24,7 @@ def test_a_named_file_s_device_is_looked_for(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("title: t\nrobot: turtlebot2\ndriver: {kind: kobuki, port: /dev/ttyNONE}\n")
     device = diagnose_hardware(str(path))[-1]
-    assert mark(device) == "BAD "
+    assert device.level == "wrong"
     assert "/dev/ttyNONE: there is no such serial port" in device.found
     path.write_text(path.read_text().replace("/dev/ttyNONE", str(path)))
     assert diagnose_hardware(str(path))[-1].ok

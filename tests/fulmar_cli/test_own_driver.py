@@ -8,6 +8,7 @@ import pytest
 
 from fulmar_bringup.commissioning.hardware_file import wires_of
 from fulmar_bringup.launched_system import list_nodes
+from fulmar_cli.diagnosis.devices import diagnose_hardware
 from fulmar_core.errors import ConfigError
 from hardware_drivers.settings import load_hardware
 from tests.fulmar_cli.command_line import RUN, complaint
@@ -85,23 +86,24 @@ def test_a_device_that_is_armed_moves_only_when_a_person_allows_it(folder, fulma
     )
 
 
-def test_doctor_says_whether_class_and_port_are_there_and_what_stops_the_device(folder, fulmar):
+def test_doctor_says_whether_class_and_port_are_there_and_what_stops_the_device(folder):
     (folder / "own_board.py").write_text(BOARD)
     (folder / "own.yaml").write_text(FILE + "  port: /dev/ttyNONE\n")
-    code, out, _ = fulmar("doctor", "--for", "hardware", "own.yaml")
-    assert code == 1
-    assert "WARN own.yaml: NOTHING BELOW THE DRIVER STOPS THE ACTUATORS WHEN IT DIES" in out
-    assert "ok   own.yaml: driver: own_board:Board, your own class" in out
-    assert "BAD  own.yaml: device: /dev/ttyNONE: there is no such serial port." in out
+    dies, driver, device = diagnose_hardware("own.yaml")[-3:]
+    assert (dies.what, dies.level) == ("own.yaml", "advice")
+    assert dies.found.startswith("NOTHING BELOW THE DRIVER STOPS THE ACTUATORS WHEN IT DIES")
+    assert (driver.level, driver.found) == ("ok", "own_board:Board, your own class")
+    assert (device.what, device.level) == ("own.yaml: device", "wrong")
+    assert "/dev/ttyNONE: there is no such serial port." in device.found
 
 
-def test_doctor_reports_a_class_that_cannot_be_used(folder, fulmar):
+def test_doctor_reports_a_class_that_cannot_be_used(folder):
     (folder / "own_board.py").write_text(LACKING)
-    code, out, _ = fulmar("doctor", "--for", "hardware", "own.yaml")
-    assert code == 1
-    assert "BAD  own.yaml: driver: driver 'own_board:Board': " in out
-    assert "lacks write. " in out
-    assert "See docs/own-driver.md." in out
+    (driver,) = (each for each in diagnose_hardware("own.yaml") if each.what == "own.yaml: driver")
+    assert driver.level == "wrong"
+    assert "driver 'own_board:Board': " in driver.found
+    assert "lacks write. " in driver.found
+    assert driver.fix == "See docs/own-driver.md."
 
 
 def test_list_shows_its_file_and_imports_nothing(folder, fulmar, monkeypatch):

@@ -11,7 +11,7 @@ from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.actuator_estimator import ActuatorEstimator
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
@@ -19,7 +19,7 @@ from fulmar_core.tasks import load_task
 from tests.inputs import inputs_of
 
 ROBOT, WORLDS = load_robot("floating_platform"), 16
-WITHOUT_TRIALS = Suspicion(retry_s=0.0)
+WITHOUT_TRIALS = HealthSettings(retry_s=0.0)
 
 
 def estimated(scenario, *, task="drift_go_to_pose", steps=40):
@@ -34,7 +34,7 @@ def estimated(scenario, *, task="drift_go_to_pose", steps=40):
         simulation.step(command)
         estimate = estimator.update(simulation.measured, command, simulation.control_dt)
     frame, raw = BodyFrame(ROBOT, task), inputs_of(simulation)
-    return frame.situation(replace(raw, estimates=estimate)), frame.situation(raw), simulation
+    return frame.body_state(replace(raw, estimates=estimate)), frame.body_state(raw), simulation
 
 
 def in_body(simulation, x, y):
@@ -76,4 +76,4 @@ def test_another_number_of_robots_begins_anew():
 
 def test_a_robot_without_valves_has_no_estimator():
     with pytest.raises(ConfigError, match="'kingfisher'"):
-        ActuatorEstimator(load_robot("kingfisher"), Suspicion())
+        ActuatorEstimator(load_robot("kingfisher"), HealthSettings())

@@ -64,7 +64,7 @@ def test_it_agrees_with_what_the_task_shows_a_network(moment):
 
 def test_the_turn_is_the_wanted_heading_minus_the_heading_and_nothing_where_a_task_has_none(moment):
     frame, inputs, _ = moment
-    turn = frame.situation(inputs).turn
+    turn = frame.body_state(inputs).turn
     if not frame.heads:
         np.testing.assert_array_equal(turn, 0.0)
         return
@@ -74,7 +74,7 @@ def test_the_turn_is_the_wanted_heading_minus_the_heading_and_nothing_where_a_ta
 
 def test_without_an_estimate_nothing_pushes_and_no_valve_is_known_dead(moment):
     frame, inputs, _ = moment
-    situation = frame.situation(inputs)
+    situation = frame.body_state(inputs)
     np.testing.assert_array_equal(situation.push, np.zeros((30, 3)))
     assert situation.alive is None
 

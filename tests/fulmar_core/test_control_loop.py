@@ -9,7 +9,7 @@ from fulmar_core.control_loop import ControlLoop, unknown_inputs
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.goal import goal_at, stack_goals
 from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.observation import Observer
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import load_robot
@@ -181,7 +181,7 @@ def test_inputs_of_an_unknown_state_and_goal_are_not_a_number():
 
 # What an estimator learns from
 
-ESTIMATOR, POSE_GOAL = Suspicion(retry_s=0.0), goal_at((0.0, 0.0, 0.0))[None]
+ESTIMATOR, POSE_GOAL = HealthSettings(retry_s=0.0), goal_at((0.0, 0.0, 0.0))[None]
 TICK_NS = 200 * MS
 
 
@@ -231,7 +231,7 @@ def test_what_is_estimated_is_forgotten(forget):
     elif forget == "pause":
         stamp += 600 * MS
     else:
-        settings = ESTIMATOR if forget == "use" else Suspicion(held=0.0)
+        settings = ESTIMATOR if forget == "use" else HealthSettings(held=0.0)
         loop.use(Scripted(np.zeros(8), robot=PLATFORM, estimator=settings))
     loop.step(at(1.0), stamp)
     assert push_of(loop) == 0.0

@@ -96,7 +96,7 @@ def test_a_heavier_platform_brakes_earlier():
 def test_the_observer_expects_errors_in_proportion_to_the_thrust():
     strong = without_file(PLATFORM, actuators=replace(PLATFORM.actuators, thrust=10.0))
     usual, scaled = gains_of(without_file(PLATFORM)).observer, gains_of(strong).observer
-    assert usual.model_force == pytest.approx(0.087)  # of `Suspicion`, which was chosen on this platform
+    assert usual.model_force == pytest.approx(0.087)  # of `HealthSettings`, which was chosen on this platform
     assert (scaled.model_force, scaled.push_torque) == pytest.approx(
         (10.0 * usual.model_force, 10.0 * usual.push_torque), rel=1e-3
     )

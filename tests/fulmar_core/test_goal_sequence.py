@@ -12,7 +12,7 @@ from fulmar_core.goal_files import FollowedPath, HeldVelocity, Poses, Positions,
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_names
 from fulmar_core.planar import at_rest
-from fulmar_core.references.rounds import Circle
+from fulmar_core.references.curves import Circle
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import GOAL_WIRES
 

@@ -10,15 +10,16 @@ from fulmar_core.goal import goal_at
 from fulmar_core.guarded_loop import ENDED, GuardedLoop
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import BEARING_OFF, Mode
+from fulmar_core.safety.fallback import ControllerSwitch, Standby
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import JUMP_M, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from tests.states import planar_state
 
 S, MS = 1_000_000_000, 1_000_000
 ROBOT = load_robot("turtlebot2")
 GENTLE = (0.01, 0.02)  # within the slew of one step from rest
+LAB = (-1.0, 1.0, -1.0, 1.0)
 GOAL, OTHER = goal_at((2.0, 0.0, 0.0)), goal_at((0.0, 2.0, 0.0))
 
 
@@ -41,7 +42,7 @@ class Estop:
     """An e-stop that holds where it has a reason."""
 
     def __init__(self):
-        self.heard, self.why = True, ""
+        self.received, self.why = True, ""
 
     def reason(self, now_ns):
         return self.why
@@ -52,11 +53,11 @@ class Bench:
 
     def __init__(self, *, fallback=None, task="go_to_position", armed=True, **settings):
         self.controller, self.estop = Scripted("first"), Estop()
-        self.succession = Succession(
+        self.switch = ControllerSwitch(
             Standby(self.controller, "{}", ""), Standby(fallback, "{}", "") if fallback else None
         )
         self.guard = GuardedLoop(
-            ROBOT, load_task(task), ControllerSettings(**settings), self.succession, self.estop
+            ROBOT, load_task(task), ControllerSettings(**settings), self.switch, self.estop
         )
         self.now_ns = S
         if armed:
@@ -192,23 +193,46 @@ def test_a_goal_during_an_estop_is_refused_and_stays_void():
 
 def test_an_estop_that_was_never_received_keeps_the_goal():
     bench = Bench()
-    bench.estop.heard, bench.estop.why = False, "no e-stop yet"
+    bench.estop.received, bench.estop.why = False, "no e-stop yet"
     assert bench.give() == ""
     assert bench.step()[0].reason == "no e-stop yet"
-    bench.estop.heard, bench.estop.why = True, ""
+    bench.estop.received, bench.estop.why = True, ""
     assert bench.step()[1] == list(GENTLE)
 
 
 def test_a_robot_that_left_its_area_waits_for_a_new_goal_inside_it():
-    bench = Bench(area=(-1.0, 1.0, -1.0, 1.0))
-    bench.give(GOAL, 7)
+    bench = Bench(area=LAB)
+    bench.give(goal_at((-1.0, 0.0, 0.0)), 7)
     bench.step(0.9)
     for x in (1.1, 0.9):
         decision, command = bench.step(x)
         assert command is None
         assert decision.reason
-    bench.give(OTHER, 8)
+    bench.give(goal_at((-1.0, 1.0, 0.0)), 8)
     assert bench.step(0.9)[1] == list(GENTLE)
+
+
+@pytest.mark.parametrize("place", [(1.1, 0.0, 0.0), (0.0, -2.0, 0.0)])
+def test_a_goal_outside_the_area_is_refused_with_the_area_and_the_goal_before_it_stays(place):
+    bench = Bench(area=LAB)
+    inside = goal_at((-1.0, 0.0, 0.0))
+    assert bench.give(inside, 7) == ""
+    for _ in range(2):  # a repetition gets the same answer
+        reason = bench.give(goal_at(place), 8)
+        assert reason.startswith(OUT_OF_BOUNDS)
+        assert "outside the area of x -1 to 1 m, y -1 to 1 m" in reason
+    assert bench.guard.refusal.stamp_ns == 8
+    assert bench.step()[1] == list(GENTLE)
+    np.testing.assert_array_equal(bench.guard.loop.goal.current[0], inside.current)
+
+
+def test_a_goal_farther_than_a_kilometre_is_refused_without_an_area():
+    assert "1,001 m from the origin, farther than 1,000 m" in Bench().give(goal_at((0.0, 1001.0, 0.0)))
+
+
+def test_a_velocity_is_no_place_and_passes_any_area():
+    bench = Bench(task="track_velocities", area=(5.0, 6.0, 5.0, 6.0))
+    assert bench.give(goal_at((0.3, 0.0, 0.0))) == ""
 
 
 def test_a_goal_beyond_the_geofence_is_not_driven_to():
@@ -291,10 +315,10 @@ def test_a_proposed_controller_takes_over_between_two_steps_with_the_goal_as_far
     bench.give(goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
     for _ in range(2):
         bench.step()
-    assert not bench.guard.turn()
-    bench.succession.propose(Standby(other, "{}", ""))
+    assert not bench.guard.switch_controller()
+    bench.switch.propose(Standby(other, "{}", ""))
     assert bench.step()[1] == list(GENTLE)
-    assert bench.guard.turn()
+    assert bench.guard.switch_controller()
     assert bench.step()[1] == [0.02, 0.01]
     assert bench.guard.mission.done == 1
 

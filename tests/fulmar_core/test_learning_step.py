@@ -31,7 +31,7 @@ def goal_at(x=0.0, *, disc=None, block=(0.0, 0.0)):
     return Goal(np.array([[[x, 0.0, 0.0]]]), np.zeros(1), discs, {"block": np.array([[*block, 0.0]])})
 
 
-def judged(task, here, *, before=None, goal=None, ended=None, previous=STILL, command=STILL, robot=BASE):
+def evaluated(task, here, *, before=None, goal=None, ended=None, previous=STILL, command=STILL, robot=BASE):
     goal = goal_at() if goal is None else goal
     reward, over = learning_step(
         robot,
@@ -50,33 +50,33 @@ def judged(task, here, *, before=None, goal=None, ended=None, previous=STILL, co
 def test_actuators_cost_by_their_share_of_full_command_and_by_its_change():
     robot = replace(BASE, costs=replace(BASE.costs, effort=0.3, change=0.2))
     full = robot.actuators.scale[None]
-    free, _ = judged(POSITION, 1.0, robot=robot)
-    held, _ = judged(POSITION, 1.0, robot=robot, previous=full, command=-full)
+    free, _ = evaluated(POSITION, 1.0, robot=robot)
+    held, _ = evaluated(POSITION, 1.0, robot=robot, previous=full, command=-full)
     assert free - held == pytest.approx(0.3 * 2 + 0.2 * 2 * 2.0**2)
 
 
 def test_an_episode_ends_outside_the_geofence_and_not_before():
     fence = BASE.limits.geofence
-    assert not judged(POSITION, fence - 0.01)[1]
-    assert judged(POSITION, fence + 0.01)[1]
+    assert not evaluated(POSITION, fence - 0.01)[1]
+    assert evaluated(POSITION, fence + 0.01)[1]
 
 
 def test_touching_ends_an_episode_and_costs_what_the_task_says():
     here, far = (OBSTACLES.surveyed(goal_at(4.0, disc=(x, 0.0, 0.3)), BASE) for x in (0.0, -9.0))
-    near, touches = judged(OBSTACLES, 0.0, goal=here)
-    away, clear = judged(OBSTACLES, 0.0, goal=far)
+    near, touches = evaluated(OBSTACLES, 0.0, goal=here)
+    away, clear = evaluated(OBSTACLES, 0.0, goal=far)
     assert (touches, clear) == (True, False)
     assert away - near == pytest.approx(OBSTACLES.collision_cost + OBSTACLES.nearness_cost)
 
 
 def test_a_task_without_a_place_has_no_geofence():
-    assert not judged(VELOCITIES, 1e6)[1]
+    assert not evaluated(VELOCITIES, 1e6)[1]
 
 
 def test_where_the_block_went_counts_and_where_it_is_may_be_outside():
     start, moved = goal_at(block=(2.0, 0.0)), goal_at(block=(1.9, 0.0))
-    stayed, _ = judged(PUSH, 3.0, goal=start)
-    pushed, over = judged(PUSH, 3.0, goal=start, ended=moved)
+    stayed, _ = evaluated(PUSH, 3.0, goal=start)
+    pushed, over = evaluated(PUSH, 3.0, goal=start, ended=moved)
     assert not over
     weights = PUSH.reward_weights
     nearness = weights.block * (np.exp(-1.9 / 0.25) - np.exp(-2.0 / 0.25))
@@ -84,13 +84,13 @@ def test_where_the_block_went_counts_and_where_it_is_may_be_outside():
     gain = nearness + far_off + weights.push * 0.1
     assert pushed - stayed == pytest.approx(gain)
     far = goal_at(block=(BASE.limits.geofence + 0.1, 0.0))
-    assert judged(PUSH, 3.0, goal=start, ended=far)[1]
+    assert evaluated(PUSH, 3.0, goal=start, ended=far)[1]
 
 
 def test_a_robot_that_leaves_its_block_behind_is_outside_too():
     start = goal_at(block=(2.0, 0.0))
-    assert not judged(PUSH, BASE.limits.geofence - 0.1, goal=start)[1]
-    assert judged(PUSH, BASE.limits.geofence + 0.1, goal=start)[1]
+    assert not evaluated(PUSH, BASE.limits.geofence - 0.1, goal=start)[1]
+    assert evaluated(PUSH, BASE.limits.geofence + 0.1, goal=start)[1]
 
 
 @pytest.mark.parametrize("name", config_names("tasks"))

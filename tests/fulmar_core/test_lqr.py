@@ -98,7 +98,7 @@ def test_errors_beyond_the_limit_count_as_the_limit():
 
 def error(state, weights=WEIGHTS, push=(0.0, 0.0, 0.0)):
     lqr, inputs = Lqr(ROBOT, POSE, weights), seen(POSE, state)
-    return lqr.error_state(inputs, replace(lqr.frame.situation(inputs), push=np.array([push])))[0]
+    return lqr.error_state(inputs, replace(lqr.frame.body_state(inputs), push=np.array([push])))[0]
 
 
 def test_who_is_pushed_towards_the_goal_goes_there_more_slowly():

@@ -13,7 +13,7 @@ from fulmar_core.episode import draw_episodes
 from fulmar_core.figures import FIGURES
 from fulmar_core.goal import goal_at, stack_goals
 from fulmar_core.metrics import (
-    Judge,
+    TargetCounter,
     Trajectories,
     TrajectoryLog,
     episode_metrics,
@@ -275,11 +275,11 @@ def test_the_log_of_one_episode_has_the_axis_of_episodes_too():
 
 def test_the_judge_counts_waypoints_by_the_tolerance_and_not_by_the_reach_of_controllers():
     goal = goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
-    judge = Judge(WAYPOINTS, goal, DT)
+    counter = TargetCounter(WAYPOINTS, goal, DT)
     between = 0.5 * (WAYPOINTS.reach + WAYPOINTS.tolerance.position)
     state = states(between, 0.0, 0.0)[0]
     assert WAYPOINTS.advance(goal, state, np.asarray(0.0)).done == 0.0
-    assert judge.see(state).done == 1.0
+    assert counter.update(state).done == 1.0
 
 
 @pytest.mark.parametrize("task", [POSE, WAYPOINTS], ids=lambda task: task.name)
@@ -288,8 +288,8 @@ def test_a_whole_episode_noted_at_once_is_what_its_steps_are(task):
     rng = np.random.default_rng(5)
     truths = [PlanarState(*np.cumsum(row)) for row in rng.normal(size=(12, 6))]
     commands = list(rng.integers(0, 2, (12, 8)).astype(float))
-    judge = Judge(task, drawn.goal, DT)
-    goals = [judge.see(truth) for truth in truths]
+    counter = TargetCounter(task, drawn.goal, DT)
+    goals = [counter.update(truth) for truth in truths]
     single, whole = (TrajectoryLog(PLATFORM, task, DT) for _ in range(2))
     for truth, goal, command in zip(truths, goals, commands, strict=True):
         single.add(truth, goal, command)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.counter_rng import Draws
-from fulmar_core.dynamics.outline import outline_of
+from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.goal import goal_at, stack_goals
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState

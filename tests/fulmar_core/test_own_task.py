@@ -17,8 +17,8 @@ from fulmar_core.mission import Mission
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.safety.fallback import warm_up
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.standby import ready
 from fulmar_core.tasks import load_recorded_task, load_task
 from sim_nodes.mock_backend import MockBackend
 from tests.own_files import own_folder
@@ -217,7 +217,7 @@ def test_a_mistake_on_the_way_is_the_task_s_not_the_controller_s(own):
     with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
         loop.step(episode.start, 100_000_000)
     with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
-        ready(Still(), ROBOT, task)
+        warm_up(Still(), ROBOT, task)
 
 
 def test_a_class_that_only_a_bag_names_is_never_imported(own, tmp_path):
@@ -244,7 +244,7 @@ GATE = """
         gate = goal.things["gate"]
         return pose_errors(state, gate, heading=False).position, gate[..., 2] + 0.0 * state.x
 """
-OF_THINGS = "from fulmar_core.things import Thing\nfrom fulmar_core.dynamics.pushing import Block\n"
+OF_THINGS = "from fulmar_core.things import Thing\nfrom fulmar_core.dynamics.contact import Block\n"
 
 
 def test_things_of_its_own_are_observed_and_those_with_a_body_are_pushed_by_every_simulator_alike(own):

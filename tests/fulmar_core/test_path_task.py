@@ -58,7 +58,7 @@ def test_errors_count_against_the_velocity_that_is_wanted_here_not_the_one_told_
     state, goal = drawn(task, worlds=1)
     moving = dataclasses.replace(state, vx=np.array([0.1]), vy=np.array([0.1]))
     now = np.zeros(1)
-    ahead, here = (one.advance(goal, moving, now).current for one in (task, task.judged))
+    ahead, here = (one.advance(goal, moving, now).current for one in (task, task.evaluated))
     still = task.advance(goal, state, now).current
     assert np.abs(ahead - here).max() > 0.005
     np.testing.assert_array_equal(here, still)

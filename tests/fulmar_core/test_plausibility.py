@@ -8,10 +8,10 @@ import pytest
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.geofence import check_starts
 from fulmar_core.paths import config_directory, config_names
 from fulmar_core.plausible_ranges import ROBOT, SCENARIO, TASK
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.geofence import check_starts
 from fulmar_core.tasks import load_task
 
 LOADERS = {"robots": load_robot, "tasks": load_task, "scenarios": load_scenario}

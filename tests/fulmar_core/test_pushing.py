@@ -10,15 +10,14 @@ import pytest
 
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.dynamics.outline import outline_of
-from fulmar_core.dynamics.pushing import SIDEWAYS, push
+from fulmar_core.dynamics.contact import SIDEWAYS, outline_of, push
 from fulmar_core.goal import goal_at, offset_to
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
-from fulmar_core.trajectories import Judge
+from fulmar_core.trajectories import TargetCounter
 
 TASK = load_task("push_block")
 BLOCK = TASK.block
@@ -230,10 +229,10 @@ def test_a_robot_sees_whether_it_stands_behind_the_block_or_beside_it(x, y, behi
 
 
 def test_a_judge_is_told_where_the_block_is():
-    judge = Judge(TASK, at((1.0, 0.0)), 0.1)
-    moved = judge.see(body(), {"block": np.array([0.05, 0.0, 0.0])})
+    counter = TargetCounter(TASK, at((1.0, 0.0)), 0.1)
+    moved = counter.update(body(), {"block": np.array([0.05, 0.0, 0.0])})
     assert float(TASK.errors(body(), moved).position) == pytest.approx(0.05)
-    assert judge.see(body()).things["block"].tolist() == [0.05, 0.0, 0.0]
+    assert counter.update(body()).things["block"].tolist() == [0.05, 0.0, 0.0]
 
 
 def test_blocks_that_cannot_be_are_refused():

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
@@ -97,7 +97,7 @@ def test_a_waypoint_is_reached_as_near_as_the_robot_can_tell(through):
 class Restless:
     """Opens one valve after the other, and keeps the estimates that it gets."""
 
-    name, control_hz, estimator = "restless", 5.0, Suspicion(retry_s=0.0)
+    name, control_hz, estimator = "restless", 5.0, HealthSettings(retry_s=0.0)
 
     def reset(self):
         self.estimates = []

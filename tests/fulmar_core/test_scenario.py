@@ -24,7 +24,7 @@ from fulmar_core.disturbances.scenario import (
 )
 from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.holdability import stranding_losses
+from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 
@@ -245,7 +245,7 @@ def test_what_strands_a_robot_fails_together_each_set_as_often_and_with_the_chan
     sets, counts = np.unique(alive, axis=0, return_counts=True)
     lost = {tuple(np.flatnonzero(row < 0.5)): count for row, count in zip(sets, counts, strict=True)}
     assert lost.pop(()) == pytest.approx(0.25 * COUNT, rel=0.15)
-    assert set(lost) == set(stranding_losses(PLATFORM, 2))
+    assert set(lost) == set(uncontrollable_losses(PLATFORM, 2))
     for count in lost.values():
         assert count == pytest.approx(0.75 * COUNT / len(lost), rel=0.35)
 

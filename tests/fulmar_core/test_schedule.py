@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fulmar_core.schedule import LONGEST_AHEAD_NS, Schedule
+from fulmar_core.mission import LONGEST_AHEAD_NS, Schedule
 
 S = 1_000_000_000
 

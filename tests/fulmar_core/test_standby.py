@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
-from fulmar_core.standby import WARM_UP, ready
+from fulmar_core.safety.fallback import WARM_UP, warm_up
 from fulmar_core.tasks import load_task
 
 ROBOT = load_robot("turtlebot2")
@@ -38,13 +38,13 @@ class Counting:
 @pytest.mark.parametrize("task", config_names("tasks"))
 def test_it_is_asked_for_commands_of_its_task_and_begins_anew(task):
     controller = Counting()
-    ready(controller, ROBOT, load_task(task))
+    warm_up(controller, ROBOT, load_task(task))
     assert len(controller.seen) == WARM_UP
     assert np.isfinite(controller.seen).all()
     assert controller.since_reset == 0
 
 
 def test_its_metadata_is_json_with_what_is_said_beside_its_own():
-    standby = ready(Counting(), ROBOT, load_task("go_to_pose"), said={"fallback": "lqr"})
+    standby = warm_up(Counting(), ROBOT, load_task("go_to_pose"), said={"fallback": "lqr"})
     assert json.loads(standby.metadata) == {"controller": "counting", "sha256": "abc", "fallback": "lqr"}
     assert standby.sha256 == "abc"

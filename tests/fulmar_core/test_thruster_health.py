@@ -9,8 +9,8 @@ import pytest
 
 from fulmar_core.disturbances.scenario import Actuation, Push, Scenario, Wave, load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.health.thruster_health import ThrusterHealth, can_be_watched
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
+from fulmar_core.health.thruster_health import ThrusterHealth, can_estimate_health
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
@@ -103,7 +103,7 @@ def test_what_is_never_commanded_is_neither_accused_nor_acquitted():
     for _ in range(50):
         watched.simulation.step(np.zeros((4, 8)))
         watched.believed = watched.health.see(watched.simulation.measured, np.zeros((4, 8)), DT)
-    np.testing.assert_allclose(watched.believed.effectiveness, 1.0 - Suspicion().failure, atol=0.01)
+    np.testing.assert_allclose(watched.believed.effectiveness, 1.0 - HealthSettings().failure, atol=0.01)
     np.testing.assert_allclose(np.hypot(*watched.believed.push[:, :2].T), 0.1, atol=0.01)
 
 
@@ -160,13 +160,13 @@ def test_a_turn_across_the_half_circle_is_no_surprise():
 
 def test_robots_that_roll_or_swim_are_refused():
     for name, robot in ROBOTS.items():
-        assert can_be_watched(robot) == robot.air_bearing, name
+        assert can_estimate_health(robot) == robot.air_bearing, name
     with pytest.raises(ConfigError, match="kingfisher"):
         ThrusterHealth(ROBOTS["kingfisher"])
 
 
 def test_suspicions_without_meaning_are_refused():
     with pytest.raises(ValueError, match="greater than 0"):
-        Suspicion(velocity=0.0)
+        HealthSettings(velocity=0.0)
     with pytest.raises(ValueError, match="one half"):
-        Suspicion(failure=0.6)
+        HealthSettings(failure=0.6)

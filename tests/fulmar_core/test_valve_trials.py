@@ -10,7 +10,7 @@ from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.disturbances.scenario import Push, Scenario
 from fulmar_core.goal import goal_in_float64
-from fulmar_core.health.valve_trials import LONGEST_S, OPENINGS_S, ValveTrials
+from fulmar_core.health.actuator_estimator import LONGEST_S, OPENINGS_S, ValveTrials
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task

@@ -11,14 +11,13 @@ import pytest
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
-from fulmar_core.references.race_corners import draw_corners
+from fulmar_core.references.race_track import draw_corners
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.race_gates import LAST, crossings
-from fulmar_core.tasks.race_track import RaceTrack
-from fulmar_core.tasks.waypoint_tasks import PassingTask
-from fulmar_core.tasks.waypoints import Course, headings_along
-from fulmar_core.trajectories import Judge
+from fulmar_core.tasks.waypoint_courses import RaceTrack, WaypointCourse, headings_along
+from fulmar_core.tasks.waypoint_tasks import WaypointTask
+from fulmar_core.trajectories import TargetCounter
 
 NAMES = ("go_through_positions", "go_through_poses", "race_waypoints", "race_wayposes", "race_gates")
 TASKS = {name: load_task(name) for name in NAMES}
@@ -89,8 +88,8 @@ def test_a_position_within_reach_is_done_whichever_way_one_looks():
 
 
 def test_a_judge_counts_by_the_tolerance_and_a_controller_by_its_reach():
-    judge = Judge(POSITIONS, square(), 0.1)
-    assert judge.see(body(0.18)).done.tolist() == [1.0]
+    counter = TargetCounter(POSITIONS, square(), 0.1)
+    assert counter.update(body(0.18)).done.tolist() == [1.0]
     assert POSITIONS.advance(square(), body(0.18), 0.0).done.tolist() == [0.0]
 
 
@@ -161,15 +160,15 @@ def test_a_gate_s_direction_turns_with_it():
 
 
 def test_gates_are_counted_step_by_step_and_once_each():
-    goal, judge = square(), Judge(GATES, square(), 0.1)
+    goal, counter = square(), TargetCounter(GATES, square(), 0.1)
     for x in np.linspace(-1.0, 1.0, 21)[1:]:
         goal = GATES.advance(goal, body(x, 0.1), 0.0)
-        judge.see(body(x, 0.1))
+        counter.update(body(x, 0.1))
         assert goal.done.tolist() == [1.0 if x >= 0.0 else 0.0]
         assert goal.things[LAST][:, :2].tolist() == [[x, 0.1]]
     for x in np.linspace(1.0, -1.0, 21):  # back again: the next gate is another one
         goal = GATES.advance(goal, body(x, 0.1), 0.0)
-    assert goal.done.tolist() == judge.goal.done.tolist() == [1.0]
+    assert goal.done.tolist() == counter.goal.done.tolist() == [1.0]
 
 
 def test_between_controller_and_post_is_a_margin_that_only_judges_count():
@@ -331,7 +330,7 @@ def test_a_track_of_fewer_corners_has_the_middles_of_its_longest_straights_too()
 
 def test_courses_and_tracks_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match="'count' must be at least 2"):
-        Course(1, (1.0, 2.0), 5.0)
+        WaypointCourse(1, (1.0, 2.0), 5.0)
     with pytest.raises(ValueError, match="'corners' must be"):
         RaceTrack((4, 9), 15.0)
     with pytest.raises(ValueError, match="'reach' must be"):
@@ -344,4 +343,4 @@ def test_courses_and_tracks_that_cannot_be_are_refused():
 
 def test_a_kind_that_does_not_say_where_its_targets_lie_is_none():
     with pytest.raises(TypeError, match="places"):
-        PassingTask(**{field.name: getattr(POSITIONS, field.name) for field in fields(PassingTask)})
+        WaypointTask(**{field.name: getattr(POSITIONS, field.name) for field in fields(WaypointTask)})

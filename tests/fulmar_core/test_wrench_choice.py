@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from fulmar_core.controllers.wrench_choice import HASTE_COST, REACH, TORQUE_WEIGHT, VALVE_COST, WrenchChoice
+from fulmar_core.controllers.wrench_choice import (
+    FULL_SHARE,
+    HASTE_COST,
+    TORQUE_WEIGHT,
+    VALVE_COST,
+    WrenchChoice,
+)
 from fulmar_core.robot import load_robot
 
 ROBOT = load_robot("floating_platform")
@@ -36,7 +42,7 @@ def test_what_is_smaller_than_any_combination_opens_nothing():
 def test_no_other_combination_comes_nearer_to_what_is_asked_for_its_gas():
     chosen = CHOICE.best(SHARES)
 
-    wanted = REACH * SHARES
+    wanted = FULL_SHARE * SHARES
 
     def cost(valves):
         dearer = 1.0 + HASTE_COST * np.sum(wanted**2, axis=-1)
@@ -52,7 +58,12 @@ def test_cheaper_gas_comes_nearer_to_what_is_asked():
     small = 0.2 * SHARES
     misses = [
         float(
-            np.mean(np.sum((wrench(WrenchChoice.of(ROBOT, gas).best(small)) - REACH * small) ** 2, axis=-1))
+            np.mean(
+                np.sum(
+                    (wrench(WrenchChoice.of(ROBOT, gas).best(small)) - FULL_SHARE * small) ** 2,
+                    axis=-1,
+                )
+            )
         )
         for gas in (0.2, 1.0)
     ]

@@ -77,7 +77,7 @@ def test_a_page_shows_every_plot_with_words(compared):
     for label in (
         "x [m]",
         "time [s]",
-        "from measurement to command, as recorded [ms]",
+        "from measurement sent to command sent [ms]",
         "commands [%]",
         "open-valve time [s]",
     ):

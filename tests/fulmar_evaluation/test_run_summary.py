@@ -14,7 +14,7 @@ from fulmar_core.errors import BagError
 from fulmar_core.rotation import yaw_of
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.run_evaluation import _goals, evaluate_run
-from fulmar_evaluation.run_summary import summarise, summary_text
+from fulmar_evaluation.run_summary import latencies_ms, summarise, summary_text
 from tests.synthetic_run import Plan, write_run
 
 
@@ -75,9 +75,11 @@ def test_a_run_of_exactly_the_window_is_long_enough_whatever_its_stamps_round_to
 def before_the_start(record, count):
     """The record with commands that answer nothing, as a controller sends them before the plant starts."""
     first = record.commanded
+    times = np.concatenate((first.log_s[0] - 10.0 * np.arange(count, 0, -1), first.log_s))
     early = {
         "stamp_s": np.concatenate((np.zeros(count), first.stamp_s)),
-        "log_s": np.concatenate((first.log_s[0] - 10.0 * np.arange(count, 0, -1), first.log_s)),
+        "log_s": times,
+        "publish_s": times,
         "effort": np.concatenate((np.zeros((count, 8)), first.effort)),
     }
     return dataclasses.replace(record, commanded=dataclasses.replace(first, **early))
@@ -113,6 +115,16 @@ def test_figures_of_the_nodes_are_taken_over(reached):
 def test_latency_comes_from_the_bag_where_the_plant_does_not_tell_it(reached):
     latency = summarise(read_run(reached))["latency_ms"]
     assert 1.5 < latency["p50"] < latency["p99"] <= latency["max"] < 6.0
+
+
+def test_latency_does_not_count_how_late_the_recorder_received_a_command(reached):
+    record = dataclasses.replace(read_run(reached), health=())
+    late = dataclasses.replace(record.commanded, log_s=record.commanded.log_s + 0.5)
+    record = dataclasses.replace(record, commanded=late)
+    assert summarise(record)["latency_ms"]["max"] < 6.0
+    sent_later = dataclasses.replace(late, publish_s=late.publish_s + 0.001)
+    before, after = (latencies_ms(dataclasses.replace(record, commanded=each)) for each in (late, sent_later))
+    np.testing.assert_allclose(after, before + 1.0, atol=1e-3)
 
 
 def test_latency_of_the_plant_counts_where_it_tells_it(reached):
@@ -279,6 +291,7 @@ def test_a_run_on_hardware_is_evaluated_from_its_first_actuation_on_for_as_long_
         applied,
         stamp_s=applied.stamp_s[first:],
         log_s=applied.log_s[first:],
+        publish_s=applied.publish_s[first:],
         effort=applied.effort[first:],
     )
     info = {**record.info, "backend": "hardware", "duration_s": 20.0}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 
 from fulmar_ros import operator_subscription
-from fulmar_ros.operator_subscription import _Once
+from fulmar_ros.operator_subscription import _Once, with_message_info
 
 
 def info(sent_ns: int, number: int) -> dict[str, int]:
@@ -25,6 +25,15 @@ def test_the_second_delivery_of_a_message_is_dropped_by_every_executor():
 def test_rclpy_takes_it_for_a_callback_that_asks_for_info():
     signature = inspect.signature(_Once(print, with_info=False))
     assert len(signature.parameters) == 2
+
+
+def test_a_callback_receives_the_message_info_from_every_executor():
+    got: list[tuple[str, dict[str, int]]] = []
+    callback = with_message_info(lambda message, about: got.append((message, about)))
+    assert len(inspect.signature(callback).parameters) == 2, "else rclpy passes no info"
+    callback("a", info(5, 1))
+    callback(("b", info(6, 2)))
+    assert got == [("a", info(5, 1)), ("b", info(6, 2))]
 
 
 def test_without_a_time_of_sending_no_message_is_lost():

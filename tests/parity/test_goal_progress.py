@@ -19,10 +19,9 @@ from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.paths import config_names
 from fulmar_core.planar import COLUMNS, PlanarState, rigid_of
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.safety.succession import Succession
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 
@@ -151,7 +150,7 @@ def in_simulators(task, series, monkeypatch):
 
 
 class NoEstop:
-    heard = False
+    received = False
 
     def reason(self, now_ns):
         return ""
@@ -163,7 +162,11 @@ def in_the_node(task, series, monkeypatch):
     for world in range(EPISODES):
         recorder, goal = Recorder(), goal_in_float64(drawn(task).goal)[world]
         guard = GuardedLoop(
-            ROBOT, task, ControllerSettings(lockstep=True), Succession(Standby(recorder, "{}", "")), NoEstop()
+            ROBOT,
+            task,
+            ControllerSettings(lockstep=True),
+            ControllerSwitch(Standby(recorder, "{}", "")),
+            NoEstop(),
         )
         guard.activate()
         if task.goal_topic == "goal_velocity":

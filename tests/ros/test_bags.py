@@ -134,6 +134,7 @@ def test_a_stamp_that_comes_twice_does_not_change_the_pace(tmp_path: Path):
     odometry = bag.of(ODOMETRY)
     odometry.data.insert(11, odometry.data[10])
     odometry.log_ns.insert(11, odometry.log_ns[10] + 1)
+    odometry.publish_ns.insert(11, odometry.publish_ns[10])
     odometry.sequence.insert(11, 0)
     plan = schedule(bag, topics=["odom"])
     assert (plan.end_ns - plan.begin_ns) / 1e9 == pytest.approx(19.8)

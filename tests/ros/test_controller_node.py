@@ -214,12 +214,12 @@ def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
 def test_a_robot_that_left_its_area_waits_there_and_back_inside_for_somebody_to_give_a_goal(
     neighbour: Neighbour,
 ) -> None:
-    with running(make_lqr, [], "area:=[-1.0, 1.0, -1.0, 1.0]"), measured(neighbour) as odometry:
+    with running(make_lqr, [], "area:=[-1.0, 9.0, -1.0, 1.0]"), measured(neighbour) as odometry:
         neighbour.give_goal()
         until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
 
         def beyond(message: Odometry) -> None:
-            message.pose.pose.position.x += 1.1
+            message.pose.pose.position.y += 1.1
 
         odometry.spoil = beyond
         until(lambda: "outside its area" in told(neighbour, "reason"))

@@ -290,6 +290,21 @@ def test_a_pose_on_the_command_line_becomes_the_goal_of_a_running_controller(
     assert "pose x = 3 m, y = 1 m, heading = 90 deg on /floating_platform/goal_pose" in line
 
 
+@pytest.mark.parametrize("controller", [["area:=[-2.0, 9.0, -2.0, 2.0]"]], indirect=True)
+def test_a_pose_outside_the_area_of_the_running_controller_ends_with_one_line_and_changes_nothing(
+    neighbour: Neighbour, stream: Stream, controller: Any, capfd
+) -> None:
+    before = controller.guard.loop.goal.current.tolist()
+    with single_goal_node(1.0, 3.0, 90.0, **PATIENT) as (_, codes):
+        until(lambda: codes == [1])
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if "ERROR" in line]
+    assert (
+        "refuses the goal: out of bounds: the goal x = 1 m, y = 3 m lies outside the area of x -2 to 9 m"
+        in line
+    )
+    assert controller.guard.loop.goal.current.tolist() == before
+
+
 @pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)
 @pytest.mark.parametrize("topic", ["goal_velocity", "goal_path"])
 def test_a_pose_for_a_controller_that_takes_other_goals_ends_with_one_line(

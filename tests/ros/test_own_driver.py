@@ -17,7 +17,7 @@ import pytest
 from fulmar_bringup.node_table import plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.exit_codes import BAD_USAGE, FAILED
+from fulmar_core.errors import BAD_USAGE, FAILED
 from fulmar_ros.runtime import spinning
 from hardware_drivers.driver_node import DriverNode
 from tests.conftest import RosDomain

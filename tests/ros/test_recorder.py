@@ -24,6 +24,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 
+from fulmar_bags.contents import open_bag
 from fulmar_core.errors import LockstepError
 from fulmar_core.topics import GOAL_POSE, METADATA
 from fulmar_ros.qos import publish_patiently, publisher_qos
@@ -63,6 +64,34 @@ def test_a_stopped_recorder_has_kept_every_message_and_leaves_no_process(record,
     with pytest.raises(ProcessLookupError):
         os.kill(recorder.process.pid, 0)
     assert not [thread for thread in threading.enumerate() if thread.name == "bag"]
+
+
+def test_a_bag_says_when_a_message_was_sent_and_when_it_was_received(record, node):
+    early = node.create_publisher(PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE))
+    latched = [time.time_ns(), early.publish(PoseStamped()), time.time_ns()]
+    time.sleep(0.2)
+    recorder = record()
+    recorder.wait_until_recording()
+    publisher = odometry(node)
+    recorder.process.send_signal(signal.SIGSTOP)
+    spans = []
+    for stamp in range(20):
+        before = time.time_ns()
+        publish(publisher, [stamp], period_s=0.0)
+        spans.append((before, time.time_ns()))
+    time.sleep(0.5)
+    went_on = time.time_ns()
+    recorder.process.send_signal(signal.SIGCONT)
+    assert publisher.wait_for_all_acked(Duration(seconds=5.0))
+    assert recorder.end(signal.SIGINT)[0] == 0
+    topics = open_bag(recorder.directory).topics
+    odom, goal = topics[f"{ROBOT}/odom"], topics[f"{ROBOT}/{GOAL_POSE.name}"]
+    assert len(odom) == len(spans)
+    for (before, after), sent, received in zip(spans, odom.publish_ns, odom.log_ns, strict=True):
+        assert before <= sent <= after
+        assert received >= went_on
+    # A latched message was sent before anybody recorded.
+    assert latched[0] <= goal.publish_ns[0] <= latched[2] < goal.log_ns[0]
 
 
 def check_provenance(file):

@@ -16,7 +16,7 @@ from rclpy.duration import Duration
 
 from fulmar_bags.run_record import read_run
 from fulmar_bringup.robot_operator import Operator
-from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
+from fulmar_core.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
 from policy_server.controllers import shipped_policy

@@ -56,7 +56,7 @@ def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None):
                 worlds.reset([1, 3, 5 + k % 4])
             np.testing.assert_allclose(batch.observe(), plain.observe(), atol=2e-4)
     assert np.ptp(reward) > 0.0
-    ours, theirs = (parts_of(worlds.moving()) for worlds in (batch, plain))
+    ours, theirs = (parts_of(worlds.mutable_state()) for worlds in (batch, plain))
     assert ours.keys() == theirs.keys()
     for name in ours:
         for our, their in zip(leaves(ours[name]), leaves(theirs[name]), strict=True):

@@ -12,7 +12,7 @@ import pytest
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import stranding_losses
+from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.observation import Observer
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
@@ -102,7 +102,7 @@ def test_the_fallback_policy_acts_where_the_robot_is_uncontrollable_and_nowhere_
 
 def test_it_takes_over_at_every_uncontrollable_set_of_dead_valves(run):
     losses = load_network(run / NETWORK_FILE).losses.numpy()
-    assert {tuple(np.flatnonzero(row)) for row in losses} == set(stranding_losses(ROBOT, 2))
+    assert {tuple(np.flatnonzero(row)) for row in losses} == set(uncontrollable_losses(ROBOT, 2))
 
 
 def test_the_exported_bundle_hands_over_as_the_network_does(run, bundle):
@@ -119,7 +119,7 @@ def test_golden_vectors_cover_the_fallback_policy(bundle):
     Policy(folder, ROBOT, TASK)  # checks them
     dead = np.load(folder / "golden.npz")["observations"][:, -8:] < 0.5
     reported = {tuple(np.flatnonzero(row)) for row in dead}
-    assert reported > set(stranding_losses(ROBOT, 2))
+    assert reported > set(uncontrollable_losses(ROBOT, 2))
     assert () in reported
 
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import step_bar
 from fulmar_cli.commands.arguments import JsonOption, SeedOption, renamed
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED
 
 
 def estimator(
@@ -52,7 +52,7 @@ def estimator(
 
     plot = plot or old_plot
     require("filterpy", *(["matplotlib"] if plot else []))
-    from fulmar_core.estimation.settings import load_estimator
+    from fulmar_core.estimation.motion_filter import load_estimator
     from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, compare, requirements_met
     from tests.benchmarks.estimator.comparison import as_json as rows_of
     from tests.benchmarks.estimator.drive import drives as drive_about

@@ -12,8 +12,7 @@ from rich.table import Table
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, SeedOption
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, UnknownNameError
 
 ROBOTS = ("floating_platform", "kingfisher", "turtlebot2", "jetbot")
 

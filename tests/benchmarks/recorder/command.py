@@ -10,8 +10,7 @@ import typer
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, ConfigError, UnknownNameError
 
 
 def recorder(

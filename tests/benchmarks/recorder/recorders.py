@@ -28,7 +28,7 @@ from fulmar_bringup.processes import child_environment, command_line
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import RunFailed
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
+from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from fulmar_ros.convert import stamp_of

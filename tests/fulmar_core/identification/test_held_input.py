@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.identification.drive import drive_of
+from fulmar_core.identification.drives import cut, drive_of
 from fulmar_core.identification.held_input import followed, late_events, mean_over_steps, ramped
-from fulmar_core.identification.windows import cut
 
 DT = 0.02
 

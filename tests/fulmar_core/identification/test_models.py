@@ -13,7 +13,7 @@ import pytest
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
-from fulmar_core.identification.drive import drive_of
+from fulmar_core.identification.drives import drive_of
 from fulmar_core.identification.identify import Weight, calibration_of, identify
 from fulmar_core.identification.model import Known
 from fulmar_core.robot import load_robot

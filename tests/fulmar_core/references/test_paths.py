@@ -9,11 +9,20 @@ import numpy as np
 import pytest
 
 from fulmar_core.references import PATHS, ReferencePath
-from fulmar_core.references.lemniscates import BernoulliLemniscate, GeronoLemniscate, Hippopede
-from fulmar_core.references.oscillations import Hypotrochoid, Lissajous, Sine
-from fulmar_core.references.polygons import InfiniteSquare, Ngon, Square
+from fulmar_core.references.curves import (
+    BernoulliLemniscate,
+    Circle,
+    GeronoLemniscate,
+    Hippopede,
+    Hypotrochoid,
+    InfiniteSquare,
+    Lissajous,
+    Ngon,
+    Sine,
+    Spiral,
+    Square,
+)
 from fulmar_core.references.race_track import RaceTrack
-from fulmar_core.references.rounds import Circle, Spiral
 
 COUNT = 1000
 EXAMPLES = (

@@ -180,24 +180,24 @@ class TestEstop:
     """The e-stop goes before everything."""
 
     def test_it_closes_the_valves_at_once_and_takes_no_command(self, guard):
-        guard.estop.hear(False, 0)
+        guard.estop.receive(False, 0)
         guard.offer(NAMES, GOOD, 0)
         assert guard.output(1).any()
-        guard.estop.hear(True, 2)
+        guard.estop.receive(True, 2)
         assert not guard.output(3).any()
         guard.offer(NAMES, GOOD, 4)
         assert not guard.output(5).any()
 
     def test_its_silence_does_the_same(self, guard):
-        guard.estop.hear(False, 0)
+        guard.estop.receive(False, 0)
         for t in range(0, 1000, 50):
             guard.offer(NAMES, GOOD, t * MS)
         assert not guard.output(1000 * MS).any()
 
     def test_after_a_release_only_a_new_command_opens_a_valve(self, guard):
-        guard.estop.hear(True, 0)
+        guard.estop.receive(True, 0)
         guard.offer(NAMES, GOOD, 1)
-        guard.estop.hear(False, 400 * MS)
+        guard.estop.receive(False, 400 * MS)
         guard.estop.release(600 * MS)
         assert not guard.output(601 * MS).any()
         guard.offer(NAMES, GOOD, 602 * MS)
@@ -206,12 +206,12 @@ class TestEstop:
     def test_it_holds_in_lock_step_too(self, guard):
         guard.offer(NAMES, GOOD, 0)
         assert guard.answer(900 * MS).tolist() == GOOD  # time stands still there
-        guard.estop.hear(True, 900 * MS)
+        guard.estop.receive(True, 900 * MS)
         assert not guard.answer(901 * MS).any()
 
     def test_a_person_is_stopped_like_a_controller(self, guard):
         guard.offer_by_hand(NAMES, GOOD, 0)
-        guard.estop.hear(True, 1)
+        guard.estop.receive(True, 1)
         assert not guard.output(2).any()
 
 
@@ -267,7 +267,7 @@ class TestCommandWriters:
 
     def test_while_two_nodes_publish_commands_the_valves_are_closed(self, guard):
         guard.offer(NAMES, GOOD, 0)
-        guard.writers.see(TWO, 1 * MS)
+        guard.publishers.see(TWO, 1 * MS)
         assert not guard.output(1 * MS).any()
         assert not guard.answer(1 * MS).any()
         guard.offer(NAMES, GOOD, 2 * MS)
@@ -275,25 +275,25 @@ class TestCommandWriters:
         assert guard.command.tolist() == [0.0] * 8  # nothing is left for the end of the hold
 
     def test_the_reason_names_both_nodes(self, guard):
-        guard.writers.see(TWO, 0)
-        assert "2 nodes publish commands, and only one may: " + ", ".join(TWO) in guard.writers.reason(0)
+        guard.publishers.see(TWO, 0)
+        assert "2 nodes publish commands, and only one may: " + ", ".join(TWO) in guard.publishers.reason(0)
 
     def test_after_one_is_gone_and_a_settle_time_the_other_is_obeyed(self, guard):
-        guard.writers.see(TWO, 0)
-        guard.writers.see([], 10 * MS)
+        guard.publishers.see(TWO, 0)
+        guard.publishers.see([], 10 * MS)
         guard.offer(NAMES, GOOD, 990 * MS)
         assert not guard.output(990 * MS).any()
         guard.offer(NAMES, GOOD, 1_010 * MS)
         assert guard.output(1_010 * MS).tolist() == GOOD
-        assert guard.writers.reason(1_010 * MS) == ""
+        assert guard.publishers.reason(1_010 * MS) == ""
 
     def test_one_node_is_obeyed(self, guard):
-        guard.writers.see(TWO[:1], 0)
+        guard.publishers.see(TWO[:1], 0)
         guard.offer(NAMES, GOOD, 0)
         assert guard.output(0).tolist() == GOOD
 
     def test_a_person_drives_although_two_controllers_do_not(self, guard):
-        guard.writers.see(TWO, 0)
+        guard.publishers.see(TWO, 0)
         guard.offer_by_hand(NAMES, GOOD, 1 * MS)
         assert guard.output(1 * MS).tolist() == GOOD
         guard.offer_by_hand(NAMES, [0.0] * 8, 2 * MS)
@@ -304,7 +304,7 @@ class TestCommandWriters:
     def test_wheels_slow_down_instead_of_locking(self, base):
         for k in range(6):
             base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
-        base.writers.see(TWO, 510 * MS)
+        base.publishers.see(TWO, 510 * MS)
         assert base.output(510 * MS)[0] == pytest.approx(0.45)
         assert 0.0 < base.output(700 * MS)[0] < 0.4
         assert base.output(1_200 * MS)[0] == 0.0
@@ -349,7 +349,7 @@ class TestSlew:
         for k in range(6):
             base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
         assert base.output(501 * MS)[0] == pytest.approx(0.45)
-        base.estop.hear(True, 510 * MS)
+        base.estop.receive(True, 510 * MS)
         assert base.output(520 * MS)[0] > 0.4
         assert base.output(620 * MS)[0] == pytest.approx(0.45 - 0.09, abs=0.02)
         assert base.output(1200 * MS)[0] == 0.0
@@ -397,7 +397,7 @@ def test_whatever_comes_the_output_is_a_command_within_limits_and_safe_under_the
         elif what == "hand":
             guard.offer_by_hand(NAMES, values, now)
         elif what in ("press", "released"):
-            guard.estop.hear(what == "press", now)
+            guard.estop.receive(what == "press", now)
         elif what == "reset":
             guard.estop.release(now)
         elif what == "back":

@@ -6,116 +6,116 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from fulmar_core.safety.estop import QUIET_NS, TIMEOUT_NS, EstopButton, EstopWatch
+from fulmar_core.safety.estop import QUIET_NS, TIMEOUT_NS, EstopButton, EstopMonitor
 
 MS = 1_000_000
 
 
 def test_where_none_is_asked_for_and_none_is_heard_everything_may_move():
-    assert EstopWatch(required=False).reason(0) == ""
+    assert EstopMonitor(required=False).reason(0) == ""
 
 
 def test_where_one_is_required_nothing_moves_before_it_is_heard():
-    watch = EstopWatch(required=True)
-    assert "none is heard" in watch.reason(0)
-    watch.hear(False, 5)
+    watch = EstopMonitor(required=True)
+    assert "none is received" in watch.reason(0)
+    watch.receive(False, 5)
     assert watch.reason(6) == ""
 
 
 def test_one_press_holds_although_the_node_goes_on_saying_released():
-    watch = EstopWatch(required=False)
-    watch.hear(False, 0)
-    watch.hear(True, 10 * MS)
+    watch = EstopMonitor(required=False)
+    watch.receive(False, 0)
+    watch.receive(True, 10 * MS)
     for t in range(100, 5000, 100):
-        watch.hear(False, t * MS)
+        watch.receive(False, t * MS)
         assert "pressed" in watch.reason(t * MS)
     watch.release(5000 * MS)
     assert watch.reason(5000 * MS) == ""
 
 
 def test_one_press_without_any_node_holds_until_a_reset_and_needs_no_node_then():
-    watch = EstopWatch(required=False)
-    watch.hear(True, 0)
+    watch = EstopMonitor(required=False)
+    watch.receive(True, 0)
     assert "pressed" in watch.reason(1)
     assert "pressed" in watch.reason(3_600_000 * MS)
     watch.release(3_600_000 * MS)
     assert watch.reason(7_200_000 * MS) == ""
-    assert not watch.heard
+    assert not watch.received
 
 
 def test_a_press_of_another_publisher_shows_no_node_where_one_is_required():
-    watch = EstopWatch(required=True)
-    watch.hear(True, 0)
+    watch = EstopMonitor(required=True)
+    watch.receive(True, 0)
     watch.release(1)
-    assert "none is heard" in watch.reason(2)
-    watch.hear(False, 3)
+    assert "none is received" in watch.reason(2)
+    watch.receive(False, 3)
     assert watch.reason(4) == ""
 
 
 def test_a_press_right_after_a_reset_holds():
-    watch = EstopWatch(required=False)
-    watch.hear(True, 0)
+    watch = EstopMonitor(required=False)
+    watch.receive(True, 0)
     watch.release(1)
-    watch.hear(True, 2)
-    watch.hear(False, 3)
+    watch.receive(True, 2)
+    watch.receive(False, 3)
     assert "pressed" in watch.reason(4)
 
 
 def test_silence_beyond_the_timeout_stops_also_where_none_was_required():
-    watch = EstopWatch(required=False)
-    watch.hear(False, 0)
+    watch = EstopMonitor(required=False)
+    watch.receive(False, 0)
     assert watch.reason(TIMEOUT_NS) == ""
     assert "silent for" in watch.reason(TIMEOUT_NS + MS)
 
 
 def test_a_reset_does_not_end_the_silence_that_follows_it():
-    watch = EstopWatch(required=False)
-    watch.hear(False, 0)
-    watch.hear(True, 100 * MS)
+    watch = EstopMonitor(required=False)
+    watch.receive(False, 0)
+    watch.receive(True, 100 * MS)
     watch.release(200 * MS)
     assert watch.reason(200 * MS) == ""
     assert "silent for" in watch.reason(701 * MS)
 
 
 def test_a_reset_without_a_node_ends_the_silence_of_one_that_is_gone():
-    watch = EstopWatch(required=False)
-    watch.hear(False, 0)
+    watch = EstopMonitor(required=False)
+    watch.receive(False, 0)
     assert "silent for" in watch.reason(600 * MS)
     watch.release(600 * MS)
     assert watch.reason(5000 * MS) == ""
 
 
 def test_a_reset_without_a_node_does_not_do_where_one_is_required():
-    watch = EstopWatch(required=True)
-    watch.hear(False, 0)
+    watch = EstopMonitor(required=True)
+    watch.receive(False, 0)
     watch.release(600 * MS)
-    assert "none is heard" in watch.reason(600 * MS)
+    assert "none is received" in watch.reason(600 * MS)
 
 
 def test_of_two_buttons_the_pressed_one_counts():
-    watch = EstopWatch(required=False)
+    watch = EstopMonitor(required=False)
     for t in range(0, 2000, 100):
-        watch.hear(True, t * MS)
-        watch.hear(False, (t + 10) * MS)
+        watch.receive(True, t * MS)
+        watch.receive(False, (t + 10) * MS)
         assert watch.reason((t + 20) * MS)
 
 
 def test_a_press_outlives_its_node_until_a_reset():
-    watch = EstopWatch(required=False)
-    watch.hear(False, 0)
-    watch.hear(True, 100 * MS)
+    watch = EstopMonitor(required=False)
+    watch.receive(False, 0)
+    watch.receive(True, 100 * MS)
     for t in range(3000, 6000, 100):  # started again, the node does not know of the press
-        watch.hear(False, t * MS)
+        watch.receive(False, t * MS)
         assert "Reset it" in watch.reason(t * MS)
     watch.release(6000 * MS)
     assert watch.reason(6000 * MS) == ""
 
 
 def test_a_button_that_was_silent_for_a_while_but_not_pressed_is_believed_again():
-    watch = EstopWatch(required=False)
-    watch.hear(False, 0)
+    watch = EstopMonitor(required=False)
+    watch.receive(False, 0)
     assert watch.reason(3000 * MS)
-    watch.hear(False, 3000 * MS)
+    watch.receive(False, 3000 * MS)
     assert watch.reason(3000 * MS) == ""
 
 
@@ -130,25 +130,25 @@ def test_the_button_stays_pressed_until_it_is_reset():
 def test_a_reset_is_refused_while_somebody_commands_motion():
     button = EstopButton()
     button.press()
-    button.hear_command("cmd_vel", False, 0)
+    button.receive_command("cmd_vel", False, 0)
     assert "cmd_vel is not zero" in button.reset(QUIET_NS)
     assert button.pressed
-    button.hear_command("cmd_vel", True, QUIET_NS)
+    button.receive_command("cmd_vel", True, QUIET_NS)
     assert button.reset(QUIET_NS + 1) == ""
 
 
 def test_a_source_that_has_fallen_silent_does_not_hold_a_reset_up_for_ever():
     button = EstopButton()
     button.press()
-    button.hear_command("cmd_vel", False, 0)
+    button.receive_command("cmd_vel", False, 0)
     assert button.reset(QUIET_NS + 1) == ""
 
 
 def test_one_quiet_source_does_not_hide_another_that_is_not():
     button = EstopButton()
     button.press()
-    button.hear_command("teleop/command", False, 0)
-    button.hear_command("actuators/command", True, 1)
+    button.receive_command("teleop/command", False, 0)
+    button.receive_command("actuators/command", True, 1)
     assert "teleop/command" in button.reset(2)
 
 
@@ -160,29 +160,29 @@ def test_one_quiet_source_does_not_hide_another_that_is_not():
 )
 @hypothesis_settings(max_examples=100, deadline=None)
 def test_nothing_moves_after_a_press_before_a_reset_whatever_else_is_said(messages, later_ms):
-    watch, now, pressed = EstopWatch(required=False), 0, False
+    watch, now, pressed = EstopMonitor(required=False), 0, False
     for said, gap_ms in messages:
         now += gap_ms * MS
         if said == "reset":
             watch.release(now)
             pressed = False
         else:
-            watch.hear(said == "press", now)
+            watch.receive(said == "press", now)
             pressed = pressed or said == "press"
     now += later_ms * MS
     moves = watch.reason(now) == ""
     assert not (moves and pressed)
     if later_ms * MS > TIMEOUT_NS:
-        assert not (moves and watch.heard)
+        assert not (moves and watch.received)
 
 
 def test_it_tells_whether_it_ever_allowed_anything():
-    watch = EstopWatch(required=True)
-    watch.hear(True, 0)
+    watch = EstopMonitor(required=True)
+    watch.receive(True, 0)
     assert not watch.was_released
-    watch.hear(False, 1)
+    watch.receive(False, 1)
     assert not watch.was_released
     watch.release(2)
-    watch.hear(False, 3)
+    watch.receive(False, 3)
     assert watch.was_released
-    assert EstopWatch(required=False).was_released
+    assert EstopMonitor(required=False).was_released

@@ -40,7 +40,8 @@ class Topic:
     name: str
     type: str  # such as `nav_msgs/msg/Odometry`
     data: list[bytes] = field(default_factory=list)  # in CDR
-    log_ns: list[int] = field(default_factory=list)  # when each was recorded, since the epoch [ns]
+    log_ns: list[int] = field(default_factory=list)  # when each was received, since the epoch [ns]
+    publish_ns: list[int] = field(default_factory=list)  # when each was sent; where unknown, as `log_ns` [ns]
     sequence: list[int] = field(default_factory=list)  # number of each, counted by its recorder; 0: not known
     unreadable: list[int] = field(default_factory=list)  # indices of those that are not what the type says
 
@@ -58,6 +59,7 @@ class Topic:
             self.type,
             [self.data[i] for i in kept],
             [self.log_ns[i] for i in kept],
+            [self.publish_ns[i] for i in kept],
             [self.sequence[i] for i in kept],
         )
 
@@ -259,10 +261,11 @@ class _Gathered:
         return self.topics.setdefault(f"{name} ({kind})", Topic(name, kind))
 
     @staticmethod
-    def _add(topic: Topic, data: bytes, log_ns: int, sequence: int) -> None:
+    def _add(topic: Topic, data: bytes, log_ns: int, publish_ns: int, sequence: int) -> None:
         # Where bags are compressed message by message, nothing in an MCAP file says so; CDR begins with a zero.
         topic.data.append(unpack(data) if data.startswith(ZSTD_MAGIC) else data)
         topic.log_ns.append(log_ns)
+        topic.publish_ns.append(publish_ns or log_ns)
         topic.sequence.append(sequence)
 
     def _read_mcap(self, file: Path) -> None:
@@ -275,7 +278,7 @@ class _Gathered:
                 if topic is None:
                     lost["messages of channels that are not announced"] += 1
                     continue
-                self._add(topic, record.data, record.log_time, record.sequence)
+                self._add(topic, record.data, record.log_time, record.publish_time, record.sequence)
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
@@ -299,7 +302,7 @@ class _Gathered:
                 topics = {each.id: self._topic(each.topic, each.msgtype) for each in reader.connections}
                 try:
                     for connection, log_ns, data in reader.messages():
-                        self._add(topics[connection.id], bytes(data), log_ns, 0)
+                        self._add(topics[connection.id], bytes(data), log_ns, 0, 0)
                 except Exception as error:  # noqa: BLE001 - damage raises whatever it pleases, from sqlite3 or rosbags
                     self.warnings.append(f"{file.name}: the rest is damaged ({_first_line(error)}).")
         except Exception as error:

@@ -18,7 +18,7 @@ from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.goal import PoseTuple, goal_at
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import Frames
-from fulmar_core.safety.area import NO_AREA
+from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.topics import (
     ACTION,
@@ -241,7 +241,7 @@ def _checked(found: Vectors, names: tuple[str, ...], topic: str, warnings: list[
     if len(found):
         warnings.append(f"{topic} is about {', '.join(found.names)}, not about {', '.join(names)}: left out.")
     empty = np.zeros(0, dtype=np.int64)
-    return Vectors(names, empty, empty, np.zeros((0, len(names))), found.left_out + len(found))
+    return Vectors(names, empty, empty, empty, np.zeros((0, len(names))), found.left_out + len(found))
 
 
 def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int, int]]:

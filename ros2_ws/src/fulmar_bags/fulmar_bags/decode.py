@@ -27,7 +27,8 @@ class Vectors:
 
     names: tuple[str, ...]
     stamp_ns: np.ndarray  # (n,) int64
-    log_ns: np.ndarray  # (n,) int64
+    log_ns: np.ndarray  # (n,) int64, when the recorder received each
+    publish_ns: np.ndarray  # (n,) int64, when each was sent
     values: np.ndarray  # (n, m)
     left_out: int  # messages with other names or lengths, or that cannot be read
 
@@ -41,7 +42,8 @@ class Odometries:
     """Odometry over time, as it was on the wire."""
 
     stamp_ns: np.ndarray  # (n,) int64
-    log_ns: np.ndarray  # (n,) int64
+    log_ns: np.ndarray  # (n,) int64, when the recorder received each
+    publish_ns: np.ndarray  # (n,) int64, when each was sent
     frame: tuple[str, ...]  # of the pose, by message
     child_frame: tuple[str, ...]  # of the twist, by message
     pose: np.ndarray  # (n, 7) x, y, z [m], quaternion xyzw
@@ -55,10 +57,15 @@ class Odometries:
 
 def messages(topic: Topic) -> list[tuple[int, Any]]:
     """Time of recording [ns] and message, of those that can be read."""
+    return [(log_ns, message) for log_ns, _, message in _timed(topic)]
+
+
+def _timed(topic: Topic) -> list[tuple[int, int, Any]]:
+    """Times of receiving and of sending [ns] and message, of those that can be read."""
     store, found = type_store(), []
-    for log_ns, data in zip(topic.log_ns, topic.data, strict=True):
+    for log_ns, publish_ns, data in zip(topic.log_ns, topic.publish_ns, topic.data, strict=True):
         try:
-            found.append((log_ns, store.deserialize_cdr(data, topic.type)))
+            found.append((log_ns, publish_ns, store.deserialize_cdr(data, topic.type)))
         except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; `open_bag` counts them
             continue
     return found
@@ -97,17 +104,16 @@ def joint_vectors(topic: Topic, field: str) -> Vectors:
     """
     fast = _alike(topic, lambda walk: walk.joint_state(field))
     if fast is not None:
-        return Vectors(fast.texts, _stamps(topic), np.array(topic.log_ns, dtype=np.int64), fast.numbers, 0)
-    found = messages(topic)
-    names = tuple(found[0][1].name) if found else ()
+        return Vectors(fast.texts, *_times(topic), fast.numbers, 0)
+    found = _timed(topic)
+    names = tuple(found[0][2].name) if found else ()
     alike = [
-        (log_ns, m) for log_ns, m in found if tuple(m.name) == names and len(getattr(m, field)) == len(names)
+        each for each in found if tuple(each[2].name) == names and len(getattr(each[2], field)) == len(names)
     ]
     return Vectors(
         names,
-        np.array([stamp_of(m) for _, m in alike], dtype=np.int64),
-        np.array([log_ns for log_ns, _ in alike], dtype=np.int64),
-        np.array([getattr(m, field) for _, m in alike], dtype=float).reshape(len(alike), len(names)),
+        *_times_of(alike),
+        np.array([getattr(m, field) for *_, m in alike], dtype=float).reshape(len(alike), len(names)),
         len(topic) - len(alike),
     )
 
@@ -117,16 +123,16 @@ def twist_vectors(topic: Topic) -> Vectors:
 
     Those without a stamp, as most drivers of others take them, count from when they were recorded.
     """
-    found = messages(topic)
-    log_ns = np.array([log for log, _ in found], dtype=np.int64)
-    plain = topic.type == TWIST
+    found, plain = _timed(topic), topic.type == TWIST
+    twists = [message if plain else message.twist for *_, message in found]
+    logs, published = np.array([each[:2] for each in found], dtype=np.int64).reshape(-1, 2).T
+    stamps = logs if plain else np.array([stamp_of(message) for *_, message in found], dtype=np.int64)
     return Vectors(
         ("speed", "yaw_rate"),
-        log_ns if plain else np.array([stamp_of(m) for _, m in found], dtype=np.int64),
-        log_ns,
-        np.array(
-            [(t.linear.x, t.angular.z) for _, m in found for t in (m if plain else m.twist,)], dtype=float
-        ).reshape(-1, 2),
+        stamps,
+        logs,
+        published,
+        np.array([(twist.linear.x, twist.angular.z) for twist in twists], dtype=float).reshape(-1, 2),
         len(topic) - len(found),
     )
 
@@ -138,24 +144,22 @@ def odometries(topic: Topic) -> Odometries:
         frame, child = fast.texts
         count = len(topic)
         return Odometries(
-            _stamps(topic),
-            np.array(topic.log_ns, dtype=np.int64),
+            *_times(topic),
             (frame,) * count,
             (child,) * count,
             fast.numbers[:, :7],
             fast.numbers[:, 7:],
             0,
         )
-    found = messages(topic)
+    found = _timed(topic)
 
     def column(read: Callable[[Any], Sequence[float]], width: int) -> np.ndarray:
-        return np.array([read(m) for _, m in found], dtype=float).reshape(-1, width)
+        return np.array([read(m) for *_, m in found], dtype=float).reshape(-1, width)
 
     return Odometries(
-        np.array([stamp_of(m) for _, m in found], dtype=np.int64),
-        np.array([log_ns for log_ns, _ in found], dtype=np.int64),
-        tuple(m.header.frame_id for _, m in found),
-        tuple(m.child_frame_id for _, m in found),
+        *_times_of(found),
+        tuple(m.header.frame_id for *_, m in found),
+        tuple(m.child_frame_id for *_, m in found),
         column(
             lambda m: [
                 *_xyz(m.pose.pose.position),
@@ -173,10 +177,18 @@ def _xyz(vector: Any) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z
 
 
-def _stamps(topic: Topic) -> np.ndarray:
+def _times(topic: Topic) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stamps, times of receiving and of sending of a topic, each of shape (n,) int64 [ns]."""
     found = stamps_ns(topic)
     assert found is not None
-    return found
+    return found, np.array(topic.log_ns, dtype=np.int64), np.array(topic.publish_ns, dtype=np.int64)
+
+
+def _times_of(found: list[tuple[int, int, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `_times`, of messages with a header."""
+    table = [(stamp_of(message), log_ns, publish_ns) for log_ns, publish_ns, message in found]
+    stamps, logs, published = np.array(table, dtype=np.int64).reshape(-1, 3).T
+    return stamps, logs, published
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
-"""Bags as a dataset in the layout of LeRobot, version 2.1 of its format: parquet by episode, meta data as JSON.
+"""Bags as a dataset in the layout of LeRobot, version 3.0 of its format: many episodes in one parquet file.
 
-Source: `meta/info.json` of public datasets of that version. Each bag is one episode, each control step one frame: what
-the controller was fed is `observation.state`, what it answered is `action`.
+Source: what LeRobot 0.4.4 writes; `tests/peers` loads our datasets with it. Each bag is one episode, each control step
+one frame: what the controller received is `observation.state`, what it answered is `action`.
 """
 
 from __future__ import annotations
@@ -19,10 +19,15 @@ from fulmar_bags.control_steps import ControlSteps
 from fulmar_bags.figures import GAP, NS
 from fulmar_core.errors import BagError, ConfigError
 
-VERSION = "v2.1"
-CHUNK = 1000  # episodes of one folder
-DATA_PATH = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
+VERSION = "v3.0"
+CHUNK = 1000  # files of one folder
+FILE_MB = 100  # an episode that would make a file of frames larger than this begins another one
+FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+DATA_PATH, EPISODES_PATH = f"data/{FILE}", f"meta/episodes/{FILE}"
 INDICES = ("frame_index", "episode_index", "index", "task_index")
+QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+
+Columns = dict[str, np.ndarray]  # of one episode, by feature; the first axis is that of its frames
 
 
 def write_lerobot(
@@ -49,25 +54,21 @@ def write_lerobot(
     _check_alike(courses)
     fps = courses[0].settings.control_rate(courses[0].robot)
     tasks = list(dict.fromkeys(titles))
-    meta = folder / "meta"
-    meta.mkdir(parents=True, exist_ok=True)
-    begin, episodes, stats = 0, [], []
-    frames = [(part, title) for mine, title in zip(parts, titles, strict=True) for part in mine]
-    for number, ((state, action), title) in enumerate(frames):
-        columns = _columns(state, action, fps, number, begin, tasks.index(title))
-        path = folder / DATA_PATH.format(episode_chunk=number // CHUNK, episode_index=number)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        pq.write_table(_table(columns), path)
-        episodes.append({"episode_index": number, "tasks": [title], "length": len(state)})
-        stats.append(
-            {"episode_index": number, "stats": {key: _stats(value) for key, value in columns.items()}}
-        )
-        begin += len(state)
-    info = _info(courses[0], fps, len(frames), begin, len(tasks), frames[0][0])
-    (meta / "info.json").write_text(json.dumps(info, indent=4) + "\n")
-    _write_lines(meta / "tasks.jsonl", [{"task_index": i, "task": task} for i, task in enumerate(tasks)])
-    _write_lines(meta / "episodes.jsonl", episodes)
-    _write_lines(meta / "episodes_stats.jsonl", stats)
+    begin, episodes, named = 0, list[Columns](), list[str]()
+    for mine, title in zip(parts, titles, strict=True):
+        for state, action in mine:
+            episodes.append(_columns(state, action, fps, len(episodes), begin, tasks.index(title)))
+            named.append(title)
+            begin += len(state)
+    places = _write_frames(episodes, folder)
+    rows = [
+        _episode(columns, title, place) for columns, title, place in zip(episodes, named, places, strict=True)
+    ]
+    _write(pa.Table.from_pylist(rows), folder / EPISODES_PATH.format(chunk_index=0, file_index=0))
+    _write(_task_table(tasks), folder / "meta/tasks.parquet")
+    every = {key: np.concatenate([columns[key] for columns in episodes]) for key in episodes[0]}
+    _write_json(folder / "meta/stats.json", {key: _stats(values) for key, values in every.items()})
+    _write_json(folder / "meta/info.json", _info(courses[0], fps, len(episodes), len(tasks), every))
     split = [
         f"bag {number}: steps are missing; its {len(mine)} parts are episodes of their own."
         for number, mine in enumerate(parts, start=1)
@@ -89,7 +90,8 @@ def _frames(course: ControlSteps) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def _check_alike(courses: Sequence[ControlSteps]) -> None:
     def kind(course: ControlSteps) -> tuple[Any, ...]:
-        return course.robot.name, course.observation_names, course.settings.control_rate(course.robot)
+        rate = course.settings.control_rate(course.robot)
+        return course.robot.name, course.robot.actuators.names, course.observation_names, rate
 
     for number, course in enumerate(courses):
         if kind(course) != kind(courses[0]):
@@ -102,7 +104,7 @@ def _check_alike(courses: Sequence[ControlSteps]) -> None:
 
 def _columns(
     state: np.ndarray, action: np.ndarray, fps: float, number: int, begin: int, task: int
-) -> dict[str, np.ndarray]:
+) -> Columns:
     count = len(state)
     frame = np.arange(count, dtype=np.int64)
     return {
@@ -117,15 +119,66 @@ def _columns(
     }
 
 
-def _table(columns: dict[str, np.ndarray]) -> pa.Table:
+def _write_frames(episodes: Sequence[Columns], folder: Path) -> list[tuple[int, int]]:
+    """Write the frames of all episodes, and say the chunk and the file that hold each of them."""
+    files: list[list[pa.Table]] = [[]]
+    size, places = 0, []
+    for columns in episodes:
+        table = _table(columns)
+        if files[-1] and size + table.nbytes > FILE_MB << 20:
+            files.append([])
+            size = 0
+        files[-1].append(table)
+        size += table.nbytes
+        places.append(divmod(len(files) - 1, CHUNK))
+    for (chunk, file), tables in zip(sorted(set(places)), files, strict=True):
+        path = folder / DATA_PATH.format(chunk_index=chunk, file_index=file)
+        _write(pa.concat_tables(tables), path)
+    return places
+
+
+def _table(columns: Columns) -> pa.Table:
+    """Frames as LeRobot types them: a vector is a list of fixed size, a feature of one number is that number."""
     arrays = {}
     for name, values in columns.items():
-        if values.ndim == 2:
-            flat = pa.array(values.reshape(-1), type=pa.float32())
-            arrays[name] = pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
-        else:
-            arrays[name] = pa.array(values)
+        flat = pa.array(values.reshape(-1))
+        wide = values.ndim == 2 and values.shape[1] > 1
+        arrays[name] = pa.FixedSizeListArray.from_arrays(flat, values.shape[1]) if wide else flat
     return pa.table(arrays)
+
+
+def _episode(columns: Columns, title: str, place: tuple[int, int]) -> dict[str, Any]:
+    """What the table of episodes says about one of them."""
+    index = columns["index"]
+    return {
+        "episode_index": int(columns["episode_index"][0]),
+        "tasks": [title],
+        "length": len(index),
+        "data/chunk_index": place[0],
+        "data/file_index": place[1],
+        "dataset_from_index": int(index[0]),
+        "dataset_to_index": int(index[-1]) + 1,
+        **{
+            f"stats/{key}/{name}": value
+            for key, values in columns.items()
+            for name, value in _stats(values).items()
+        },
+        "meta/episodes/chunk_index": 0,
+        "meta/episodes/file_index": 0,
+    }
+
+
+def _task_table(tasks: Sequence[str]) -> pa.Table:
+    """Tasks as pandas writes a frame whose index is the text of each, which is where LeRobot looks for it."""
+    index = "__index_level_0__"  # what pandas calls an index without a name
+    table = pa.table({"task_index": np.arange(len(tasks), dtype=np.int64), index: list(tasks)})
+    kinds = [("task_index", "task_index", "int64", "int64"), (None, index, "unicode", "object")]
+    columns = [
+        {"name": name, "field_name": field, "pandas_type": kind, "numpy_type": dtype, "metadata": None}
+        for name, field, kind, dtype in kinds
+    ]
+    about = {"index_columns": [index], "column_indexes": [], "columns": columns}
+    return table.replace_schema_metadata({"pandas": json.dumps(about)})
 
 
 def _stats(values: np.ndarray) -> dict[str, list[float] | list[int] | list[bool]]:
@@ -133,44 +186,42 @@ def _stats(values: np.ndarray) -> dict[str, list[float] | list[int] | list[bool]
     numbers = table.astype(np.float64)
     low, high = table.min(axis=0).tolist(), table.max(axis=0).tolist()
     mean, std = numbers.mean(axis=0).tolist(), numbers.std(axis=0).tolist()
-    return {"min": low, "max": high, "mean": mean, "std": std, "count": [len(table)]}
+    quantiles = {name: np.quantile(numbers, share, axis=0).tolist() for name, share in QUANTILES.items()}
+    return {"min": low, "max": high, "mean": mean, "std": std, "count": [len(table)], **quantiles}
 
 
-def _info(
-    course: ControlSteps,
-    fps: float,
-    episodes: int,
-    frames: int,
-    tasks: int,
-    shapes: tuple[np.ndarray, np.ndarray],
-) -> dict[str, Any]:
-    def vector(names: Sequence[str], width: int) -> dict[str, Any]:
-        return {"dtype": "float32", "shape": [width], "names": list(names)}
+def _info(course: ControlSteps, fps: float, episodes: int, tasks: int, frames: Columns) -> dict[str, Any]:
+    def feature(dtype: str, width: int = 1, names: Sequence[str] | None = None) -> dict[str, Any]:
+        return {"dtype": dtype, "shape": [width], "names": None if names is None else list(names)}
 
-    state, action = shapes
-    index = {name: {"dtype": "int64", "shape": [1], "names": None} for name in INDICES}
+    state, action = frames["observation.state"], frames["action"]
     return {
         "codebase_version": VERSION,
         "robot_type": course.robot.name,
         "total_episodes": episodes,
-        "total_frames": frames,
+        "total_frames": len(state),
         "total_tasks": tasks,
-        "total_videos": 0,
-        "total_chunks": (episodes + CHUNK - 1) // CHUNK,
         "chunks_size": CHUNK,
+        "data_files_size_in_mb": FILE_MB,
+        "video_files_size_in_mb": 200,  # there are none, but readers ask for it
         "fps": int(fps) if float(fps).is_integer() else fps,
         "splits": {"train": f"0:{episodes}"},
         "data_path": DATA_PATH,
         "video_path": None,
         "features": {
-            "observation.state": vector(course.observation_names, state.shape[1]),
-            "action": vector(course.robot.actuators.names, action.shape[1]),
-            "timestamp": {"dtype": "float32", "shape": [1], "names": None},
-            "next.done": {"dtype": "bool", "shape": [1], "names": None},
-            **index,
+            "observation.state": feature("float32", state.shape[1], course.observation_names),
+            "action": feature("float32", action.shape[1], course.robot.actuators.names),
+            "timestamp": feature("float32"),
+            "next.done": feature("bool"),
+            **{name: feature("int64") for name in INDICES},
         },
     }
 
 
-def _write_lines(path: Path, lines: Sequence[dict[str, Any]]) -> None:
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+def _write(table: pa.Table, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(table, path)
+
+
+def _write_json(path: Path, value: dict[str, Any]) -> None:
+    path.write_text(json.dumps(value, indent=4) + "\n")

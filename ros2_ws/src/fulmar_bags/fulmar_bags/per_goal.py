@@ -34,7 +34,7 @@ class BagPerGoal:
             BagError: The first bag cannot be written.
         """
         self._open_bag, self._goals = open_bag, goals
-        self._held: dict[str, deque[tuple[bytes, int]]] = {
+        self._held: dict[str, deque[tuple[bytes, int, int]]] = {
             name: deque(maxlen=n) for name, n in latched.items()
         }
         self._attachments: dict[str, bytes] = {}
@@ -57,11 +57,11 @@ class BagPerGoal:
         """Bytes that the disk has not taken yet."""
         return sum(bag.waiting for bag in self._bags)
 
-    def write(self, topic: str, data: bytes, *, log_ns: int) -> None:
+    def write(self, topic: str, data: bytes, *, log_ns: int, publish_ns: int | None = None) -> None:
         """As `BagWriter.write`; a new goal gets its bag with the next `tick`."""
-        self._bags[-1].write(topic, data, log_ns=log_ns)
+        self._bags[-1].write(topic, data, log_ns=log_ns, publish_ns=publish_ns)
         if topic in self._held:
-            self._held[topic].append((data, log_ns))
+            self._held[topic].append((data, log_ns, publish_ns or log_ns))
         if topic in self._goals and data != self._goal:
             self._due, self._goal = self._goal is not None, data
 
@@ -108,7 +108,7 @@ class BagPerGoal:
         for name, data in self._attachments.items():
             new.attach(name, data)
         messages = [(topic, *message) for topic, held in self._held.items() for message in held]
-        first_ns = max((log_ns for _, _, log_ns in messages), default=0)
-        for topic, data, log_ns in messages:
-            new.write(topic, data, log_ns=first_ns, publish_ns=log_ns)
+        first_ns = max((log_ns for _, _, log_ns, _ in messages), default=0)
+        for topic, data, _, sent_ns in messages:
+            new.write(topic, data, log_ns=first_ns, publish_ns=sent_ns)
         self._repeated += len(messages)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fulmar_bags.wire_reader import Received, WireReader
 from fulmar_core.errors import BagError
-from fulmar_core.safety.estop import TIMEOUT_NS, EstopWatch
+from fulmar_core.safety.estop import TIMEOUT_NS, EstopMonitor
 from fulmar_core.topics import ESTOP, ESTOP_RELEASED
 
 # A message reaches the controller and the recorder at different times; within this span the record decides.
@@ -65,9 +65,9 @@ class RecordedEstop:
         self.recorded = False
 
     @property
-    def heard(self) -> bool:
+    def received(self) -> bool:
         """Whether it was received, and stopped everything without a doubt, at the time of the last call."""
-        return self._stops and self._late.watch.heard and self._early.watch.heard
+        return self._stops and self._late.watch.received and self._early.watch.received
 
     def reason(self, now_ns: int) -> str:
         """Why nothing may move at a time of the record, not before the one of the last call [ns]; empty if it may."""
@@ -82,7 +82,7 @@ class _ShiftedWatch:
     """An e-stop watch that receives everything somewhat earlier or later than the recorder."""
 
     def __init__(self, messages: tuple[Received, ...], required: bool, offset_ns: int) -> None:
-        self.watch = EstopWatch(required=required)
+        self.watch = EstopMonitor(required=required)
         self._rest = iter(messages)
         self._next = next(self._rest, None)
         self._offset_ns = offset_ns
@@ -93,6 +93,6 @@ class _ShiftedWatch:
             if self._next.value == RELEASED:
                 self.watch.release(self._next.log_ns)
             else:
-                self.watch.hear(self._next.value, self._next.log_ns)
+                self.watch.receive(self._next.value, self._next.log_ns)
             self._next = next(self._rest, None)
         return self.watch.reason(now_ns)

@@ -30,6 +30,7 @@ class _Message:
     topic: str
     data: bytes
     log_ns: int
+    publish_ns: int | None
 
 
 class BagRing:
@@ -89,14 +90,14 @@ class BagRing:
         """Bytes that the disk has not taken yet, without those from before a fault."""
         return (self._bag.waiting if self._bag else 0) + self._bytes_due
 
-    def write(self, topic: str, data: bytes, *, log_ns: int) -> None:
+    def write(self, topic: str, data: bytes, *, log_ns: int, publish_ns: int | None = None) -> None:
         """As `BagWriter.write`; messages of a fault stay in memory until `tick` has begun its file."""
-        message = _Message(topic, data, log_ns)
+        message = _Message(topic, data, log_ns, publish_ns)
         reason = self._fault_in(topic, data)
         if reason:
             self._note_fault(reason, log_ns)
         if self._bag is not None and not self._due and log_ns <= self._until_ns:
-            self._bag.write(topic, data, log_ns=log_ns)
+            self._bag.write(topic, data, log_ns=log_ns, publish_ns=publish_ns)
             self._hold(message)
         else:
             self._keep(message)
@@ -159,9 +160,10 @@ class BagRing:
         self._bag.note(FAULTS, json.dumps(self.faults))
         first_ns = self._kept[0].log_ns
         for message in (message for held in self._held.values() for message in held):
-            self._bag.write(message.topic, message.data, log_ns=first_ns, publish_ns=message.log_ns)
+            sent_ns = message.publish_ns or message.log_ns
+            self._bag.write(message.topic, message.data, log_ns=first_ns, publish_ns=sent_ns)
         for message in self._kept:
-            self._bag.write(message.topic, message.data, log_ns=message.log_ns)
+            self._bag.write(message.topic, message.data, log_ns=message.log_ns, publish_ns=message.publish_ns)
             self._hold(message)
         self._kept.clear()
         self._bytes = 0

@@ -35,7 +35,8 @@ class Motion:
     """States of one body over time; all arrays begin with the same axis."""
 
     stamp_s: np.ndarray  # (n,) time of measurement [s]
-    log_s: np.ndarray  # (n,) when the recorder got it [s]
+    log_s: np.ndarray  # (n,) when the recorder received it, by its wall clock [s]
+    publish_s: np.ndarray  # (n,) when it was sent, by the wall clock of the sender [s]
     position: np.ndarray  # (n, 3) in the world [m]
     quat_xyzw: np.ndarray  # (n, 4) [-]
     velocity_in_world: np.ndarray  # (n, 3) [m/s]
@@ -64,6 +65,7 @@ class Actuation:
 
     stamp_s: np.ndarray  # (n,) [s]
     log_s: np.ndarray  # (n,) [s]
+    publish_s: np.ndarray  # (n,) [s]
     names: tuple[str, ...]  # of the columns
     effort: np.ndarray  # (n, m)
 
@@ -239,6 +241,7 @@ def _motion(found: Odometries) -> Motion:
     return Motion(
         stamp_s=found.stamp_ns / NS,
         log_s=found.log_ns / NS,
+        publish_s=found.publish_ns / NS,
         position=found.pose[:, :3],
         quat_xyzw=quat,
         velocity_in_world=rotate(quat, found.twist[:, :3]),
@@ -247,7 +250,7 @@ def _motion(found: Odometries) -> Motion:
 
 
 def _actuation(found: Vectors) -> Actuation:
-    return Actuation(found.stamp_ns / NS, found.log_ns / NS, found.names, found.values)
+    return Actuation(found.stamp_ns / NS, found.log_ns / NS, found.publish_ns / NS, found.names, found.values)
 
 
 def _health(reader: WireReader, name: str) -> tuple[HealthSample, ...]:

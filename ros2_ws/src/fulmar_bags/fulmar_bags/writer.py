@@ -111,8 +111,10 @@ class BagWriter:
         Args:
             topic: A name given to `add_topic`.
             data: The message in CDR.
-            log_ns: When it came, since the epoch [ns]. Earlier than the one before counts as the same time.
-            publish_ns: When it was sent, if known [ns].
+            log_ns: When it was received, by the recorder's wall clock, since the epoch [ns]. Earlier than the one
+                before counts as the same time.
+            publish_ns: When it was sent, by the sender's wall clock, since the epoch [ns]. None or 0: not known, and
+                the log time is written instead. Simulated time is in the stamps of the messages alone.
         """
         there = self._topics[topic]
         self._last_ns = max(log_ns, self._last_ns)

@@ -36,7 +36,9 @@ class Bag(Protocol):
     def counts(self) -> BagCounts: ...  # noqa: D102 - as of `BagWriter`, all of them
     @property
     def waiting(self) -> int: ...  # noqa: D102
-    def write(self, topic: str, data: bytes, *, log_ns: int) -> None: ...  # noqa: D102
+    def write(  # noqa: D102
+        self, topic: str, data: bytes, *, log_ns: int, publish_ns: int | None = None
+    ) -> None: ...
     def attach(self, name: str, data: bytes) -> None: ...  # noqa: D102
     def note(self, name: str, text: str) -> None: ...  # noqa: D102
     def tick(self, now: float) -> None: ...  # noqa: D102
@@ -85,7 +87,7 @@ class BagThread:
         """
         self._bag, self._on_error = bag, on_error
         self._max_queued, self._max_waiting = max_queued, max_waiting
-        self._queue: queue.SimpleQueue[tuple[str, bytes, int]] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[str, bytes, int, int | None]] = queue.SimpleQueue()
         self._files: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
         self._received = self._put_bytes = self._taken_bytes = 0  # each is changed by one thread alone
         self._crowded_out: Counter[str] = Counter()  # by `put`
@@ -101,7 +103,7 @@ class BagThread:
         """Messages offered so far."""
         return self._received
 
-    def put(self, topic: str, data: bytes, log_ns: int) -> None:
+    def put(self, topic: str, data: bytes, log_ns: int, publish_ns: int | None = None) -> None:
         """Offer a message, from one thread only; arguments as of `BagWriter.write`."""
         self._received += 1
         if (
@@ -114,7 +116,7 @@ class BagThread:
             )
             return
         self._put_bytes += len(data)
-        self._queue.put((topic, data, log_ns))
+        self._queue.put((topic, data, log_ns, publish_ns))
 
     def attach(self, name: str, data: bytes) -> None:
         """Carry a file along; from any thread."""
@@ -157,12 +159,12 @@ class BagThread:
         while not self._files.empty():
             self._bag.attach(*self._files.get())
         for _ in range(self._queue.qsize()):
-            topic, data, log_ns = self._queue.get()
+            topic, data, log_ns, publish_ns = self._queue.get()
             self._taken_bytes += len(data)
             if self._bag.waiting >= self._max_waiting:
                 self._refused[topic] += 1
                 continue
-            self._bag.write(topic, data, log_ns=log_ns)
+            self._bag.write(topic, data, log_ns=log_ns, publish_ns=publish_ns)
 
     def _note(self, *, complete: bool) -> None:
         account = self.account(complete=complete)

@@ -164,7 +164,7 @@ def release_without_node(node: Node, space: str) -> Answer:
         name = f"{space}/{wire.name}"
 
         def on_command(message: JointState | TwistStamped) -> None:
-            button.hear_command(name, not moves(message), time.monotonic_ns())
+            button.receive_command(name, not moves(message), time.monotonic_ns())
 
         node.create_subscription(kind, name, on_command, subscriber_qos(wire))
 

@@ -211,6 +211,13 @@ def first_targets(file: GoalFile) -> np.ndarray:
     return np.zeros((1, 3)) if isinstance(file, FollowedPath) else file.targets()
 
 
+def places_of(file: GoalFile) -> np.ndarray:
+    """Where a file leads, shape (n, 2 or 3), x and y first [m]; no place for velocities."""
+    if isinstance(file, FollowedPath):
+        return np.asarray(file.planner().points)
+    return np.zeros((0, 3)) if isinstance(file, Velocities) else file.targets()
+
+
 def start_of(file: GoalFile) -> PoseTuple | None:
     """Start of a run; None for places: the start that the seed draws around the first of them."""
     if isinstance(file, FollowedPath):

@@ -20,13 +20,13 @@ from fulmar_bringup.system import (
 from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.estimation.motion_filter import load_estimator
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_names
 from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.robot import Robot
-from fulmar_core.safety.area import NO_AREA
+from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task
 from fulmar_core.topics import COMMAND, IMU, MOCAP, ODOMETRY, TRUTH, VELOCITY_COMMAND

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, start_of
+from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, places_of, start_of
 from fulmar_bringup.plan_checks import (
     adapter_path,
     check_arming,
@@ -35,18 +35,19 @@ from fulmar_bringup.system import (
     default_guards,
     system_of,
 )
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.geofence import check_starts
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.recording import MODES, Mode, Recording
-from fulmar_core.robot import load_robot
+from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import checked_name
+from fulmar_core.safety.geofence import check_places, check_starts, unreachable
 from fulmar_core.tasks import Task, load_task
 
+DRAWS = 1000  # of a start and a goal, before an area counts as too small for them
 PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
 
 
@@ -158,20 +159,29 @@ def plan_run(
         raise ConfigError(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
         )
-    episode = draw_episode(the_robot, the_task, load_scenario(scenario), seed=seed, number=0)
-    mission, drawn_start = episode.goal, _pose_of_state(episode.start)
     if hardware and not emulate:
         start = start or (0.0, 0.0, 0.0)  # where a robot stands is where its odometry begins
         if goal is None and goals is None and not goals_later:
             raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
-    if goals is not None:
-        if goal is not None:
-            raise ConfigError("--goals brings its own goals; it takes no --goal.")
-        file = checked_goals(goals, the_robot, the_task)
-        mission, drawn_start = _from_file(file, mission, drawn_start)
+    if goals is not None and goal is not None:
+        raise ConfigError("--goals brings its own goals; it takes no --goal.")
+    file = None if goals is None else checked_goals(goals, the_robot, the_task)
+    if file is not None:
+        check_places(f"the goal of '{goals}'", places_of(file).tolist(), watched.area)
+    mission, drawn_start = _placed(
+        the_robot,
+        the_task,
+        load_scenario(scenario),
+        seed,
+        file=file,
+        goal=goal,
+        start=start,
+        area=watched.area,
+        checks_goal=not goals_later,
+        checks_start=not hardware or emulate,
+    )
+    if file is not None:
         duration_s = duration_s or duration_of(file, the_robot, start or drawn_start)
-    elif goal is not None:
-        mission, drawn_start = _moved(the_task, mission, drawn_start, goal)
     if start is None and goals is None:
         check_starts(the_robot, the_task)
     start = start or drawn_start
@@ -206,6 +216,60 @@ def plan_run(
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
+
+
+def _placed(
+    robot: Robot,
+    task: Task,
+    scenario: Scenario,
+    seed: int,
+    *,
+    file: GoalFile | None,
+    goal: PoseTuple | None,
+    start: PoseTuple | None,
+    area: Sequence[float],
+    checks_goal: bool,
+    checks_start: bool,
+) -> tuple[Goal, PoseTuple]:
+    """The goal and the start of a run, both inside the area; what was not given is drawn until it is.
+
+    The first draw is the seed's episode. It stays where the task has obstacles or things: the plant draws the
+    same ones.
+
+    Args:
+        robot: The robot.
+        task: The task.
+        scenario: Scenario of the draws.
+        seed: Seed of the draws.
+        file: Goals from a file, which were checked.
+        goal: The goal that was given.
+        start: The start that was given.
+        area: Area of the robot.
+        checks_goal: Whether the robot goes to the goal by itself; otherwise goals come later.
+        checks_start: Whether the start is known; a real robot starts where it stands.
+
+    Raises:
+        ConfigError: What was given is outside, or no draw is inside.
+    """
+    if goal is not None:
+        check_places("the goal", [goal], area)
+    if start is not None and checks_start:
+        check_places("the start", [start], area)
+    for number in range(DRAWS):
+        episode = draw_episode(robot, task, scenario, seed=seed, number=number)
+        mission, drawn = episode.goal, _pose_of_state(episode.start)
+        if file is not None:
+            mission, drawn = _from_file(file, mission, drawn)
+        elif goal is not None:
+            mission, drawn = _moved(task, mission, drawn, goal)
+        targets = mission.targets.tolist() if checks_goal and task.goal_topic != "goal_velocity" else []
+        starts = [start or drawn] if checks_start else []
+        problem = unreachable("the drawn goal", targets, area) or unreachable("the drawn start", starts, area)
+        if not problem:
+            return mission, drawn
+        if mission.obstacles.size or task.things:
+            break
+    raise ConfigError(f"{problem} Give --start and --goal, another --seed, or a larger area.")
 
 
 def _from_file(file: GoalFile, drawn: Goal, start: PoseTuple) -> tuple[Goal, PoseTuple]:

@@ -29,8 +29,7 @@ from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import ConfigError, RunFailed
-from fulmar_core.exit_codes import BAD_USAGE
+from fulmar_core.errors import BAD_USAGE, ConfigError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import HOLDS

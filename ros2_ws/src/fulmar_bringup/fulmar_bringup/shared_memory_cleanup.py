@@ -11,6 +11,7 @@ import fcntl
 import os
 import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 SHARED_MEMORY = Path("/dev/shm")
@@ -29,15 +30,38 @@ def give_back_abandoned_memory(folder: Path = SHARED_MEMORY) -> int:
     """
     removed = 0
     for lock in _locks(folder):
-        with contextlib.suppress(OSError), lock.open() as held:  # somebody else's, or gone meanwhile
-            about = lock.stat()
-            if about.st_uid != os.getuid() or time.time() - about.st_mtime < YOUNG_S:
-                continue
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            lock.with_name(lock.name.removesuffix("_el")).unlink(missing_ok=True)
-            lock.unlink(missing_ok=True)
-            removed += 1
+        with _abandoned(lock) as abandoned:
+            if abandoned:
+                lock.with_name(lock.name.removesuffix("_el")).unlink(missing_ok=True)
+                lock.unlink(missing_ok=True)
+                removed += 1
     return removed
+
+
+def count_abandoned_memory(folder: Path = SHARED_MEMORY) -> int:
+    """How many pieces `give_back_abandoned_memory` would remove."""
+    count = 0
+    for lock in _locks(folder):
+        with _abandoned(lock) as abandoned:
+            count += abandoned
+    return count
+
+
+@contextlib.contextmanager
+def _abandoned(lock: Path) -> Iterator[bool]:
+    """Whether a process of this user has left a piece of memory; nobody else takes it until the context ends."""
+    with contextlib.ExitStack() as held:
+        try:
+            file = held.enter_context(lock.open())  # somebody else's, or gone meanwhile
+            about = lock.stat()
+            if about.st_uid == os.getuid() and time.time() - about.st_mtime >= YOUNG_S:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                mine = True
+            else:
+                mine = False
+        except OSError:
+            mine = False
+        yield mine
 
 
 def _locks(folder: Path) -> list[Path]:
@@ -45,3 +69,7 @@ def _locks(folder: Path) -> list[Path]:
         return [path for path in folder.iterdir() if LOCK.fullmatch(path.name)]
     except OSError:  # another system than Linux
         return []
+
+
+if __name__ == "__main__":
+    print(f"removed {give_back_abandoned_memory()} pieces of shared memory")  # noqa: T201 - a command of its own

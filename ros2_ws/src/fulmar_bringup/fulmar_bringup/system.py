@@ -12,7 +12,7 @@ from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import check_robot_name, checked_name
-from fulmar_core.safety.area import NO_AREA, check_area
+from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.tasks import load_task
 from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry

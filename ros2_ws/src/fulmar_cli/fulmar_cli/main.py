@@ -6,11 +6,13 @@ import os
 import signal
 import sys
 from collections import namedtuple
+from importlib.metadata import version
 from types import FrameType
+from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import console, showing_warnings
+from fulmar_bringup.console import console, output, showing_warnings
 from fulmar_cli.commands.bag import bag
 from fulmar_cli.commands.benchmark import benchmark
 from fulmar_cli.commands.bundle import bundle
@@ -34,8 +36,16 @@ from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
 from fulmar_cli.commands.up import up
 from fulmar_cli.extras import advice_for
-from fulmar_core.errors import BagError, BundleError, ConfigError, FulmarError, did_you_mean
-from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
+from fulmar_core.errors import (
+    BAD_USAGE,
+    DONE,
+    FAILED,
+    BagError,
+    BundleError,
+    ConfigError,
+    FulmarError,
+    did_you_mean,
+)
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 
@@ -43,10 +53,27 @@ app = typer.Typer(
     name="fulmar",
     help="Robots driven by learned and classical controllers over ROS 2: simulate, run, record, train, evaluate.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        output.print(f"fulmar {version('fulmar')}", markup=False)
+        raise typer.Exit(DONE)
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    """Options of the whole program; its help is that of `app`."""
+
+
 app.command("list")(list_names)
 app.command()(run)
 app.command()(up)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Flags
-from fulmar_core.safety.area import NO_AREA, check_area
+from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
 

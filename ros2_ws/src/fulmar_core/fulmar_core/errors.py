@@ -75,3 +75,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 def shortened(text: str) -> str:
     """A name from outside as messages for people quote it: what is too long to be a name is cut."""
     return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
+
+
+DONE, FAILED, BAD_USAGE = 0, 1, 2

@@ -17,10 +17,9 @@ from fulmar_core.mission import Mission
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
-from fulmar_core.safety.area import outside
+from fulmar_core.safety.fallback import ControllerSwitch, Standby
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS, outside, unreachable
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import Task
 
 ENDED = "the e-stop stopped this goal"
@@ -35,10 +34,10 @@ class Refusal:
 
 
 class Estop(Protocol):
-    """What is known of the e-stop; see `EstopWatch`."""
+    """What is known of the e-stop; see `EstopMonitor`."""
 
     @property
-    def heard(self) -> bool:
+    def received(self) -> bool:
         """Whether it was ever received."""
         ...
 
@@ -57,7 +56,7 @@ class GuardedLoop:
     Attributes:
         loop: Advances the goal, observes, and limits commands.
         mission: Goal, obstacles and things.
-        succession: The controller that acts, and its fallback.
+        switch: The controller that acts, and its fallback.
         newest: The newest usable measurement since the activation.
         acted: Control steps with a command of the controller's own since the activation.
         refusal: Why the newest goal does not count, if the e-stop refused it or took it away.
@@ -68,7 +67,7 @@ class GuardedLoop:
         robot: Robot,
         task: Task,
         settings: ControllerSettings,
-        succession: Succession[Standby],
+        switch: ControllerSwitch[Standby],
         estop: Estop,
         *,
         gate: InputGate | None = None,
@@ -80,15 +79,15 @@ class GuardedLoop:
             robot: The robot.
             task: What it does.
             settings: Limits and wires.
-            succession: Has the controller.
+            switch: Has the controller.
             estop: Is asked before every step.
             gate: Of the measurements; that of the settings by default.
             applied: What the actuators did, as far as that is known.
         """
         self._lock = threading.Lock()
-        self.succession = succession
+        self.switch = switch
         self.loop = ControlLoop(
-            robot, task, succession.current.controller, pause_ns=settings.pause_ns(robot), applied=applied
+            robot, task, switch.current.controller, pause_ns=settings.pause_ns(robot), applied=applied
         )
         self.mission = Mission(self.loop, streamed=settings.goals_streamed)
         self.newest: Measurement | None = None
@@ -150,10 +149,15 @@ class GuardedLoop:
             self._change(bearing_off=not on)
 
     def take_goal(self, goal: Goal, stamp_ns: int, now_ns: int) -> str:
-        """Take a goal; none while a heard e-stop holds."""
+        """Take a goal; none outside the robot's area, and none while a heard e-stop holds."""
         with self._lock:
+            beyond = self._beyond(goal)
+            if beyond:
+                self.refusal = Refusal(stamp_ns, beyond)
+                self.mission.refuse(goal, stamp_ns)
+                return beyond
             stopped = self._estop.reason(now_ns)
-            if self._estop.heard and stopped:
+            if self._estop.received and stopped:
                 self.refusal = Refusal(stamp_ns, stopped)
                 self.mission.refuse(goal, stamp_ns)
                 return f"{stopped}. Give a new goal once the e-stop is released."
@@ -203,11 +207,11 @@ class GuardedLoop:
             )
         return True
 
-    def turn(self) -> bool:
+    def switch_controller(self) -> bool:
         """Let a controller that was proposed take over, between two control steps; whether one has."""
-        if not self.succession.turn():
+        if not self.switch.apply():
             return False
-        self.loop.use(self.succession.current.controller)
+        self.loop.use(self.switch.current.controller)
         return True
 
     def begin_step(self, measurement: Measurement | None, now_ns: int) -> tuple[Decision, Inputs | None]:
@@ -245,17 +249,17 @@ class GuardedLoop:
         Returns:
             Whether the fallback acts from now on.
         """
-        before = self.succession.current
-        fault = self.succession.judge(refusal or None)
+        before = self.switch.current
+        fault = self.switch.note(refusal or None)
         if fault:
             self.set(latched_fault=fault)
-        return self._follow_succession(before)
+        return self._follow_switch(before)
 
     def fall_back(self, reason: str) -> bool:
         """Let the fallback go on in place of a controller that raised; false if there is none."""
-        before = self.succession.current
-        self.succession.fall_back(reason)
-        return self._follow_succession(before)
+        before = self.switch.current
+        self.switch.fall_back(reason)
+        return self._follow_switch(before)
 
     def _begin_anew(self) -> None:
         """Let the controller forget what was before a new goal or a jump."""
@@ -267,16 +271,16 @@ class GuardedLoop:
         state = self._newest_state if measurement is self.newest else planar_of(measurement.state)[None]
         return self.loop.inputs(state, measurement.stamp_ns)
 
-    def _follow_succession(self, before: Standby) -> bool:
-        changed = self.succession.current is not before
+    def _follow_switch(self, before: Standby) -> bool:
+        changed = self.switch.current is not before
         if changed:
-            self.loop.use(self.succession.current.controller)
+            self.loop.use(self.switch.current.controller)
         return changed
 
     def _arbitrate(self, now_ns: int) -> Decision:
         """An e-stop takes the goal away: after it, nothing moves by itself."""
         stopped = self._estop.reason(now_ns)
-        if stopped and self._estop.heard:
+        if stopped and self._estop.received:
             if self.mission.goal_stamp_ns:
                 self.refusal = Refusal(self.mission.goal_stamp_ns, stopped)
             self.mission.drop()
@@ -299,6 +303,13 @@ class GuardedLoop:
             return ""
         x, y = self.newest.state.position_in_world[:2].tolist()
         return outside(x, y, self._settings.area)
+
+    def _beyond(self, goal: Goal) -> str:
+        """How a goal lies outside the area; empty if it does not, or is no place."""
+        if self.loop.task.goal_topic == "goal_velocity":
+            return ""
+        problem = unreachable("the goal", goal.targets.tolist(), self._settings.area)
+        return problem and OUT_OF_BOUNDS + problem
 
     def _change(self, **changes: object) -> None:
         for name, value in changes.items():

@@ -94,7 +94,7 @@ def can_hold(
 
 
 @functools.lru_cache(maxsize=16)
-def stranding_losses(robot: Robot, count: int) -> tuple[tuple[int, ...], ...]:
+def uncontrollable_losses(robot: Robot, count: int) -> tuple[tuple[int, ...], ...]:
     """Thrusters that leave no pose to hold when they are lost together, in a world that does not push.
 
     Args:

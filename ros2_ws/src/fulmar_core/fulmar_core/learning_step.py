@@ -26,7 +26,7 @@ def learning_step(
     command: Array,
     effort: float,
 ) -> tuple[Array, Array]:
-    """Judge one control step of some worlds.
+    """TargetCounter one control step of some worlds.
 
     Args:
         robot: Says what changing its commands costs, and how far off it may be.

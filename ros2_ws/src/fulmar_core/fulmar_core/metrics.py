@@ -13,10 +13,10 @@ import numpy as np
 
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.terms import Errors
-from fulmar_core.trajectories import Judge, Trajectories, TrajectoryLog, first_steps, join, select
+from fulmar_core.trajectories import TargetCounter, Trajectories, TrajectoryLog, first_steps, join, select
 
 __all__ = [
-    "Judge",
+    "TargetCounter",
     "Trajectories",
     "TrajectoryLog",
     "episode_metrics",

@@ -6,9 +6,8 @@ import dataclasses
 
 from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.arrays import array_namespace
-from fulmar_core.disturbances.outside import outside_wrench
 from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.disturbances.world import World
+from fulmar_core.disturbances.world import World, outside_wrench
 from fulmar_core.dynamics.free_body import Wrench, free_body_step
 from fulmar_core.dynamics.rolling import rolling_step
 from fulmar_core.planar import PlanarState

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 
-class Moves:
+class MutableState:
     """Something that steps, and tells by name what they change: arrays, what is made of arrays, and numbers."""
 
-    MOVING: ClassVar[tuple[str, ...]]
+    MUTABLE: ClassVar[tuple[str, ...]]
 
-    def moving(self) -> dict[str, Any]:
+    def mutable_state(self) -> dict[str, Any]:
         """Everything that steps change, by name; not copied."""
-        return {name: getattr(self, name) for name in self.MOVING}
+        return {name: getattr(self, name) for name in self.MUTABLE}
 
     def take(self, moving: dict[str, Any]) -> None:
         """Go on from what `moving` told of one that was built alike; not copied."""
-        for name in self.MOVING:
+        for name in self.MUTABLE:
             setattr(self, name, moving[name])

@@ -32,7 +32,7 @@ class FollowPath(TrackVelocities):
     lead_s: float = 0.0  # see `FollowedPath`
 
     @property
-    def judged(self) -> FollowPath:
+    def evaluated(self) -> FollowPath:
         """What errors are told against: the velocity that counts where the robot is."""
         return dataclasses.replace(self, lead_s=0.0)
 
@@ -82,7 +82,7 @@ def path_task(task: TrackVelocities, file: FollowedPath) -> FollowPath:
     return FollowPath(**told, path=file.planner(), lead_s=file.lead_s)
 
 
-def judged_task(name: str, *, episode_s: float = 0.0, goals: str = "") -> Task:
+def evaluated_task(name: str, *, episode_s: float = 0.0, goals: str = "") -> Task:
     """The task that episodes are judged by.
 
     Args:

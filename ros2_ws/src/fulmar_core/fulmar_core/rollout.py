@@ -14,7 +14,7 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
 from fulmar_core.goal import Goal, goal_in_float64
-from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join
+from fulmar_core.metrics import TargetCounter, Trajectories, TrajectoryLog, join
 from fulmar_core.planar import PlanarState, planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
@@ -171,7 +171,7 @@ def _roll_out(
 ) -> Trajectories:
     """Run one episode in each world; what happened is taken from the true states."""
     loop = ControlLoop(robot, task, controller, robots=len(goal.done))
-    log, judge = TrajectoryLog(robot, loop.task, loop.dt), Judge(loop.task, goal, loop.dt)
+    log, counter = TrajectoryLog(robot, loop.task, loop.dt), TargetCounter(loop.task, goal, loop.dt)
     loop.reset()
     loop.begin(goal_in_float64(goal))
     for number in range(episode_steps(task, loop.dt)):
@@ -179,7 +179,7 @@ def _roll_out(
         loop.goal = goal_in_float64(loop.goal.among(worlds.things))
         step = loop.step(worlds.measured, round(1e9 * number * loop.dt))
         worlds.move(step.command)
-        log.add(worlds.truth, judge.see(worlds.truth, worlds.things), step.command)
+        log.add(worlds.truth, counter.update(worlds.truth, worlds.things), step.command)
         progress((number + 1) * len(goal.done))
     return log.trajectories()
 

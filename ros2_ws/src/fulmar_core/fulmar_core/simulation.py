@@ -17,7 +17,7 @@ from fulmar_core.episode import draw_episodes
 from fulmar_core.episode_prefetch import Beginning, UpcomingEpisodes
 from fulmar_core.goal import Goal
 from fulmar_core.motion import actuation_of, control_step, may_be_off_centre, may_open_late
-from fulmar_core.mutable_state import Moves
+from fulmar_core.mutable_state import MutableState
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
@@ -29,7 +29,7 @@ from fulmar_core.things import Poses, push_things
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
 
-class BatchSimulation(Moves):
+class BatchSimulation(MutableState):
     """Worlds that step together; each is reset by itself.
 
     Attributes:
@@ -39,7 +39,7 @@ class BatchSimulation(Moves):
         command: What was last commanded, after every limit, shape (worlds, n).
     """
 
-    MOVING = (
+    MUTABLE = (
         "truth", "measured", "goal", "world", "command",
         "_repeats", "_steps", "_noise_keys",
     )  # fmt: skip
@@ -220,20 +220,20 @@ class BatchSimulation(Moves):
             self.goal = self.goal.among(moved)
         self._measure()
 
-    def moving(self) -> dict[str, Any]:
-        """As `Moves.moving`, with what moves of actuators and odometer as dictionaries of their own."""
-        parts = {"_actuation": self._actuation.moving(), "_odometer": self._odometer.moving()}
-        return super().moving() | parts
+    def mutable_state(self) -> dict[str, Any]:
+        """As `MutableState.moving`, with what moves of actuators and odometer as dictionaries of their own."""
+        parts = {"_actuation": self._actuation.mutable_state(), "_odometer": self._odometer.mutable_state()}
+        return super().mutable_state() | parts
 
     def take(self, moving: dict[str, Any]) -> None:
-        """As `Moves.take`."""
+        """As `MutableState.take`."""
         super().take(moving)
         self._actuation.take(moving["_actuation"])
         self._odometer.take(moving["_odometer"])
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that moves, as a copy of its own that pickles."""
-        return copy.deepcopy(self.moving())
+        return copy.deepcopy(self.mutable_state())
 
     def restore(self, snapshot: dict[str, Any]) -> None:
         """Go on from a snapshot of a simulation that was built alike."""

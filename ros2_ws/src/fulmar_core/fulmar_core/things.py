@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fulmar_core.arrays import array_namespace
-from fulmar_core.dynamics.pushing import Block, push
+from fulmar_core.dynamics.contact import Block, push
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array

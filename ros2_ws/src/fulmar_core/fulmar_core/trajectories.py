@@ -127,15 +127,15 @@ def _step_columns(robot: Robot, task: Task, state: PlanarState, goal: Goal) -> d
     }
 
 
-class Judge:
+class TargetCounter:
     """Counts targets by the task's own tolerance, whatever the controller takes for reached."""
 
     def __init__(self, task: Task, goal: Goal, control_dt: float) -> None:
         """Begin an episode, or a batch of them."""
-        self._task, self._dt, self._steps = task.judged, control_dt, 0
+        self._task, self._dt, self._steps = task.evaluated, control_dt, 0
         self.goal = goal
 
-    def see(self, truth: PlanarState, things: Poses | None = None) -> Goal:
+    def update(self, truth: PlanarState, things: Poses | None = None) -> Goal:
         """The goal after one more control step, by the true state at its end.
 
         Args:

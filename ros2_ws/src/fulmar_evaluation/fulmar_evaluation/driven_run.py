@@ -8,7 +8,7 @@ import numpy as np
 
 from fulmar_bags.run_record import read_run
 from fulmar_core.errors import ConfigError
-from fulmar_core.identification.drive import Drive, drive_of
+from fulmar_core.identification.drives import Drive, drive_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rotation import yaw_of
 

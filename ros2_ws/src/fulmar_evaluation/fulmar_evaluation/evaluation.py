@@ -12,11 +12,11 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episodes
-from fulmar_core.geofence import check_starts
 from fulmar_core.metrics import Trajectories, episode_metrics, successes, summarise
-from fulmar_core.path_task import judged_task
+from fulmar_core.path_task import evaluated_task
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import WORLDS, batches, roll_out_in_backends
+from fulmar_core.safety.geofence import check_starts
 from fulmar_core.tasks import Task
 from fulmar_evaluation.waypoint_score import bound_figures, has_bound, waypoint_bound
 
@@ -48,7 +48,7 @@ class Trial:
     @property
     def task(self) -> Task:
         """The task, with the length of its episodes."""
-        return judged_task(self.plan.task, episode_s=self.plan.duration_s, goals=self.plan.goals)
+        return evaluated_task(self.plan.task, episode_s=self.plan.duration_s, goals=self.plan.goals)
 
     def controller(self) -> Controller:
         """The controller, made anew."""

@@ -33,10 +33,10 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode, episode_steps
 from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.goal import Goal
-from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, join, select
-from fulmar_core.parent_watch import end_with
-from fulmar_core.path_task import judged_task
+from fulmar_core.metrics import TargetCounter, Trajectories, TrajectoryLog, join, select
+from fulmar_core.path_task import evaluated_task
 from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.process import end_with
 from fulmar_core.robot import load_robot
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import SWITCH_INTERVAL_S, settle_memory, spinning
@@ -211,7 +211,7 @@ def _episodes(
     progress: Progress,
 ) -> Trajectories:
     robot, scenario = load_robot(plan.robot), load_scenario(plan.scenario)
-    task = judged_task(plan.task, episode_s=plan.duration_s, goals=plan.goals)
+    task = evaluated_task(plan.task, episode_s=plan.duration_s, goals=plan.goals)
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
     steps = episode_steps(task, control_dt)
     runs: list[Trajectories] = []
@@ -236,7 +236,7 @@ def _episodes(
         episode = draw_episode(robot, task, scenario, seed=plan.seed, number=number)
         # The same instant twice would be the same goal: the clock moves on between episodes.
         plant.clock.advance(control_dt)
-        counter = Judge(task, episode.goal, control_dt)
+        counter = TargetCounter(task, episode.goal, control_dt)
         truths: list[PlanarState] = []
         goals: list[Goal] = []
         commands: list[np.ndarray] = []
@@ -244,14 +244,14 @@ def _episodes(
         def on_step(
             sample: Sample,
             command: np.ndarray,
-            counter: Judge = counter,
+            counter: TargetCounter = counter,
             truths: list[PlanarState] = truths,
             goals: list[Goal] = goals,
             commands: list[np.ndarray] = commands,
         ) -> None:
             assert sample.truth is not None
             truths.append(planar_of(sample.truth))
-            goals.append(counter.see(truths[-1], sample.things))
+            goals.append(counter.update(truths[-1], sample.things))
             commands.append(np.array(command))
 
         with _goal_given(plan, episode, plant, overseer, group, alive):

@@ -13,10 +13,17 @@ import numpy as np
 from fulmar_bags.run_record import Actuation, GivenGoal, Motion, Places, RunRecord
 from fulmar_core.errors import BagError
 from fulmar_core.goal import Goal, stack_goals
-from fulmar_core.metrics import Judge, Trajectories, TrajectoryLog, counts_targets, episode_metrics, successes
+from fulmar_core.metrics import (
+    TargetCounter,
+    Trajectories,
+    TrajectoryLog,
+    counts_targets,
+    episode_metrics,
+    successes,
+)
+from fulmar_core.mission import LONGEST_AHEAD_NS, SLACK_NS
 from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.schedule import LONGEST_AHEAD_NS, SLACK_NS
 from fulmar_core.tasks import Task, load_recorded_task
 from fulmar_core.trajectories import COLUMNS
 
@@ -218,9 +225,9 @@ def _goals_at(
                 before += float(counter.goal.done) + (task.goal_topic == "goal_velocity")
             now = {name: pose[step] for name, pose in things.items()}
             begun = task.begun(Goal(given[which].targets, np.asarray(0.0), obstacles, now), last)
-            counter, number = Judge(task, begun, dt), which
+            counter, number = TargetCounter(task, begun, dt), which
         last = states[step]
-        goal = counter.see(last, {name: pose[step] for name, pose in things.items()})
+        goal = counter.update(last, {name: pose[step] for name, pose in things.items()})
         discs = goal.obstacles if len(goal.obstacles) else np.zeros((1, 3))
         done = np.asarray(before + goal.done)
         counted.append(replace(goal, targets=goal.current[None], done=done, obstacles=discs))

@@ -88,19 +88,23 @@ def _stopped_by(sample: HealthSample, reason: str) -> bool:
 
 
 def latencies_ms(record: RunRecord) -> np.ndarray:
-    """From an odometry message to the command that answers it, both as the recorder got them.
+    """From the sending of an odometry message to the sending of the command that answers it.
+
+    Both times are wall clock, also in lock step and with simulated time: how busy the recorder is does not count. Where
+    plant and controller run on two machines, the difference of their clocks does.
 
     Returns:
         One value for each stamp that was answered [ms].
     """
-    came: dict[float, float] = {}
-    for stamp_s, log_s in zip(record.odom.stamp_s, record.odom.log_s, strict=True):
-        came.setdefault(stamp_s, log_s)
+    odom, commanded = record.odom, record.commanded
+    sent: dict[float, float] = {}
+    for stamp_s, publish_s in zip(odom.stamp_s, odom.publish_s, strict=True):
+        sent.setdefault(stamp_s, publish_s)
     answered: dict[float, float] = {}
-    for stamp_s, log_s in zip(record.commanded.stamp_s, record.commanded.log_s, strict=True):
-        if stamp_s in came:
-            answered.setdefault(stamp_s, log_s)
-    return np.array([1e3 * (log_s - came[stamp_s]) for stamp_s, log_s in answered.items()])
+    for stamp_s, publish_s in zip(commanded.stamp_s, commanded.publish_s, strict=True):
+        if stamp_s in sent:
+            answered.setdefault(stamp_s, publish_s)
+    return np.array([1e3 * (publish_s - sent[stamp_s]) for stamp_s, publish_s in answered.items()])
 
 
 def percentiles(values: np.ndarray) -> Spread:

@@ -14,6 +14,7 @@ from fulmar_bringup.plan_checks import checked_rate, chosen_policy
 from fulmar_bringup.progress import step_bar
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import check_names
+from fulmar_core.counts import check_episodes
 from fulmar_core.disturbances.scenario import check_delays, load_scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.errors import ConfigError, UnknownNameError
@@ -94,6 +95,14 @@ def plan_trial(
             f"an episode of {duration_s:g} s is shorter than the {window_s:g} s that '{task}' is held in the end. "
             "Make it longer."
         )
+    episodes = episodes or (BATCH_EPISODES if through == "batch" else EPISODES)
+    check_episodes(
+        the_robot,
+        episodes=episodes,
+        steps=steps or round(duration_s / control_dt),
+        worlds=(worlds or WORLDS) if through == "batch" else None,
+        jobs=(jobs or 1) if through == "ros" else 1,
+    )
     policy = chosen_policy(controller, policy, the_robot, the_task, hz)
     plan = RunPlan(
         robot=robot,
@@ -110,7 +119,7 @@ def plan_trial(
     return Trial(
         plan,
         through,
-        episodes or (BATCH_EPISODES if through == "batch" else EPISODES),
+        episodes,
         worlds or WORLDS,
         jobs or len(os.sched_getaffinity(0)),
         bounds or BOUNDED_EPISODES,

@@ -17,17 +17,16 @@ from fulmar_bags.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
 from fulmar_core.control_loop import Step
 from fulmar_core.controller_settings import POLICY, ControllerSettings
 from fulmar_core.controllers.controller import Controller, Inputs
-from fulmar_core.errors import FulmarError, TaskError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, FulmarError, TaskError
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.beliefs import BeliefReader, Beliefs
-from fulmar_core.health.thruster_health import can_be_watched
+from fulmar_core.health.thruster_health import can_estimate_health
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode
-from fulmar_core.safety.estop import EstopWatch
+from fulmar_core.safety.estop import EstopMonitor
+from fulmar_core.safety.fallback import Standby
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.standby import Standby
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ODOMETRY
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
@@ -72,10 +71,10 @@ class ControllerNode(LifecycleNode):
         self._sending = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
         self.guard: GuardedLoop | None = None  # while configured
-        self._estop = EstopWatch(required=self.settings.estop)  # a press outlives a new configuration
+        self._estop = EstopMonitor(required=self.settings.estop)  # a press outlives a new configuration
         self._swap = PolicySwap(
             self._load if self.settings.controller == POLICY else None,
-            propose=lambda candidate: self._guarded.succession.propose(candidate),
+            propose=lambda candidate: self._guarded.switch.propose(candidate),
             warn=self.get_logger().warning,
         )
         self._names = self.robot.actuators.names
@@ -86,7 +85,7 @@ class ControllerNode(LifecycleNode):
         )
         self._pause_ns = self.settings.pause_ns(self.robot)
         self._applied = AppliedHistory(self.settings.hold_ns(self.robot))
-        self._belief_reader = BeliefReader(self.robot) if can_be_watched(self.robot) else None
+        self._belief_reader = BeliefReader(self.robot) if can_estimate_health(self.robot) else None
         self._beliefs = Beliefs()
         self._beat = ControlBeat(
             1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
@@ -192,7 +191,7 @@ class ControllerNode(LifecycleNode):
             self.wires.destroy(self)
 
     def _on_estop(self, message: Bool) -> None:
-        self._estop.hear(bool(message.data), time.monotonic_ns())
+        self._estop.receive(bool(message.data), time.monotonic_ns())
         self._publish_status()
 
     def _on_estop_released(self, _message: String) -> None:
@@ -209,7 +208,7 @@ class ControllerNode(LifecycleNode):
     def _announce(self) -> None:
         """Publish the identity of the controller that acts from now on; estimates begin anew."""
         self._beliefs = Beliefs()
-        self.wires.publish_metadata(self._guarded.succession.current.metadata)
+        self.wires.publish_metadata(self._guarded.switch.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
         goal, problem = goal_of(message, self._frames)
@@ -302,7 +301,7 @@ class ControllerNode(LifecycleNode):
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
         guard = self._guarded
-        if guard.turn():
+        if guard.switch_controller():
             self._swap.took_over()
             self._announce()
         stamp = measurement.stamp_ns if measurement else 0

@@ -50,7 +50,7 @@ class ControllerStatus:
 
         `decision` is the arbiter's for now, `beliefs` are warnings about actuators.
         """
-        mission, succession, refusal = guard.mission, guard.succession, guard.refusal
+        mission, succession, refusal = guard.mission, guard.switch, guard.refusal
         standby, last_input_ns = succession.current, guard.flags.last_input_ns
         changed = (
             decision.mode,

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.health.thruster_health import can_be_watched
+from fulmar_core.health.thruster_health import can_estimate_health
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.topics import (
@@ -95,7 +95,7 @@ class ControllerWires:
         self._observation = node.create_publisher(JointState, OBSERVATION.name, qos(OBSERVATION))
         self._action = node.create_publisher(JointState, ACTION.name, qos(ACTION))
         self._health = None
-        if can_be_watched(robot):
+        if can_estimate_health(robot):
             self._health = node.create_publisher(JointState, ACTUATORS_HEALTH.name, qos(ACTUATORS_HEALTH))
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
@@ -116,7 +116,7 @@ class ControllerWires:
         # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
         if on_bearing is not None:
             self._subscriptions += subscribe_operator(node, Bool, AIR_BEARING, on_bearing)
-        if can_be_watched(robot):
+        if can_estimate_health(robot):
             applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
             self._subscriptions.append(
                 node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)

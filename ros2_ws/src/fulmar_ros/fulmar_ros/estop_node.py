@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
 from fulmar_core.topics import (
@@ -89,11 +89,11 @@ class EstopNode(Node):
 
     def _on_command(self, source: str, message: JointState) -> None:
         zero = not any(message.effort)  # ends at the first value that is not
-        self._button.hear_command(source, zero, time.monotonic_ns())
+        self._button.receive_command(source, zero, time.monotonic_ns())
 
     def _on_velocity(self, message: TwistStamped) -> None:
         zero = message.twist.linear.x == 0.0 and message.twist.angular.z == 0.0
-        self._button.hear_command(VELOCITY_COMMAND.name, zero, time.monotonic_ns())
+        self._button.receive_command(VELOCITY_COMMAND.name, zero, time.monotonic_ns())
 
     def _on_estop(self, message: Bool, info: dict[str, Any]) -> None:
         """Latch a press by any other publisher, whose other messages do not count."""

@@ -10,10 +10,9 @@ from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.errors import FulmarError
-from fulmar_core.priority import give_up_priority
+from fulmar_core.process import give_up_priority
 from fulmar_core.robot import Robot
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby, ready
+from fulmar_core.safety.fallback import ControllerSwitch, Standby, warm_up
 from fulmar_core.tasks import Task
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
@@ -25,7 +24,7 @@ def line_up(
     task: Task,
     settings: ControllerSettings,
     complain: Callable[[str], object],
-) -> Succession[Standby]:
+) -> ControllerSwitch[Standby]:
     """Primary controller and its fallback; where the primary is refused, the fallback begins, and `complain` says why.
 
     Raises:
@@ -34,13 +33,13 @@ def line_up(
     """
     fallback = _fallback(robot, task, settings)
     try:
-        first = ready(make_controller(robot, task, settings), robot, task)
+        first = warm_up(make_controller(robot, task, settings), robot, task)
     except (FulmarError, ImportError) as error:
         if fallback is None:
             raise
         complain(f"falling back to {settings.fallback}: {error}")
-        return Succession(None, fallback, refused=str(error))
-    return Succession(first, fallback)
+        return ControllerSwitch(None, fallback, refused=str(error))
+    return ControllerSwitch(first, fallback)
 
 
 def load_other(
@@ -55,7 +54,7 @@ def load_other(
     Raises:
         FulmarError: It cannot take the place of the one that runs.
     """
-    return ready(make_controller(robot, task, dataclasses.replace(settings, policy=folder)), robot, task)
+    return warm_up(make_controller(robot, task, dataclasses.replace(settings, policy=folder)), robot, task)
 
 
 def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby | None:
@@ -64,7 +63,7 @@ def _fallback(robot: Robot, task: Task, settings: ControllerSettings) -> Standby
         return None
     law = None if name == "classical" else name
     controller = load_classical(robot, task, control_hz=settings.control_rate(robot), law=law)
-    return ready(controller, robot, task, said={"fallback": True})
+    return warm_up(controller, robot, task, said={"fallback": True})
 
 
 LONGEST_PATH = 4096  # characters of a bundle's folder, as of any path

@@ -9,22 +9,24 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from fulmar_bags.message_reader import measurement_of
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_bags.message_reader import measurement_of, stamp_ns
+from fulmar_core.errors import DONE, FAILED
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile, load_goals
 from fulmar_core.goal_sequence import STANDSTILL, goal_sequence
 from fulmar_core.paths import config_names
 from fulmar_core.planar import planar_of
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import GOAL_WIRES, ODOMETRY
+from fulmar_core.topics import GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.graph import running_robots_text
 from fulmar_ros.health import Health
@@ -114,6 +116,10 @@ class GoalNode(Node):
         self.create_subscription(
             Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
         )
+        if not self._settings.stay:
+            self.create_subscription(
+                DiagnosticArray, STATUS.name, self._on_status, subscriber_qos(STATUS, reliable=True)
+            )
         self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
         if not self._single:
             self.get_logger().info(f"{goals.title}: goals for {name} on {self._publisher.topic_name}")
@@ -163,6 +169,21 @@ class GoalNode(Node):
         if self._single and self._sent is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
         self._sent, self._sent_at_ns = goal, self._time_ns
+
+    def _on_status(self, message: DiagnosticArray) -> None:
+        """End where the controller refuses the goal for good: it lies outside the robot's area."""
+        values = {pair.key: pair.value for status in message.status[:1] for pair in status.values}
+        reason = values.get("goal_refused", "")
+        with self._lock:
+            sent = self._message
+            mine = sent is not None and values.get("goal_refused_stamp_ns") == str(
+                stamp_ns(sent.header.stamp)
+            )
+            if self._over or not mine or not reason.startswith(OUT_OF_BOUNDS):
+                return
+            self._over = True
+        self.get_logger().error(f"the controller refuses the goal: {reason}")
+        self._request_exit(FAILED)
 
     def _publish_progress(self) -> None:
         if self._sequence.progress != self._progress:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
+from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import multiply
 from fulmar_core.state import RigidBodyState

@@ -17,6 +17,8 @@ from rclpy.subscription import Subscription
 from fulmar_core.topics import Wire
 from fulmar_ros.qos import STREAM_DEPTH, subscriber_qos
 
+# Asks rclpy for message info.
+_WITH_INFO = inspect.signature(lambda message, info: None)
 SUBSCRIPTIONS = 2  # of one latched wire, as its publishers count them
 # Messages by which a second delivery is recognised; the middleware keeps no more for a reader
 REMEMBERED = 5000
@@ -69,11 +71,26 @@ def subscribe_operator(
     ]
 
 
+def with_message_info(callback: Callable[[Any, dict[str, int]], None]) -> Callable[..., None]:
+    """A callback for `Node.create_subscription` that receives the message info from every executor.
+
+    Args:
+        callback: Called with each message and its info.
+    """
+
+    def on_message(*received: Any) -> None:
+        # The EventsExecutor of rclpy 7.1 passes message and info as one tuple, other executors as two arguments.
+        message, info = received if len(received) == 2 else received[0]
+        callback(message, info)
+
+    vars(on_message)["__signature__"] = _WITH_INFO
+    return on_message
+
+
 class _Once:
     """A callback of several subscriptions that passes each message on once, by its source time and number."""
 
-    # Asks rclpy for message info.
-    __signature__ = inspect.signature(lambda message, info: None)
+    __signature__ = _WITH_INFO
 
     def __init__(self, callback: Callable[..., None], *, with_info: bool) -> None:
         self._callback, self._with_info = callback, with_info

@@ -128,7 +128,7 @@ class PlantHealth:
     def _contested(self) -> str:
         """Which nodes publish commands, where two do and one has the actuators."""
         with self._wires.lock:
-            contested = self._guard.writers.reason(time.monotonic_ns())
+            contested = self._guard.publishers.reason(time.monotonic_ns())
         return "" if self._guard.person or self.mode == "finished" else contested
 
     def _estop(self) -> tuple[str, str, str] | None:

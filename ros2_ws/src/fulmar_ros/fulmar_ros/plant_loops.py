@@ -10,7 +10,7 @@ import numpy as np
 
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.errors import LockstepError
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
+from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_ros.deadline import Deadlines

@@ -12,11 +12,10 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from fulmar_core.backend import AirBearing, Backend
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
-from fulmar_core.errors import ConfigError, FulmarError
-from fulmar_core.exit_codes import BAD_USAGE, FAILED
+from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_core.safety.estop import EstopWatch
+from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import CLOCK, DIAGNOSTICS
@@ -89,7 +88,7 @@ class PlantNode(LifecycleNode):
         self.guard = ActuatorGuard(
             self.robot.actuators,
             Watchdog(round(timeout_s * 1e9)),
-            estop=EstopWatch(required=self.settings.estop),
+            estop=EstopMonitor(required=self.settings.estop),
             control_dt=1.0 / self.settings.control_rate(self.robot),
             lockstep=self.settings.lockstep,
         )

@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
 from fulmar_core.planar import at_rest, rigid_of
-from fulmar_core.priority import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.input_gate import BACK_NS
@@ -298,7 +298,7 @@ class PlantWires:
 
     def _on_estop(self, message: Bool) -> None:
         with self.lock:
-            self._guard.estop.hear(bool(message.data), time.monotonic_ns())
+            self._guard.estop.receive(bool(message.data), time.monotonic_ns())
 
     def _on_estop_released(self, _message: String) -> None:
         with self.lock:
@@ -320,7 +320,7 @@ class PlantWires:
         """Report to the guard which nodes publish commands."""
         writers = writers_of(self._node, self._commands)
         with self.lock:
-            self._guard.writers.see(writers, time.monotonic_ns())
+            self._guard.publishers.see(writers, time.monotonic_ns())
 
     @property
     def _plant_ns(self) -> int | None:

@@ -17,11 +17,10 @@ from fulmar_bags.per_goal import BagPerGoal
 from fulmar_bags.ring import BagRing, fault_finder
 from fulmar_bags.writer import BagWriter, check_free
 from fulmar_bags.writer_thread import BagThread
-from fulmar_core.errors import BagError
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
 from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire, thing_wire
-from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.operator_subscription import subscribe_operator, with_message_info
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import EVERYTHING, subscriber_qos
 from fulmar_ros.recorder_health import RecorderHealth
@@ -63,10 +62,13 @@ class RecorderNode(Node):
         commands: list[Subscription] = []
         for wire, topic in self._topics.items():
             if wire.source == "operator" and wire.delivery == "latched":
-                subscribe_operator(self, classes[wire], wire, self._keep(topic), depth=EVERYTHING, raw=True)
+                subscribe_operator(
+                    self, classes[wire], wire, self._keep(topic), depth=EVERYTHING, raw=True, with_info=True
+                )
                 continue
             qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
-            made = self.create_subscription(classes[wire], wire.name, self._keep(topic), qos, raw=True)
+            keep = with_message_info(self._keep(topic))
+            made = self.create_subscription(classes[wire], wire.name, keep, qos, raw=True)
             commands += [made] if wire in (COMMAND, VELOCITY_COMMAND) else []
         self._health = RecorderHealth(
             self,
@@ -136,9 +138,15 @@ class RecorderNode(Node):
             fault_in=fault_finder(self._robot, self._topics),
         )
 
-    def _keep(self, topic: str) -> Callable[[bytes], None]:
+    def _keep(self, topic: str) -> Callable[[bytes, dict[str, int]], None]:
+        """A callback that puts a topic's messages into the bag.
+
+        `log_time` is when the message was received, by the wall clock of this machine; `publish_time` is when it was
+        sent, by the wall clock of the sender's machine (the source timestamp of DDS). Both are wall clock also in lock
+        step and with simulated time, which only the stamps in the messages follow.
+        """
         put = self._thread.put
-        return lambda data: put(topic, data, time.time_ns())
+        return lambda data, info: put(topic, data, time.time_ns(), info["source_timestamp"])
 
     def _attach_provenance(self) -> None:
         """Attach code version and packages; git and a slow disk may take seconds, while messages come already."""

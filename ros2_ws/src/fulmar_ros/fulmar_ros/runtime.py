@@ -25,9 +25,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from fulmar_core.errors import FulmarError
-from fulmar_core.exit_codes import BAD_USAGE, DONE, FAILED
-from fulmar_core.parent_watch import end_with
+from fulmar_core.errors import BAD_USAGE, DONE, FAILED, FulmarError
+from fulmar_core.process import end_with
 from fulmar_ros.middleware import set_up_middleware
 
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.

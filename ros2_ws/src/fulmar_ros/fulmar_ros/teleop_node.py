@@ -25,8 +25,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState, Joy
 from std_srvs.srv import Trigger
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.exit_codes import DONE
+from fulmar_core.errors import DONE, ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping
 from fulmar_core.topics import GIVE_BACK, JOY, TELEOP

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.disturbances.outside import outside_wrench
-from fulmar_core.disturbances.world import World
+from fulmar_core.disturbances.world import World, outside_wrench
 from fulmar_core.episode import Episode, episode_steps
 from fulmar_core.errors import ConfigError
 from fulmar_core.holdability import LEAST_MARGIN, hold_margin

@@ -26,6 +26,8 @@ from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
 from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.counts import check_episodes
+from fulmar_core.episode import episode_steps
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
@@ -68,6 +70,9 @@ def run_drift(
     Arguments beside the request as of `evaluate_units`.
     """
     began = time.monotonic()
+    robot = load_robot(ROBOT)
+    steps = episode_steps(load_task(POSE_TASK), robot.timing.control_s)
+    check_episodes(robot, episodes=request.episodes, steps=steps, jobs=request.jobs)
     pairs = {
         (task, controller): _pair(request, task, controller)
         for task in dict.fromkeys(_task_of_row(row) for row in request.rows)

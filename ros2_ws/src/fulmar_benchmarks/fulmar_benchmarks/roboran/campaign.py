@@ -13,7 +13,10 @@ from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import FORMAT, pair_entry
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
+from fulmar_core.counts import check_episodes
 from fulmar_core.provenance import fulmar_version, git_revision
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import BATCH_EPISODES
 from fulmar_evaluation.evaluation import EPISODES as JUDGED
 
@@ -57,6 +60,10 @@ def run_benchmark(
     Arguments beside the request as of `evaluate_units`.
     """
     began = time.monotonic()
+    longest_s = max(load_task(task).episode_s for task in request.tasks)
+    for robot in map(load_robot, request.robots):
+        steps = round(longest_s * robot.timing.control_hz)
+        check_episodes(robot, episodes=max(request.episodes.values()), steps=steps, jobs=request.jobs)
     pairs = [
         find_pair(robot, task, kind, request.policies)
         for task in request.tasks

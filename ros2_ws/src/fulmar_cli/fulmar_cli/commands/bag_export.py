@@ -34,9 +34,9 @@ def export(
 ) -> None:
     """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
 
-    The dataset follows version 2.1 of LeRobot's format: `meta/info.json`, tasks, episodes and their statistics as JSON
-    lines, and a parquet file for each episode, with `observation.state` and `action` as the controller saw and said
-    them. It needs the extra 'datasets'.
+    The dataset follows version 3.0 of LeRobot's format: `meta/info.json`, `meta/stats.json`, tasks, episodes and frames
+    as parquet, with `observation.state` and `action` as the controller received and sent them. It needs the extra
+    'datasets'.
     """
     from fulmar_bags.tables import write_csv, write_npz
 
@@ -55,15 +55,17 @@ def export(
     else:
         from fulmar_bags.control_steps import control_steps_of
         from fulmar_bags.lerobot import write_lerobot
+        from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries
 
         for bag in opened:
             if bag.info is None:
                 raise BagError(
                     f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
                 )
-        courses = [control_steps_of(bag, task=task) for bag in opened]
-        titles = [course.task.title for course in courses]
-        folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
+        with knowing_what_it_carries(*opened):
+            courses = [control_steps_of(bag, task=task) for bag in opened]
+            titles = [course.task.title for course in courses]
+            folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
         files, left_out = [folder], []
         warn(notes)
     warn(f"left out: {line}" for line in left_out)

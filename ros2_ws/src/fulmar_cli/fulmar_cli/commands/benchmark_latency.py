@@ -12,8 +12,7 @@ from rich.table import Table
 from fulmar_bringup.console import output, print_result, write_line
 from fulmar_bringup.progress import time_bar, work_bar
 from fulmar_cli.commands.arguments import JsonOption, option
-from fulmar_core.errors import ConfigError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, ConfigError
 
 
 def latency(

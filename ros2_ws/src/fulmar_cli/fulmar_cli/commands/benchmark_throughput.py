@@ -45,6 +45,7 @@ def throughput(
     fulmar benchmark throughput --robots kingfisher,turtlebot2 --json
     """
     from fulmar_cli.extras import require
+    from fulmar_core.counts import PROCESS_BYTES, WORLD_BYTES, check_count
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.paths import config_names
     from fulmar_core.robot import load_robot
@@ -57,6 +58,8 @@ def throughput(
     names = config_names("robots") if robots is None else [name.strip() for name in robots.split(",")]
     chosen = [load_robot(name) for name in names]
     the_task, the_scenario = load_task(task), load_scenario(scenario)
+    check_count("--worlds", worlds, bytes_each=WORLD_BYTES)
+    check_count("--cores", cores, bytes_each=PROCESS_BYTES)
     require("mujoco", *([] if library == "numpy" else ["torch"]))
     _check_device(device, library)
     from fulmar_benchmarks.throughput import Library, measure

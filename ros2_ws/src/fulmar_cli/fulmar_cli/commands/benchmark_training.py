@@ -10,7 +10,7 @@ import typer
 
 from fulmar_bringup.console import output, print_result, write_line
 from fulmar_cli.commands.arguments import JsonOption, option
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED
 
 
 def training(
@@ -29,10 +29,13 @@ def training(
 
     Success is the mean of the training scenario and the nominal one, on episodes that nobody learns from.
     """
+    from fulmar_core.counts import PROCESS_BYTES, check_count
     from training.benchmark import benchmark_jobs, compare
     from training.executors import LocalExecutor
     from training.progress import JobBars
 
+    check_count("--seeds", seeds)
+    check_count("--at-once", at_once, bytes_each=PROCESS_BYTES)
     out = out or Path("runs") / "benchmark" / f"{time.strftime('%Y%m%d_%H%M%S')}_training"
     numbers = range(1, seeds + 1)
     jobs = benchmark_jobs(robot, task, seeds=numbers, seconds=seconds, check_every_s=check_every, out=out)

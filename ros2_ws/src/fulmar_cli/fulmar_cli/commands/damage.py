@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from fulmar_bringup.console import log_line
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED
 
 if TYPE_CHECKING:
     from fulmar_bags.contents import Bag

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from fulmar_bringup.console import output, print_json
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import ConfigError, UnknownNameError
-
-if TYPE_CHECKING:
-    from fulmar_cli.diagnosis import Finding
+from fulmar_core.errors import DONE, FAILED, ConfigError, UnknownNameError
 
 
 def doctor(
@@ -19,36 +16,38 @@ def doctor(
         str | None,
         typer.Argument(metavar="[NAME]", help="With --for hardware: a hardware file; all by default."),
     ] = None,
-    what: Annotated[
+    purpose: Annotated[
         str | None,
-        typer.Option("--for", metavar="hardware", help="Check hardware files instead of the machine."),
+        typer.Option(
+            "--for",
+            metavar="hardware|sim",
+            help="hardware: what a robot needs, and hardware files. sim: what a simulation needs. Both by default.",
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check the machine: Python, ROS, simulator, policies, timing, disk; say what to do about what is wrong.
+    """Check installation, network, processor, disk and devices; print the command that mends what is not right.
 
-    With --for hardware: for each hardware file, what stops the device when the driver dies; for a named one also
+    Each check is ok, advice (it works, but worse than it could) or wrong. Exit code: 0, or 1 if something is wrong.
+
+    With --for hardware also for each hardware file what stops the device when the driver dies; for a named one also
     whether its port is there.
     """
-    from fulmar_cli.diagnosis import diagnose, diagnose_hardware
+    from fulmar_cli.diagnosis.checks import PURPOSES, diagnose
+    from fulmar_cli.diagnosis.finding import healthy
 
-    if what not in (None, "hardware"):
-        raise UnknownNameError("subject of --for", str(what), ["hardware"])
-    if name and not what:
+    if purpose is not None and purpose not in PURPOSES:
+        raise UnknownNameError("purpose of --for", purpose, PURPOSES)
+    if name and purpose != "hardware":
         raise ConfigError(f"'{name}' names a hardware file: say `fulmar doctor --for hardware {name}`.")
-    findings = diagnose_hardware(name) if what else diagnose()
+    findings = diagnose(purpose, name)
+    well = healthy(findings)
     if as_json:
-        print_json({"healthy": all(f.ok for f in findings), "findings": [f.as_dict() for f in findings]})
+        print_json({"healthy": well, "findings": [finding.as_dict() for finding in findings]})
     else:
         for finding in findings:
-            output.print(f"{mark(finding)} {finding.what}: {finding.found}", markup=False, soft_wrap=True)
-            if not finding.ok:
-                output.print(f"       {finding.advice}", markup=False, soft_wrap=True)
-    raise typer.Exit(0 if all(finding.ok for finding in findings) else 1)
-
-
-def mark(finding: Finding) -> str:
-    """How the line of a finding begins."""
-    if not finding.ok:
-        return "BAD "
-    return "WARN" if finding.warning else "ok  "
+            line = f"{finding.level:<6} {finding.what}: {finding.found}"
+            output.print(line, markup=False, soft_wrap=True)
+            if finding.fix:
+                output.print(f"       fix: {finding.fix}", markup=False, soft_wrap=True)
+    raise typer.Exit(DONE if well else FAILED)

@@ -11,7 +11,7 @@ from rich.table import Table
 from fulmar_bringup.console import log_line, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, option
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED
 
 if TYPE_CHECKING:
     from fulmar_evaluation.faults.fault import FaultResult

@@ -70,18 +70,20 @@ def goals(
     if robot is None:
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
-    from fulmar_bringup.goal_plan import check_pace
+    from fulmar_bringup.goal_plan import check_pace, places_of
     from fulmar_bringup.node_table import goals_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
+    from fulmar_core.safety.geofence import check_places
 
     the_robot = load_robot(robot)
     given = None if place is None else single_goal(place)
     file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot)
+    check_places(f"the goal of '{name}'" if name else "the goal", places_of(file).tolist())
     spec = goals_spec(
         robot,
         name or "",

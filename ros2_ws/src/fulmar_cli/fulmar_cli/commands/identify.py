@@ -70,8 +70,8 @@ def identify(
     if out is not None:
         save_calibration(calibration, out)
     document = _document(robot, bags, sum(drive.duration_s for _, drive, _ in runs), found, out)
-    if found.untold:
-        names_left = ", ".join(found.untold)
+    if found.undetermined:
+        names_left = ", ".join(found.undetermined)
         warn([f"the runs do not show {names_left}: left out of the calibration. Drive more briskly."])
     if not found.trusted:
         log_line(f"note: {found.scale}.")
@@ -91,7 +91,7 @@ def _document(
             name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit}
             for name, e in fit.estimates.items()
         },
-        "untold": list(found.untold),
+        "untold": list(found.undetermined),
         "residuals": dict(zip(("x_m", "y_m", "heading_rad"), fit.noise, strict=True)),
         "windows": fit.windows,
         "calibration": None if out is None else str(out),

@@ -9,8 +9,7 @@ import typer
 
 from fulmar_bringup.console import log_line, output, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument
-from fulmar_core.errors import FulmarError, UnknownNameError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, FulmarError, UnknownNameError
 from fulmar_core.paths import config_names
 
 FAMILIES = (
@@ -69,7 +68,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     """Names of one family, and what loads one of them and gives its title."""
     from fulmar_bringup.system import load_system
     from fulmar_core.disturbances.scenario import load_scenario
-    from fulmar_core.estimation.settings import load_estimator
+    from fulmar_core.estimation.motion_filter import load_estimator
     from fulmar_core.goal_files import load_goals
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot

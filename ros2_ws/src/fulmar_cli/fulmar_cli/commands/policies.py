@@ -10,8 +10,7 @@ import typer
 
 from fulmar_bringup.console import console, log_line, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, flag, option
-from fulmar_core.errors import ConfigError, did_you_mean
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, ConfigError, did_you_mean
 
 
 def policies(

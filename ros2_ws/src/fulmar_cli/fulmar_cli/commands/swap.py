@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED
 from fulmar_core.paths import config_names
 from fulmar_core.robot_name import checked_name
 

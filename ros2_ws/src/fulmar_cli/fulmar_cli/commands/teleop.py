@@ -8,8 +8,7 @@ import typer
 
 from fulmar_bringup.console import write_line
 from fulmar_cli.commands.arguments import NameOption, RobotArgument, flag, option
-from fulmar_core.errors import RunFailed
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, RunFailed
 from fulmar_core.robot_name import checked_name, namespace_of
 
 

@@ -19,8 +19,7 @@ from fulmar_cli.commands.arguments import (
     option,
 )
 from fulmar_cli.extras import require
-from fulmar_core.errors import ConfigError
-from fulmar_core.exit_codes import FAILED
+from fulmar_core.errors import FAILED, ConfigError
 
 if TYPE_CHECKING:
     from training.jobs import Job

@@ -16,7 +16,7 @@ from fulmar_bringup.progress import live_line
 from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands.arguments import argument, dated_folder, flag, option
 from fulmar_cli.commands.values import read_pose
-from fulmar_core.exit_codes import DONE, FAILED
+from fulmar_core.errors import DONE, FAILED
 
 RECORDING_HELP = (
     "whole: one bag. goals: one bag for each goal, DIR/goal_001 and so on. ring: only the time around a fault. "

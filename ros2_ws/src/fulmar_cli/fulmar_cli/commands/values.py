@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.safety.area import check_area
+from fulmar_core.safety.geofence import check_area
 
 Area = tuple[float, float, float, float]  # x_min, x_max, y_min, y_max [m]
 

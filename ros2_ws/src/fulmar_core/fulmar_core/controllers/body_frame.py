@@ -20,7 +20,7 @@ Twist = tuple[np.ndarray, np.ndarray, np.ndarray]  # ahead, to the left [m/s], t
 
 
 @dataclass(frozen=True)
-class Situation:
+class BodyState:
     """One moment of n robots, each in its body's own frame; shapes (n,) unless said."""
 
     goal: Vector  # way to the current target; zeros where velocities are the goal
@@ -56,14 +56,14 @@ class BodyFrame:
         """Obstacles stand about."""
         return self._around is not None
 
-    def situation(self, inputs: Inputs) -> Situation:
+    def body_state(self, inputs: Inputs) -> BodyState:
         """Everything but obstacles and further targets; of the estimated motion, where there is an estimate."""
         estimate = inputs.estimates
         if estimate is not None:
             inputs = replace(inputs, state=estimate.state)
         motion = self.motion(inputs)
         zero = np.zeros_like(motion[2])
-        return Situation(
+        return BodyState(
             (zero, zero) if self.tracks else self.goal(inputs),
             self.turn(inputs) if self.heads else zero,
             motion,

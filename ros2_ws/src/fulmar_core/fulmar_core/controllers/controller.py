@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_core.goal import Goal
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.planar import PlanarState
 
 
@@ -42,7 +42,7 @@ class Controller(Protocol):
 
     name: str
     control_hz: float
-    estimator: Suspicion | None
+    estimator: HealthSettings | None
 
     def reset(self) -> None:
         """Forget everything about the past: a new goal, a new episode, or time jumped."""

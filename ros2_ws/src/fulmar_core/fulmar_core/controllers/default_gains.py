@@ -24,8 +24,8 @@ from fulmar_core.controllers.lqr import LqrWeights
 from fulmar_core.controllers.polar import PolarGains
 from fulmar_core.controllers.pure_pursuit import PurePursuitGains
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.health.thruster_health import can_be_watched
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
+from fulmar_core.health.thruster_health import can_estimate_health
 from fulmar_core.robot import Robot
 
 Gains = TypeVar("Gains")
@@ -33,7 +33,7 @@ Gains = TypeVar("Gains")
 PRECISION, HEADING_PRECISION = 0.05, math.radians(5.0)
 # A faster outer loop gains nothing on the tasks' scale of metres and passes the noise of the heading on [1/s].
 FASTEST = 4.0
-# `Suspicion` was chosen for valves of so much each, those of configs/robots/floating_platform.yaml [N], [N·m].
+# `HealthSettings` was chosen for valves of so much each, those of configs/robots/floating_platform.yaml [N], [N·m].
 SUSPECTED_FORCE, SUSPECTED_TORQUE = 1.0, 0.31
 DIRECTIONS = np.stack([(np.cos(angle), np.sin(angle)) for angle in np.radians(np.arange(360))])
 
@@ -76,7 +76,7 @@ def lqr_weights(robot: Robot) -> LqrWeights:
         overshoot=1.0,
         braking=0.6,  # the rest is for pushes, and for a body that is heavier than written down
         least_open_s=0.04 if thrusters.binary else 0.0,
-        observer=_suspicion(robot, thrusters) if can_be_watched(robot) else None,
+        observer=_suspicion(robot, thrusters) if can_estimate_health(robot) else None,
         speed_around=0.4,
     )
 
@@ -94,12 +94,12 @@ def _least(thrusters: Thrusters, columns: list[int], directions: np.ndarray) -> 
     return float(most.min())
 
 
-def _suspicion(robot: Robot, thrusters: Thrusters) -> Suspicion:
+def _suspicion(robot: Robot, thrusters: Thrusters) -> HealthSettings:
     """The observer's own defaults, in proportion to one valve, and no less noise than the robot's sensors have."""
-    usual, sensors = Suspicion(), robot.sensors.odometry
+    usual, sensors = HealthSettings(), robot.sensors.odometry
     pushes = thrusters.thrust / SUSPECTED_FORCE
     turns = thrusters.thrust * float(np.abs(thrusters.wrench_per_newton[:, 5]).max()) / SUSPECTED_TORQUE
-    return Suspicion(
+    return HealthSettings(
         position=max(usual.position, 1.5 * sensors.position.std),
         heading=max(usual.heading, 1.5 * sensors.heading.std),
         velocity=max(usual.velocity, 1.5 * sensors.velocity.std),

@@ -10,19 +10,19 @@ import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
-from fulmar_core.health.thruster_health import can_be_watched
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
+from fulmar_core.health.thruster_health import can_estimate_health
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 
 PUSH_TERMS = ("push_x_in_body", "push_y_in_body", "push_torque")  # [N, N, N·m]
 # Networks learn on an estimator that takes no body for held and has no valve tried again.
-ESTIMATOR = Suspicion(held=0.0, retry_s=0.0)
+ESTIMATOR = HealthSettings(held=0.0, retry_s=0.0)
 
 
 def disturbance_terms(robot: Robot) -> tuple[str, ...]:
     """Names of the inputs: the push, and 1 for each valve, or 0 where it is dead; none of robots without valves."""
-    if not can_be_watched(robot):
+    if not can_estimate_health(robot):
         return ()
     return (*PUSH_TERMS, *(f"{name}_alive" for name in robot.actuators.names))
 

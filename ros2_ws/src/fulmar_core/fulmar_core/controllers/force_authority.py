@@ -11,7 +11,7 @@ from fulmar_core.actuators.thrusters import Thrusters
 UNBOUNDED = 1e6  # where no side stands in the way, as for a direction of length 0 [N]
 
 
-class Reach:
+class ForceAuthority:
     """The forces that valves can bring up in the plane, as a convex polygon."""
 
     def __init__(self, thrusters: Thrusters) -> None:

@@ -12,9 +12,8 @@ import numpy as np
 
 from fulmar_core.controllers.body_frame import BodyFrame, Vector
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.free_space import room_ahead
-from fulmar_core.controllers.guidance import passing_speed
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.controllers.guidance import passing_speed, room_ahead
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -52,7 +51,7 @@ class Law(ABC):
         self.control_hz = control_hz or robot.timing.control_hz
         self.robot, self.task, self.gains = robot, task, gains
         self.frame = BodyFrame(robot, task)
-        self.estimator: Suspicion | None = None
+        self.estimator: HealthSettings | None = None
         if self.frame.crosses_obstacles and not gains.speed_around:
             raise ValueError("'speed_around' is missing, which says how fast to go among obstacles.")
         robot.timing.substeps(self.control_hz)  # refuses rates that the physics cannot keep

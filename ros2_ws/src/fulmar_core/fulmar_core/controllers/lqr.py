@@ -14,20 +14,49 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.body_frame import Situation, Vector
+from fulmar_core.controllers.body_frame import BodyState, Vector
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.force_authority import Reach
+from fulmar_core.controllers.force_authority import ForceAuthority
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
-from fulmar_core.controllers.riccati import regulator
 from fulmar_core.controllers.valve_allocation import ValveAllocation
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.dynamics.free_body import free_body_step
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+
+
+@dataclass(frozen=True)
+class Regulator:
+    """u = -gain x, for x' = a x + b u and the cost x' q x + u' r u of each step."""
+
+    gain: np.ndarray  # (m, n)
+    cost_to_go: np.ndarray  # (n, n): x' p x is what is still to be paid
+    hessian: np.ndarray  # (m, m): what an input u costs, now and later, is u' (r + b' p b) u
+
+
+def regulator(a: np.ndarray, b: np.ndarray, q: np.ndarray, r: np.ndarray) -> Regulator:
+    """Solve the discrete algebraic Riccati equation.
+
+    Args:
+        a: Shape (n, n).
+        b: Shape (n, m).
+        q: Cost of states, shape (n, n).
+        r: Cost of inputs, shape (m, m).
+
+    Raises:
+        numpy.linalg.LinAlgError: No feedback makes it stable.
+    """
+    # It takes a fifth of a second to import, which every process would pay for, and few solve anything.
+    from scipy.linalg import solve_discrete_are
+
+    p = solve_discrete_are(a, b, q, r)
+    hessian = r + b.T @ p @ b
+    return Regulator(np.linalg.solve(hessian, b.T @ p @ a), p, hessian)
+
 
 FAR = 1.0  # from where a valve costs most [m]
 
@@ -54,7 +83,9 @@ class LqrWeights:
     open_valve_far: float = 0.0  # same, more of it, from `FAR` on, where precision is worth less
     braking: float = 0.0  # share of the deceleration that valves and push allow; 0: no heed [-]
     least_open_s: float = 0.0  # on/off valves are left as they are for so long [s]
-    observer: Suspicion | None = None  # how far to trust what; without, observations are believed as they are
+    observer: HealthSettings | None = (
+        None  # how far to trust what; without, observations are believed as they are
+    )
     speed_around: float = 0.0  # among obstacles, as a share; tasks without any need none [-]
 
     def __post_init__(self) -> None:
@@ -135,7 +166,7 @@ class Lqr(Law):
         self.cost_to_go, self.gain = best.cost_to_go, best.gain
         self._hessian = hessian = best.hessian
         allocation = OpeningAllocation if robot.actuators.continuous else ValveAllocation
-        self.reach = Reach(robot.actuators)
+        self.reach = ForceAuthority(robot.actuators)
         # How far from the goal the law asks for 1 m/s [s].
         self.lead = 1.0 if self.frame.tracks else float(self.gain[0, used.index(3)] / self.gain[0, 0])
         self.estimator = gains.observer
@@ -149,7 +180,7 @@ class Lqr(Law):
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose valves; shapes as in `Controller.act`."""
-        now = self.frame.situation(inputs)
+        now = self.frame.body_state(inputs)
         far = np.minimum(np.hypot(*now.goal) / FAR, 1.0) ** 2
         dearer = (
             far * self._weights.open_valve_far / self.control_hz if self._weights.open_valve_far else None
@@ -164,7 +195,7 @@ class Lqr(Law):
             self._last, self._age_s = command, 0.0
         return np.asarray(self._last)
 
-    def wanted(self, inputs: Inputs, now: Situation) -> np.ndarray:
+    def wanted(self, inputs: Inputs, now: BodyState) -> np.ndarray:
         """Wrench that the valves should bring up, in the body's frame, shape (..., 3) [N, N, N·m].
 
         Args:
@@ -180,7 +211,7 @@ class Lqr(Law):
             )  # what keeps u and v in a turn
         return np.asarray(wrench - now.push)
 
-    def error_state(self, inputs: Inputs, now: Situation) -> np.ndarray:
+    def error_state(self, inputs: Inputs, now: BodyState) -> np.ndarray:
         """State minus goal in the body frame, with far errors cut to the limits."""
         if self.frame.tracks:
             return np.asarray(np.stack(now.motion, axis=-1) - inputs.goal.current)
@@ -197,7 +228,7 @@ class Lqr(Law):
         parts.append(np.stack(now.motion, axis=-1))
         return np.concatenate(parts, axis=-1)
 
-    def _aim(self, inputs: Inputs, now: Situation) -> Vector:
+    def _aim(self, inputs: Inputs, now: BodyState) -> Vector:
         """Where to go: the goal, beyond a waypoint, or along the way around obstacles, in the body frame [m]."""
         x, y = now.goal
         if self.frame.crosses_obstacles:

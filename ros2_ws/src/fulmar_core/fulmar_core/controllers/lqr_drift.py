@@ -41,7 +41,7 @@ import numpy as np
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
-from fulmar_core.controllers.riccati import regulator
+from fulmar_core.controllers.lqr import regulator
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import wrap_angle
 from fulmar_core.tasks import Task

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.body_frame import Situation
+from fulmar_core.controllers.body_frame import BodyState
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
@@ -88,9 +88,9 @@ class Mpc(Law):
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose valves; shapes as in `Controller.act`."""
-        return self.plan(self.frame.situation(inputs))
+        return self.plan(self.frame.body_state(inputs))
 
-    def plan(self, now: Situation) -> np.ndarray:
+    def plan(self, now: BodyState) -> np.ndarray:
         """Valves to open now, shape (..., n).
 
         Vectors in the plane are complex numbers, and the frame is the target's: rotations are products.

@@ -19,7 +19,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
 WRENCH = 3  # force ahead, to the left, and torque
-REACH = 1.5  # what a share of 1 asks for, in units: beyond one of them only the direction matters [-]
+FULL_SHARE = 1.5  # what a share of 1 asks for, in units: beyond one of them only the direction matters [-]
 # Of missing all torque, where missing all force weighs 1: about as in the tuned LQR's cost-to-go.
 TORQUE_WEIGHT = 4.4
 VALVE_COST = 0.045  # of an open valve, where missing all force costs 1; what is not worth a valve opens none
@@ -63,7 +63,7 @@ class WrenchChoice:
         table = ValveAllocation(robot.actuators, weight=np.diag(unit**-2.0), valve_cost=cost)
         commands, wrench, offset = table.every
         order = ORDER_COST * np.arange(len(commands))
-        slope = 2.0 * REACH * (wrench / unit).T
+        slope = 2.0 * FULL_SHARE * (wrench / unit).T
         parts = commands, slope, offset + order, cost * commands.sum(axis=-1), unit
         return cls(*(np.asarray(part, dtype=np.float32) for part in parts))
 
@@ -79,13 +79,13 @@ class WrenchChoice:
         """
         xp = array_namespace(shares)
         commands = xp.asarray(self.commands)
-        haste = HASTE_COST * REACH**2 * xp.sum(shares * shares, axis=-1, keepdims=True)
+        haste = HASTE_COST * FULL_SHARE**2 * xp.sum(shares * shares, axis=-1, keepdims=True)
         cost = xp.asarray(self.offset) + haste * xp.asarray(self.gas) - shares @ xp.asarray(self.slope)
         return cost if dead is None else cost + DEAD_COST * (dead @ commands.T)
 
     def shares_of(self, wrench: np.ndarray) -> np.ndarray:
         """Shares that ask for a wrench, shape (rows, 3) [N, N, N·m]; one that is out of reach keeps its direction."""
-        shares = wrench / (REACH * self.unit)
+        shares = wrench / (FULL_SHARE * self.unit)
         return np.asarray(shares / np.maximum(1.0, np.linalg.norm(shares, axis=-1, keepdims=True)))
 
     def best(self, shares: Array, dead: Array | None = None) -> Array:

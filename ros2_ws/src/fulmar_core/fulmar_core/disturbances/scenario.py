@@ -15,7 +15,7 @@ from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import stranding_losses
+from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.paths import config_path
 from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import SCENARIO
@@ -277,7 +277,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     offset = uncertain * draws.uniform(0.0, spans.center_of_mass)
     xp = array_namespace(mass)
     faults, sensing = scenario.actuation, scenario.sensing
-    together = stranding_losses(robot, faults.failures) if faults.stranding else ()
+    together = uncontrollable_losses(robot, faults.failures) if faults.stranding else ()
     force, torque = robot.performance.force, robot.performance.torque
     push, wave, kick = scenario.push, scenario.wave, scenario.kick
     size = force * push.force * draws.uniform(push.least, 1.0)

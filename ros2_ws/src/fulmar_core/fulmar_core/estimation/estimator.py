@@ -12,8 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.estimation.motion_filter import MOTION, POSE, RATE, VX, VY, YAW, MotionFilter, Snapshot, X, Y
-from fulmar_core.estimation.settings import EstimatorSettings
+from fulmar_core.estimation.motion_filter import (
+    MOTION,
+    POSE,
+    RATE,
+    VX,
+    VY,
+    YAW,
+    EstimatorSettings,
+    MotionFilter,
+    Snapshot,
+    X,
+    Y,
+)
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw, multiply, rotate, yaw_of
 from fulmar_core.sensors.imu import ImuSample

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.force_authority import Reach
+from fulmar_core.controllers.force_authority import ForceAuthority
 from fulmar_core.health.thruster_health import Health
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
@@ -35,7 +35,7 @@ class BeliefReader:
     def __init__(self, robot: Robot) -> None:
         """Read the estimates of this robot, which has thrusters."""
         assert isinstance(robot.actuators, Thrusters)
-        self._names, self._reach = robot.actuators.names, Reach(robot.actuators)
+        self._names, self._reach = robot.actuators.names, ForceAuthority(robot.actuators)
         self._torque = robot.performance.torque
 
     def read(self, health: Health) -> Beliefs:

@@ -19,9 +19,7 @@ import numpy as np
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.applied import Applied
-from fulmar_core.health.hold_detector import HoldDetector
-from fulmar_core.health.push_filter import PushFilter
-from fulmar_core.health.trust import Suspicion
+from fulmar_core.health.filters import HealthSettings, HoldDetector, PushFilter
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
 
@@ -50,7 +48,7 @@ class Health:
 class ThrusterHealth:
     """The bank, for one robot or for many at once."""
 
-    def __init__(self, robot: Robot, suspicion: Suspicion | None = None) -> None:
+    def __init__(self, robot: Robot, suspicion: HealthSettings | None = None) -> None:
         """List the hypotheses.
 
         Args:
@@ -60,12 +58,12 @@ class ThrusterHealth:
         Raises:
             ConfigError: The robot has no thrusters, or swims.
         """
-        if not can_be_watched(robot):
+        if not can_estimate_health(robot):
             raise ConfigError(
                 f"the health of '{robot.name}' cannot be told: it is no body on air with thrusters."
             )
         assert isinstance(robot.actuators, Thrusters)
-        self._robot, self._suspicion = robot, suspicion or Suspicion()
+        self._robot, self._suspicion = robot, suspicion or HealthSettings()
         self._shared = robot.actuators.shared_pressure
         count = len(robot.actuators.nozzles)
         lost = [each for size in range(MOST_LOST + 1) for each in itertools.combinations(range(count), size)]
@@ -235,6 +233,6 @@ def _wrapped(angle: np.ndarray) -> np.ndarray:
     return angle - 2.0 * np.pi * (angle * (0.5 / np.pi)).round()
 
 
-def can_be_watched(robot: Robot) -> bool:
+def can_estimate_health(robot: Robot) -> bool:
     """Whether the health of a robot's actuators can be told."""
     return isinstance(robot.actuators, Thrusters) and robot.body.planar and robot.hydrodynamics is None

@@ -13,9 +13,9 @@ from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.calibration import DRAGS
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.hydrodynamics import drag
+from fulmar_core.identification.drives import Windows
 from fulmar_core.identification.held_input import followed, for_each_copy
 from fulmar_core.identification.model import USEFUL_DELAY_S, Unknown, Values, nominal_world
-from fulmar_core.identification.windows import Windows
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 

@@ -18,9 +18,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.identification.drive import Drive
+from fulmar_core.identification.drives import Drive, Windows, cut
 from fulmar_core.identification.model import Known, Model, Unknown
-from fulmar_core.identification.windows import Windows, cut
 
 ROUNDS = 60  # Gauss-Newton steps of one fit
 CLOSE = 1e-7  # relative decrease of the cost at which a fit has arrived

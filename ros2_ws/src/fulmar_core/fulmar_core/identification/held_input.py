@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.identification.windows import Windows
+from fulmar_core.identification.drives import Windows
 
 
 def mean_over_steps(

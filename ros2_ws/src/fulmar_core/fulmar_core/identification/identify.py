@@ -13,7 +13,7 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.calibration import Calibration, Measured
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.identification.boat import BoatModel
-from fulmar_core.identification.drive import Drive
+from fulmar_core.identification.drives import Drive
 from fulmar_core.identification.fit import Estimate, Fit, fit
 from fulmar_core.identification.model import Known, Model, Unknown
 from fulmar_core.identification.platform import PlatformModel, ballast_name
@@ -21,7 +21,7 @@ from fulmar_core.identification.wheels import WheelModel
 from fulmar_core.robot import Robot
 
 EXACT = 1e-6  # relative standard deviation of what is said to be known without an error
-NOTHING_TOLD = "the runs tell nothing of the robot: it hardly moved. Drive it, as with --controller excite."
+NO_MOTION = "the runs tell nothing of the robot: it hardly moved. Drive it, as with --controller excite."
 SIGMAS = 1.96  # half a 95 % interval, in standard deviations
 
 
@@ -40,7 +40,7 @@ class Identified:
     fit: Fit
     scale: str  # what the scale of forces rests on, in a sentence
     trusted: bool  # whether that was measured; False: it is the robot's YAML
-    untold: tuple[
+    undetermined: tuple[
         str, ...
     ] = ()  # quantities that the runs tell nothing about: intervals wider than their values
 
@@ -83,14 +83,16 @@ def identify(
             noise=(max(noise.position.std, 1e-4), max(noise.heading.std, 1e-4)),
         )
     except np.linalg.LinAlgError as error:  # without motion no number follows from it
-        raise ConfigError(NOTHING_TOLD) from error
-    untold = tuple(
-        unknown.name for unknown in model.unknowns if not _told(unknown, found.estimates[unknown.name])
+        raise ConfigError(NO_MOTION) from error
+    undetermined = tuple(
+        unknown.name
+        for unknown in model.unknowns
+        if not _is_determined(unknown, found.estimates[unknown.name])
     )
-    return Identified(found, scale, trusted, untold)
+    return Identified(found, scale, trusted, undetermined)
 
 
-def _told(unknown: Unknown, found: Estimate) -> bool:
+def _is_determined(unknown: Unknown, found: Estimate) -> bool:
     """Whether an estimate says more than that the quantity exists."""
     return (found.high - found.low) / 2.0 <= max(abs(found.value), unknown.useful)
 
@@ -101,14 +103,14 @@ def calibration_of(robot: Robot, identified: Identified, runs: Sequence[str] = (
     Raises:
         ConfigError: They told nothing.
     """
-    allowed = {field.name for field in fields(Calibration)} - set(identified.untold)
+    allowed = {field.name for field in fields(Calibration)} - set(identified.undetermined)
     measured = {
         name: Measured(found.value, found.low, found.high)
         for name, found in identified.fit.estimates.items()
         if name in allowed
     }
     if not measured:
-        raise ConfigError(NOTHING_TOLD)
+        raise ConfigError(NO_MOTION)
     return Calibration(robot=robot.name, runs=tuple(runs), **measured)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.disturbances.world import FIELDS, World
-from fulmar_core.identification.windows import Windows
+from fulmar_core.identification.drives import Windows
 from fulmar_core.robot import Robot
 
 USEFUL_DELAY_S, USEFUL_PLACE_M = 0.1, 0.1  # a worse one helps no simulation

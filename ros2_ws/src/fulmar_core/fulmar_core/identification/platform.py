@@ -14,10 +14,9 @@ import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.dynamics.free_body import free_body_step
-from fulmar_core.identification.drive import Drive
+from fulmar_core.identification.drives import Drive, Windows
 from fulmar_core.identification.held_input import for_each_copy, mean_over_steps
 from fulmar_core.identification.model import USEFUL_DELAY_S, USEFUL_PLACE_M, Unknown, Values, nominal_world
-from fulmar_core.identification.windows import Windows
 from fulmar_core.motion import to_center
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot

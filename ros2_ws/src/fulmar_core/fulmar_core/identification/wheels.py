@@ -10,9 +10,9 @@ import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.dynamics.rolling import SERVO_S
+from fulmar_core.identification.drives import Windows
 from fulmar_core.identification.held_input import followed, for_each_copy
 from fulmar_core.identification.model import USEFUL_DELAY_S, Unknown, Values
-from fulmar_core.identification.windows import Windows
 from fulmar_core.robot import Robot
 
 # A servo has a second, faster lag, and wheels give way a little: which of it looks like delay is open.

@@ -5,11 +5,20 @@ The explicit table of paths. A new path is one class and one line in each of the
 
 from __future__ import annotations
 
-from fulmar_core.references.lemniscates import BernoulliLemniscate, GeronoLemniscate, Hippopede
-from fulmar_core.references.oscillations import Hypotrochoid, Lissajous, Sine
-from fulmar_core.references.polygons import InfiniteSquare, Ngon, Square
+from fulmar_core.references.curves import (
+    BernoulliLemniscate,
+    Circle,
+    GeronoLemniscate,
+    Hippopede,
+    Hypotrochoid,
+    InfiniteSquare,
+    Lissajous,
+    Ngon,
+    Sine,
+    Spiral,
+    Square,
+)
 from fulmar_core.references.race_track import RaceTrack
-from fulmar_core.references.rounds import Circle, Spiral
 
 ReferencePath = (
     Circle

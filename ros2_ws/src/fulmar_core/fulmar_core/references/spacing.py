@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core import ranges
+from fulmar_core import config
 
 Point = tuple[float, float]  # x, y [m]
 
@@ -23,7 +23,7 @@ def positive(**sizes: float) -> None:
     Raises:
         ValueError: Names the first such size.
     """
-    ranges.positive(**sizes)
+    config.positive(**sizes)
     for name, size in sizes.items():
         if size > LARGEST:
             raise ValueError(f"'{name}' must be at most {LARGEST:g}.")

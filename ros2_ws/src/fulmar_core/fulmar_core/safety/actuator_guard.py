@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.actuators.slowdown import slowed
+from fulmar_core.actuators.actuation import slowed
 from fulmar_core.robot import Actuators, Rolling
-from fulmar_core.safety.command_gate import command_problem, name_problem
-from fulmar_core.safety.command_writers import CommandWriters
-from fulmar_core.safety.estop import EstopWatch
+from fulmar_core.safety.command_gate import CommandPublishers, command_problem, name_problem
+from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
 
 LAST_WORDS_NS = (
@@ -32,7 +31,7 @@ class ActuatorGuard:
         rejected: How many commands could not be carried out.
         last_rejection: Why not the last of them.
         person: Whether a person has the actuators.
-        writers: Which nodes publish the controller's commands; of two none is obeyed.
+        publishers: Which nodes publish the controller's commands; of two none is obeyed.
     """
 
     def __init__(
@@ -40,7 +39,7 @@ class ActuatorGuard:
         actuators: Actuators,
         watchdog: Watchdog,
         *,
-        estop: EstopWatch | None = None,
+        estop: EstopMonitor | None = None,
         control_dt: float = 0.0,
         lockstep: bool = False,
     ) -> None:
@@ -54,8 +53,8 @@ class ActuatorGuard:
             lockstep: Time stands still between commands, so nothing slows down while one is waited for.
         """
         self._actuators, self.watchdog = actuators, watchdog
-        self.estop = estop or EstopWatch(required=False)
-        self.writers = CommandWriters()
+        self.estop = estop or EstopMonitor(required=False)
+        self.publishers = CommandPublishers()
         self._control_dt, self._lockstep = control_dt, lockstep
         self.rejected = 0
         self.last_rejection = ""
@@ -169,7 +168,7 @@ class ActuatorGuard:
 
     def _stopped(self, now_ns: int) -> int | None:
         """Since when the e-stop, or a second publisher of commands, holds the robot; None if neither does."""
-        contested = not self.person and self.writers.reason(now_ns)
+        contested = not self.person and self.publishers.reason(now_ns)
         if not self.estop.reason(now_ns) and not contested:
             self._stopped_ns = None
         elif self._stopped_ns is None:

@@ -12,7 +12,7 @@ HOLDS = "e-stop:"  # how every reason begins
 SILENT = f"{HOLDS} silent"  # and how the one does that nobody may have given by a press
 
 
-class EstopWatch:
+class EstopMonitor:
     """Decides from the messages of the e-stop whether anything may move.
 
     One press latches, from any publisher. Only `release`, which follows a successful reset, ends it. An e-stop node
@@ -32,7 +32,7 @@ class EstopWatch:
         self._alive_ns: int | None = None  # newest message, since one said "released"
         self.was_released = not required  # whether it ever allowed anything
 
-    def hear(self, pressed: bool, now_ns: int) -> None:
+    def receive(self, pressed: bool, now_ns: int) -> None:
         """Take a message of the e-stop, at this time of a steady clock [ns].
 
         A "released" shows that an e-stop node is there, and that it was not pressed as far as it knows; it does not
@@ -55,7 +55,7 @@ class EstopWatch:
             self._alive_ns = None
 
     @property
-    def heard(self) -> bool:
+    def received(self) -> bool:
         """Whether it has been pressed since the last reset, or an e-stop node is, or was, there."""
         return self._pressed or self._alive_ns is not None
 
@@ -64,7 +64,7 @@ class EstopWatch:
         if self._pressed:
             return f"{HOLDS} pressed. Reset it: fulmar estop --reset"
         if self._alive_ns is None:
-            return f"{HOLDS} none is heard, and one is required" if self._required else ""
+            return f"{HOLDS} none is received, and one is required" if self._required else ""
         silent_ns = self._silent_ns(now_ns)
         if silent_ns > self._timeout_ns:
             return f"{SILENT} for {silent_ns / 1e6:.0f} ms (limit {self._timeout_ns / 1e6:.0f} ms)"
@@ -87,7 +87,7 @@ class EstopButton:
         """Stop everything."""
         self.pressed = True
 
-    def hear_command(self, source: str, zero: bool, now_ns: int) -> None:
+    def receive_command(self, source: str, zero: bool, now_ns: int) -> None:
         """Note a command.
 
         Args:

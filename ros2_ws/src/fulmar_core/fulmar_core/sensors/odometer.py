@@ -19,7 +19,7 @@ from fulmar_core.counter_rng import (
     write_keys,
 )
 from fulmar_core.disturbances.world import World
-from fulmar_core.mutable_state import Moves
+from fulmar_core.mutable_state import MutableState
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.rotation import Array, wrap_angle
 
@@ -87,10 +87,10 @@ class FirstReading:
         write_keys(self.keys, index, other.keys)
 
 
-class Odometer(Moves):
+class Odometer(MutableState):
     """Measures a batch of worlds, once every `period` seconds; remembers what it held back."""
 
-    MOVING = ("_past", "_held", "_keys")
+    MUTABLE = ("_past", "_held", "_keys")
 
     def __init__(
         self,

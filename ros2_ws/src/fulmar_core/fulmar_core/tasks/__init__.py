@@ -14,18 +14,15 @@ from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_path
 from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import TASK
-from fulmar_core.tasks.go_through_poses import GoThroughPoses
-from fulmar_core.tasks.go_through_positions import GoThroughPositions
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.own_task import load_own_task
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.tasks.race_gates import RaceGates
-from fulmar_core.tasks.race_waypoints import RaceWaypoints
-from fulmar_core.tasks.race_wayposes import RaceWayposes
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.track_velocities import TrackVelocities
+from fulmar_core.tasks.waypoint_tasks import GoThroughPoses, GoThroughPositions, RaceWaypoints, RaceWayposes
 
 __all__ = ["ShippedTask", "Task", "load_recorded_task", "load_task"]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
-from fulmar_core.dynamics.outline import outline_of
+from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array

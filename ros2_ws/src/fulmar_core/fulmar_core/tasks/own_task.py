@@ -30,7 +30,7 @@ from fulmar_core.topics import GOAL_WIRES
 
 METHODS = ("draw", "observe", "reward", "errors")
 ATTRIBUTES = ("episode_s", "tolerance", "goal_topic", "observation_names")
-SHIPPED_ONLY = ("step_s", "judged", "fitted", "surveyed")  # members that own tasks cannot have
+SHIPPED_ONLY = ("step_s", "evaluated", "fitted", "surveyed")  # members that own tasks cannot have
 ROLE = "task"  # in messages
 TRIED = 3  # episodes that `check` draws
 

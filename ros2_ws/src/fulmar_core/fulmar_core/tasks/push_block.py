@@ -11,8 +11,7 @@ import numpy as np
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
-from fulmar_core.dynamics.outline import outline_of
-from fulmar_core.dynamics.pushing import Block
+from fulmar_core.dynamics.contact import Block, outline_of
 from fulmar_core.goal import Goal, no_obstacles, offset_to
 from fulmar_core.planar import PlanarState, at_rest, to_body
 from fulmar_core.robot import Robot
@@ -155,7 +154,7 @@ class PushBlock(Task):
         return Errors(position=self._way(goal)[2])
 
     def distance_from_goal(self, state: PlanarState, goal: Goal) -> Array:
-        """Of robot or block from the block's place, whichever is farther; see `fulmar_core.geofence` [m]."""
+        """Of robot or block from the block's place, whichever is farther; see `fulmar_core.safety.geofence` [m]."""
         xp, target = array_namespace(state.x), goal.current
         robot = xp.hypot(target[..., 0] - state.x, target[..., 1] - state.y)
         return xp.maximum(robot, self._way(goal)[2])

@@ -13,9 +13,9 @@ from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState, to_body
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.race_track import RaceTrack
 from fulmar_core.tasks.terms import Errors, pose_errors
-from fulmar_core.tasks.waypoint_tasks import PassingTask, WaypointReward, bearing_of, newly_done, path_terms
+from fulmar_core.tasks.waypoint_courses import RaceTrack
+from fulmar_core.tasks.waypoint_tasks import WaypointReward, WaypointTask, bearing_of, newly_done, path_terms
 
 LAST = "robot_a_step_ago"  # pose that a goal keeps
 JUMP = 1.0  # who moves farther than this in one step was carried, or the goal is new [m]
@@ -30,7 +30,7 @@ class GateReward(WaypointReward):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RaceGates(PassingTask):
+class RaceGates(WaypointTask):
     """Pass between the posts of gates, each in the direction of the track.
 
     A gate is a pose: its middle, and the direction that counts. `reach` and the tolerance are half its width, for
@@ -63,7 +63,7 @@ class RaceGates(PassingTask):
         return goal.among({LAST: array_namespace(state.x).stack((state.x, state.y, state.yaw), axis=-1)})
 
     def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
-        """Whether the current gate is passed in its direction; see `PassingTask.reached`."""
+        """Whether the current gate is passed in its direction; see `WaypointTask.reached`."""
         last = goal.things[LAST]
         return crossings(last[..., 0], last[..., 1], state, goal.current, radius)[0]
 

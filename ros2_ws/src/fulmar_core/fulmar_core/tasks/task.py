@@ -72,7 +72,7 @@ class Task(ABC):
         return None
 
     @property
-    def judged(self) -> Task:
+    def evaluated(self) -> Task:
         """The task with the errors that evaluations use."""
         return self
 

@@ -1,18 +1,18 @@
-"""What tasks share whose targets are passed one after another, as many as time allows."""
+"""Tasks that visit waypoints one after another, as many as time allows."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.planar import PlanarState, at_rest, wrapped
+from fulmar_core.planar import PlanarState, at_rest, to_body, wrapped
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.task import Task
@@ -25,7 +25,7 @@ from fulmar_core.tasks.terms import (
     motion_terms,
     pose_errors,
 )
-from fulmar_core.tasks.waypoints import headings_along
+from fulmar_core.tasks.waypoint_courses import RaceTrack, WaypointCourse, headings_along
 
 PLACE_TERMS = ("direction_x_in_body", "direction_y_in_body", "distance")
 TURN_TERMS = ("cos_heading_error", "sin_heading_error")
@@ -65,7 +65,7 @@ class WaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PassingTask(Task):
+class WaypointTask(Task):
     """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
 
     name: str
@@ -150,7 +150,7 @@ class PassingTask(Task):
             goal: Before this step.
             state: After it, shapes (...,).
             radius: How near counts [m].
-            strict: Judge the heading, where it counts, as a controller does and not as a judge.
+            strict: TargetCounter the heading, where it counts, as a controller does and not as a judge.
 
         Returns:
             Truth values, shape (...,).
@@ -191,3 +191,112 @@ def bearing_of(state: PlanarState, target: Array) -> Array:
     """Angle from the body's x axis to a target, in [-pi, pi] [rad]."""
     x, y = goal_terms(state, target)
     return wrapped(array_namespace(x).atan2(y, x))
+
+
+@dataclass(frozen=True)
+class PoseWaypointReward(WaypointReward):
+    """Weights of the reward, per control step."""
+
+    heading: float  # times exp(-d / 0.5 m - |e| / 0.25 rad): look the right way when near
+    turn: float  # times radians come nearer, the more the nearer the waypoint: exp(-d / 1 m)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseWaypointTask(WaypointTask):
+    """Pass through poses: a target counts where place and heading are right at the same time."""
+
+    reach_heading_deg: (
+        float  # a controller takes a heading for right within this, less than the tolerance [deg]
+    )
+    reward_weights: PoseWaypointReward
+
+    heads: ClassVar[bool] = True
+    observation_names: ClassVar[tuple[str, ...]] = path_terms(2, heading=True)
+
+    def __post_init__(self) -> None:
+        """Refuse a reach that judges would not count."""
+        super().__post_init__()
+        if not 0.0 < self.reach_heading_deg <= self.tolerance.heading_deg:
+            raise ValueError(
+                "'reach_heading_deg' must be greater than 0 and at most the tolerance of the heading."
+            )
+
+    def reached(self, goal: Goal, state: PlanarState, radius: float, *, strict: bool = True) -> Array:
+        """Whether the current target is passed with the right heading; see `WaypointTask.reached`."""
+        limit = math.radians(self.reach_heading_deg if strict else self.tolerance.heading_deg)
+        errors = self.errors(state, goal)
+        return (errors.position < radius) & (array_namespace(state.x).abs(errors.heading) < limit)
+
+    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
+        """Reward of one control step; see `Task.reward`."""
+        xp = array_namespace(after.x)
+        w, old, new = self.reward_weights, self.errors(before, goal), self.errors(after, goal)
+        reached = newly_done(goal, ended)
+        e, d = xp.abs(new.heading), new.position
+        target = goal.current
+        progress = _way_to(before, target, old.position) - _way_to(after, target, d)
+        plain = w.of(progress, reached, bearing_of(after, target), after)
+        turned = xp.exp(-d) * (xp.abs(old.heading) - e)
+        return plain + w.heading * xp.exp(-d / 0.5 - e / 0.25) + w.turn * turned
+
+
+def _way_to(state: PlanarState, target: Array, distance: Array) -> Array:
+    """How far it is to a pose by way of a point behind it, half as far off as the robot [m]."""
+    xp = array_namespace(state.x)
+    along, across = to_body(target[..., 2], target[..., 0] - state.x, target[..., 1] - state.y)
+    along = along - 0.5 * distance
+    return 0.5 * distance + xp.sqrt(along * along + across * across)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoThroughPositions(WaypointTask):
+    """Pass through positions of a random course in their order.
+
+    Three of them are seen, one more than in RoboRAN: where a boat leaves a waypoint to depends on the next two.
+    """
+
+    kind: Literal["go_through_positions"]
+    course: WaypointCourse
+
+    seen: ClassVar[int] = 3
+    observation_names: ClassVar[tuple[str, ...]] = path_terms(3, heading=False)
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        return self.course.draw(draws)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoThroughPoses(PoseWaypointTask):
+    """Pass through poses of a random course in their order; each looks from the one before to the one after."""
+
+    kind: Literal["go_through_poses"]
+    course: WaypointCourse
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        return self.course.draw(draws)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RaceWaypoints(WaypointTask):
+    """Pass through the corners of a race track in their order."""
+
+    kind: Literal["race_waypoints"]
+    track: RaceTrack
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        return self.track.draw(draws)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RaceWayposes(PoseWaypointTask):
+    """Pass through the corners of a race track in their order, looking along it."""
+
+    kind: Literal["race_wayposes"]
+    track: RaceTrack
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        return self.track.draw(draws)

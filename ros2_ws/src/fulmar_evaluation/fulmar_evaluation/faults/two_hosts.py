@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fulmar_core.errors import RunFailed
-from fulmar_core.priority import PLANT_PRIORITY, take_priority
+from fulmar_core.process import PLANT_PRIORITY, take_priority
 
 TUN = Path("/dev/net/tun")
 TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454CA, 0x0002, 0x1000  # linux/if_tun.h

@@ -132,6 +132,6 @@ def draw_latency(axes: Axes, runs: Sequence[View]) -> None:
     axes.xaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("from measurement to command, as recorded [ms]")
+    axes.set_xlabel("from measurement sent to command sent [ms]")
     axes.set_ylabel("commands [%]")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8.5, handlelength=1.2)

@@ -249,6 +249,6 @@ def _latency(runs: Sequence[View]) -> Plot:
     axes = figure.subplots()
     draw_latency(axes, runs)
     caption = """
-    Time from a measurement to the command that answers it, as the recorder saw both pass; the scale is
-    logarithmic. The solid line is the median (p50); 99 of 100 commands come before the dashed one (p99)."""
+    Time from sending a measurement to sending the command that answers it; the scale is logarithmic.
+    The solid line is the median (p50); 99 of 100 commands come before the dashed one (p99)."""
     return Plot("How fast the controller answers", caption, figure)

@@ -142,7 +142,8 @@ def _write_kept(bag: Bag, folder: Path, task: Task) -> None:
     )
     by_name = {topic.name: topic for _, topic in topics}
     for log, name, index in every:
-        writer.write(name, by_name[name].data[index], log_ns=log)
+        topic = by_name[name]
+        writer.write(name, topic.data[index], log_ns=log, publish_ns=topic.publish_ns[index])
     writer.close()
 
 

@@ -22,9 +22,8 @@ from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.observation import Observer
 from fulmar_core.rotation import rotate
+from fulmar_core.safety.fallback import ControllerSwitch, Standby, warm_up
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.safety.succession import Succession
-from fulmar_core.standby import Standby, ready
 from fulmar_core.state import RigidBodyState
 
 FROM = ("observations", "odometry")
@@ -120,8 +119,9 @@ class _Rerun:
             course.robot,
             course.task,
             settings,
-            Succession(
-                Standby(controller, "", ""), ready(fallback, course.robot, course.task) if fallback else None
+            ControllerSwitch(
+                Standby(controller, "", ""),
+                warm_up(fallback, course.robot, course.task) if fallback else None,
             ),
             self._estop,
             gate=InputGate(course.robot.limits, frozen_after=0),
@@ -157,8 +157,8 @@ class _Rerun:
             for message in goals.get(step, ()):
                 guard.take_goal(message.value, message.stamp_ns, message.log_ns)
             for message in changes.get(step, ()):
-                guard.succession.propose(self._successor(*message.value))
-            guard.turn()
+                guard.switch.propose(self._successor(*message.value))
+            guard.switch_controller()
             reasons[step], inputs = self._inputs(step)
             if inputs is not None:
                 try:
@@ -197,7 +197,7 @@ class _Rerun:
                 return "no odom yet. Is the plant running?", None
             decision, inputs = guard.begin_step(measurement, log_ns)
             return decision.reason, inputs
-        if self._estop.heard and not recorded:
+        if self._estop.received and not recorded:
             guard.mission.drop()
         if not recorded or (self._source == "odometry" and measurement is None):
             guard.loop.rest(stamp)
@@ -261,7 +261,7 @@ class _Rerun:
         assert self._load is not None
         where = f"the run went on with the policy of {folder}"
         try:
-            found = ready(self._load(folder), self._robot, self._course.task)
+            found = warm_up(self._load(folder), self._robot, self._course.task)
         except FulmarError as error:
             raise BagError(f"{where}, which cannot be loaded: {error}") from error
         if found.sha256 != sha256:

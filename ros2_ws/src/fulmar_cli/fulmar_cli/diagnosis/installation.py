@@ -1,0 +1,75 @@
+"""Checks of the installation: Python, the parts of Fulmar, configuration files and shipped policies."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from importlib.metadata import PackageNotFoundError, version
+
+from fulmar_cli.diagnosis.finding import Finding
+from fulmar_cli.extras import EXTRAS
+from fulmar_core.errors import FulmarError
+from fulmar_core.paths import config_directories, config_names
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+
+OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
+
+
+def check_python(found: tuple[int, ...] = sys.version_info[:3]) -> Finding:
+    """Whether this Python is one that Fulmar is tested with."""
+    good = OLDEST_PYTHON <= found[:2] <= NEWEST_PYTHON
+    text = ".".join(map(str, found))
+    return Finding("Python", "ok" if good else "wrong", text, "" if good else "make setup PYTHON=python3.12")
+
+
+def check_extra(extra: str) -> Finding:
+    """Whether the first module of an extra can be imported."""
+    return check_module(EXTRAS[extra][0], extra)
+
+
+def check_module(module: str, extra: str) -> Finding:
+    """Whether a module can be imported, and its version.
+
+    Args:
+        module: Name of the module.
+        extra: The extra that brings it.
+    """
+    try:
+        importlib.import_module(module)
+    except ImportError as error:
+        fix = f"make setup   # in the checkout; it brings the extra '{extra}'"
+        return Finding(module, "wrong", str(error), fix)
+    try:
+        return Finding(module, "ok", version(module))
+    except PackageNotFoundError:
+        return Finding(module, "ok", "installed by the system")
+
+
+def check_configuration() -> Finding:
+    """Whether every robot and every task can be read."""
+    try:
+        for name in config_names("robots"):
+            load_robot(name)
+        for name in config_names("tasks"):
+            load_task(name)
+    except FulmarError as error:
+        return Finding("configuration", "wrong", str(error), "git status configs   # and correct that line")
+    return Finding("configuration", "ok", ", ".join(map(str, config_directories())))
+
+
+def check_policies() -> Finding:
+    """Whether every shipped policy loads and fits its robot and its task."""
+    try:
+        from fulmar_core.policy_bundle import read_passport
+        from policy_server.policy import Policy
+        from policy_server.shipped import shipped_policies
+
+        folders = shipped_policies()
+        for folder in folders:
+            passport = read_passport(folder)
+            robot, task = load_robot(passport.robot), load_task(passport.task)
+            Policy(folder, robot, task, control_hz=passport.control_hz)
+    except (FulmarError, ImportError) as error:
+        return Finding("shipped policies", "wrong", str(error), "git checkout policy_server")
+    return Finding("shipped policies", "ok", ", ".join(folder.name for folder in folders) or "none")

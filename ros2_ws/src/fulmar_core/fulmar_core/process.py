@@ -1,0 +1,71 @@
+"""Process settings: thread priority, and ending with the parent process."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+
+# Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
+# other, and a controller that spins for ever must not keep the watchdog from closing the valves.
+CONTROL_PRIORITY, PLANT_PRIORITY = 10, 20
+
+
+def take_priority(priority: int) -> bool:
+    """Put the calling thread before every ordinary one (SCHED_FIFO), where this process may.
+
+    Args:
+        priority: Among such threads, 1 to 99; the higher interrupts the lower.
+
+    Returns:
+        Whether it could; without the right to it the thread keeps its place and is late when others are busy.
+    """
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except (PermissionError, AttributeError):
+        return False
+    return True
+
+
+def take_priority_with_helpers(priority: int) -> None:
+    """The same for every other thread of this process that has none yet, but for the main one.
+
+    Messages pass through threads of the middleware. One of them that waits for the processor holds up, with the locks
+    that it holds, also who stands before every ordinary thread. The main thread only starts and ends a node.
+
+    Args:
+        priority: See `take_priority`.
+    """
+    try:
+        threads = [int(name) for name in os.listdir("/proc/self/task")]
+    except OSError:
+        return
+    for thread in threads:
+        with contextlib.suppress(OSError, AttributeError):  # it may have ended, or we may not
+            if thread != os.getpid() and os.sched_getscheduler(thread) == os.SCHED_OTHER:
+                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+
+
+def give_up_priority() -> None:
+    """Make the calling thread an ordinary one: a thread begins with the priority of whoever started it."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+_PR_SET_PDEATHSIG = 1  # prctl(2)
+
+
+def end_with(parent: int, ending: signal.Signals) -> None:
+    """Ask the kernel for a signal when the process that started us dies; Linux alone does so, others go on.
+
+    Args:
+        parent: Its id. Where that is no longer our parent, it is dead already, and the signal comes at once.
+        ending: The signal.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(ending))
+    if os.getppid() != parent:
+        os.kill(os.getpid(), ending)
