@@ -39,7 +39,7 @@ def test_what_is_smaller_than_any_combination_opens_nothing():
     assert not CHOICE.best(np.array([[0.01, -0.01, 0.01]], dtype=np.float32)).any()
 
 
-def test_no_other_combination_comes_nearer_to_what_is_asked_for_its_gas():
+def test_no_other_combination_comes_nearer_to_what_is_asked_for_its_valve_cost():
     chosen = CHOICE.best(SHARES)
 
     wanted = FULL_SHARE * SHARES
@@ -60,12 +60,12 @@ def test_cheaper_gas_comes_nearer_to_what_is_asked():
         float(
             np.mean(
                 np.sum(
-                    (wrench(WrenchChoice.of(ROBOT, gas).best(small)) - FULL_SHARE * small) ** 2,
+                    (wrench(WrenchChoice.of(ROBOT, valve_cost).best(small)) - FULL_SHARE * small) ** 2,
                     axis=-1,
                 )
             )
         )
-        for gas in (0.2, 1.0)
+        for valve_cost in (0.2, 1.0)
     ]
     assert misses[0] < 0.9 * misses[1]
 

@@ -1,4 +1,4 @@
-"""The pure heart of Fulmar: robots, dynamics, tasks, controllers, safety, wires.
+"""The pure core of Fulmar: robots, dynamics, tasks, controllers, safety, topics.
 
 Knows neither ROS, nor a simulator, nor a learning library.
 """

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whatever happens while they are written."""
+"""Atomic writes: a file is complete or absent, whatever happens while it is written."""
 
 from __future__ import annotations
 
@@ -10,13 +10,10 @@ from typing import BinaryIO
 
 
 def write_whole(contents: Mapping[Path, bytes]) -> None:
-    """Write files; those of the same names are replaced only when all of the new ones are complete.
-
-    Args:
-        contents: What goes into each; their folders are there.
+    """Write files into existing folders; files of the same names are replaced only when all new ones are complete.
 
     Raises:
-        OSError: One could not be written, with its name; nothing of it is left, and what was there stays.
+        OSError: A file could not be written, with its name; nothing of it is left, and what was there stays.
     """
     with contextlib.ExitStack() as all_of_them:
         for path, content in contents.items():
@@ -27,7 +24,7 @@ def write_whole(contents: Mapping[Path, bytes]) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """One such file, to write into until the context ends; errors as of `write_whole`."""
+    """Open one such file for writing until the context ends; errors as of `write_whole`."""
     new = path.with_name(f".{path.name}.{os.getpid()}.new")  # of each process its own, should two write it
     try:
         with _named(path), new.open("wb") as file:
@@ -40,7 +37,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk: a new name is lost with the power until then.
+    """Bring the names in a folder to the disk: until then a new name is lost with the power.
 
     Raises:
         OSError: The disk refuses.

@@ -1,4 +1,4 @@
-"""The seam between Fulmar and whatever moves: a simulator, a mock, or a robot.
+"""Backend: the seam between Fulmar and a simulator, a mock or a robot.
 
 The same node runs on any backend; only the constructor argument differs.
 """
@@ -26,7 +26,7 @@ class Sample:
     truth: RigidBodyState | None  # None: not a simulator
     things: Poses = field(default_factory=dict)  # where the task's things are, each (3,)
     stamp_ns: int | None = None  # when it was captured; None: just now, by the clock of who asked [ns]
-    applied: np.ndarray | None = None  # (n,) what the actuators were told; None: the very command
+    applied: np.ndarray | None = None  # (n,) commands of the actuators; None: the very command
 
     @property
     def measured(self) -> RigidBodyState:
@@ -42,11 +42,10 @@ class Backend(Protocol):
     robot: Robot
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Begin anew.
+        """Begin an episode.
 
         Args:
-            episode: Where to begin, in which world, and what stands about, without a batch axis; real robots begin
-                where they are, in the world that they have.
+            episode: Start, world and obstacles, without a batch axis; real robots begin where they are.
             seed: Seed of the sensor noise.
             number: Number of the episode.
 
@@ -80,7 +79,7 @@ class Backend(Protocol):
 
 @runtime_checkable
 class AirBearing(Protocol):
-    """What keeps a platform afloat: supervised apart from thrust, and never dropped by a command's absence."""
+    """Air supply that keeps a platform afloat: supervised apart from thrust, never dropped by a missing command."""
 
     @property
     def bearing_on(self) -> bool:

@@ -21,7 +21,7 @@ MOST_BYTES = 100_000  # of a key file, of a signature
 
 
 def make_keys(private: Path, public: Path) -> None:
-    """Make a new pair of keys, as PEM files.
+    """Make a new pair of ed25519 keys, as PEM files.
 
     Raises:
         ConfigError: One of the files exists.
@@ -41,11 +41,7 @@ def make_keys(private: Path, public: Path) -> None:
 
 
 def sign_bundle(folder: Path, private: Path) -> None:
-    """Sign a bundle whose hashes are right; an older signature is replaced.
-
-    Args:
-        folder: The bundle.
-        private: PEM file with an ed25519 key.
+    """Sign a bundle whose hashes are right, with an ed25519 key in PEM; replaces an older signature.
 
     Raises:
         BundleError: The bundle is damaged.
@@ -67,17 +63,17 @@ def sign_bundle(folder: Path, private: Path) -> None:
 
 
 def verify_bundle(bundle: Bundle, trusted: Path) -> str:
-    """Refuse a bundle that none of the trusted keys has signed.
+    """Reject a bundle that none of the trusted keys has signed.
 
     Args:
-        bundle: As it was read, whose hashes are in order.
+        bundle: From `read_bundle`.
         trusted: PEM file with one public key, or a folder of such files.
 
     Returns:
         Name of the file with the key that has signed it.
 
     Raises:
-        BundleError: It is not signed, or by nobody who is trusted, or was changed since.
+        BundleError: It is not signed, or by no trusted key, or was changed since.
         ConfigError: There is no readable key.
     """
     from cryptography.exceptions import InvalidSignature

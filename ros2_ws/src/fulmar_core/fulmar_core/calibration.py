@@ -1,7 +1,7 @@
-"""What was measured on one machine, in place of what the YAML of its kind says.
+"""Calibration: values measured on one robot, in place of those in the YAML of its kind.
 
-`fulmar identify` writes such a file; `--calibration FILE` of `run`, `evaluate` and `train` puts it to use. It travels
-in the environment variable FULMAR_CALIBRATION, so that every process of a run loads the same robot: the simulator, the
+`fulmar identify` writes such a file; `--calibration FILE` of `run`, `evaluate` and `train` uses it. It travels in the
+environment variable FULMAR_CALIBRATION, so that every process of a run loads the same robot: the simulator, the
 controllers that compute with its mass, and the workers of a training.
 """
 
@@ -23,11 +23,7 @@ if TYPE_CHECKING:
     from fulmar_core.robot import Robot
 
 VARIABLE = "FULMAR_CALIBRATION"
-DRAGS = (
-    ("surge", 0),
-    ("sway", 1),
-    ("yaw", 5),
-)  # axes, and where each stands among the six of `Hydrodynamics`
+DRAGS = (("surge", 0), ("sway", 1), ("yaw", 5))  # axes, with their index among the six of `Hydrodynamics`
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,6 @@ class Measured:
     high: float
 
     def __post_init__(self) -> None:
-        """Refuse intervals that do not hold their own value."""
         if not self.low <= self.value <= self.high:
             raise ValueError(f"low <= value <= high is needed, found {self.low}, {self.value}, {self.high}.")
 
@@ -102,7 +97,7 @@ def calibration_path() -> Path | None:
 
 
 def calibration_in_use() -> Calibration | None:
-    """What the file in use says.
+    """The calibration of the file in use, if there is one.
 
     Raises:
         ConfigError: It cannot be read.
@@ -112,17 +107,10 @@ def calibration_in_use() -> Calibration | None:
 
 
 def calibrated(robot: Robot, calibration: Calibration) -> Robot:
-    """A robot as it was measured; scenarios with an uncertain body draw from the measured intervals.
-
-    Args:
-        robot: The robot of the YAML.
-        calibration: What was measured.
-
-    Returns:
-        The same robot with other numbers.
+    """A robot with its measured values; scenarios with an uncertain body draw from the measured intervals.
 
     Raises:
-        ConfigError: Something was measured that this robot does not have, or that no robot can have.
+        ConfigError: A value was measured that this robot does not have, or that no robot can have.
     """
     foreign = set(calibration.measured) - set(_places(robot))
     if foreign:
@@ -137,7 +125,7 @@ def calibrated(robot: Robot, calibration: Calibration) -> Robot:
 
 
 def _places(robot: Robot) -> tuple[str, ...]:
-    """What can be said about a robot."""
+    """Names of the quantities that a calibration of this robot may have."""
     if isinstance(robot.actuators, DifferentialDrive):
         return "wheel_scale", "turn_scale", "lag", "delay"
     body = ("mass", "yaw_inertia", "center_of_mass_x", "center_of_mass_y", "delay")

@@ -2,7 +2,7 @@
 
 Knows types and files, not what a robot or a task is. The supported field types are
 bool, int, float, str, `X | None`, `Literal`, `tuple[X, ...]`, `tuple[X, Y, Z]`, `dict[str, X]`,
-nested dataclasses, unions of dataclasses told apart by a field `kind`, `Annotated[X, Named({...})]`, and `Any` for
+nested dataclasses, unions of dataclasses distinguished by a field `kind`, `Annotated[X, Named({...})]`, and `Any` for
 plain values of any shape. A member of a union whose `kind` is text stands for every dotted path of a class.
 """
 

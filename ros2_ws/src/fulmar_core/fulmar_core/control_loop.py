@@ -1,4 +1,4 @@
-"""One control step from measurement to command, for nodes, re-runs, evaluations and identification alike."""
+"""One control step from measurement to command, for nodes, re-runs, evaluation and identification."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class ControlLoop:
             stamp_ns: When it was measured, on the plant's clock [ns].
 
         Returns:
-            What the controller acts on.
+            The controller's inputs.
         """
         if stamp_ns - self.answered_ns > self._pause_ns:
             self.previous = self._safe
@@ -120,9 +120,6 @@ class ControlLoop:
     def act(self, inputs: Inputs) -> Step:
         """Ask the controller, and limit and gate its command, which is the previous one from then on.
 
-        Args:
-            inputs: Of `inputs`.
-
         Raises:
             Exception: Whatever the controller raises; the previous command is the safe one then.
         """
@@ -130,12 +127,7 @@ class ControlLoop:
         return self.take(inputs, self._controller.act(inputs))
 
     def take(self, inputs: Inputs, chosen: np.ndarray) -> Step:
-        """Limit and gate an action, chosen from these inputs.
-
-        Args:
-            inputs: Of `inputs`.
-            chosen: See `Controller.act`.
-        """
+        """Limit and gate an action (see `Controller.act`) that was chosen from these inputs."""
         action = np.asarray(chosen, dtype=float)
         refusal = command_problem(action, self._safe.shape) or ""
         command = self._safe

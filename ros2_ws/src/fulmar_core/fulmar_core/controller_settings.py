@@ -1,4 +1,4 @@
-"""What a controller node can be told."""
+"""ROS parameters of a controller node, and what follows from them."""
 
 from __future__ import annotations
 
@@ -30,26 +30,20 @@ class ControllerSettings:
     rate: float = 1.0  # simulated seconds a wall-clock second, where not in lock step
     input_timeout_s: float = 0.0  # 0: two control periods, at least 0.2 s and at most 0.5 s [s]
     wait_for_subscribers: int = 0  # of actuators/command, before the first answer in lock step
-    goals_streamed: bool = (
-        False  # a goal node sends the goal with each odometry; in lock step it is waited for
-    )
+    goals_streamed: bool = False  # a goal node sends the goal with each odometry; lock step waits for it
     fallback: str = ""  # classical controller that takes over when a policy is refused, or its commands are
     trusted_keys: str = ""  # file or folder of public keys: no bundle runs that none of them has signed
-    estop: bool = False  # nothing moves before an e-stop is heard
+    estop: bool = False  # nothing moves before an e-stop message is received
     max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
-    area: tuple[float, float, float, float] = (
-        NO_AREA  # x_min, x_max, y_min, y_max that the robot must not leave [m]
-    )
+    # x_min, x_max, y_min, y_max that the robot must not leave [m].
+    area: tuple[float, float, float, float] = NO_AREA
     overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
     odometry_may_repeat: bool = False  # to the last bit, while the robot stands: that of encoders does
-    air_bearing: bool = (
-        False  # wait for `air_bearing/state`, as for every robot whose YAML declares a bearing
-    )
+    air_bearing: bool = False  # wait for `air_bearing/state`, as with a bearing in the robot's YAML
     copies: int = 1  # of each command, within its period; in real time only
     autostart: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse values without meaning."""
         for name in ("control_hz", "rate", "input_timeout_s", "max_run_time_s"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} = {getattr(self, name)} must be a finite number, at least 0.")

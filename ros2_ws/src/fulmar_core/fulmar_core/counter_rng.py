@@ -28,16 +28,13 @@ Keys = tuple[Array, Array]  # two words for each world, shapes (n,)
 
 
 def world_keys(seed: int, numbers: Array, repeats: Array, stream: int) -> Keys:
-    """What the numbers of some worlds hang on.
+    """Keys that the numbers of some worlds follow from.
 
     Args:
         seed: Seed of the run, >= 0.
         numbers: Number of each world or episode, shape (n,), integers >= 0.
         repeats: How often each has begun anew, shape (n,), integers >= 0.
         stream: What for: START, WORLD or NOISE.
-
-    Returns:
-        Keys for `words`.
     """
     n, r = _counter(numbers), _counter(repeats)
     odd, start = _beginnings(seed, stream, array_namespace(n), n.dtype, device(n))
@@ -99,15 +96,7 @@ def uniform_from(bits: Array, dtype: Any) -> Array:
 
 
 def normal_from(bits: Array, dtype: Any) -> Array:
-    """Words as standard normal numbers, pair by pair (Box and Muller 1958).
-
-    Args:
-        bits: Shape (2k, n).
-        dtype: Floating type of the result.
-
-    Returns:
-        Shape (2k, n).
-    """
+    """Words, shape (2k, n), as standard normal numbers of a floating type, pair by pair (Box and Muller 1958)."""
     xp = array_namespace(bits)
     unit = uniform_from(bits, dtype)
     half = bits.shape[0] // 2
@@ -132,16 +121,7 @@ class Draws:
         return cls(seed, np.asarray([number]), np.asarray([repeat]), stream)
 
     def uniform(self, low: Any, high: Any, *shape: int) -> Array:
-        """Numbers between two bounds.
-
-        Args:
-            low: Lower bound; a number or something that broadcasts to the result.
-            high: Upper bound.
-            shape: Of what each world gets.
-
-        Returns:
-            Shape (worlds, *shape), float64.
-        """
+        """Numbers between two bounds, which may broadcast, shape (worlds, *shape), float64."""
         return low + (high - low) * self._unit(shape)
 
     def normal(self, std: Any, *shape: int) -> Array:

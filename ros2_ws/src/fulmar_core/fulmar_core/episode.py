@@ -33,17 +33,10 @@ class Episode:
 
 
 def episode_steps(task: Task, control_dt: float) -> int:
-    """Control steps of one episode.
-
-    Args:
-        task: Says how long an episode lasts.
-        control_dt: Time of one control step [s].
-
-    Returns:
-        Number of steps, >= 1.
+    """Control steps of one episode, >= 1.
 
     Raises:
-        ConfigError: The episode is shorter than one control step.
+        ConfigError: The episode is shorter than one control step [s].
     """
     steps = round(task.episode_s / control_dt)
     if steps < 1:
@@ -73,7 +66,7 @@ def draw_episodes(
         seed: Seed of the run, >= 0.
         numbers: Numbers of the episodes, or of the worlds they run in, shape (n,), >= 0.
         repeats: How many episodes each of these worlds has had before, shape (n,); none by default.
-        training: Start where learning starts instead of where judging does.
+        training: Start where learning starts instead of where evaluation does.
 
     Returns:
         As many episodes.

@@ -41,7 +41,6 @@ class UpcomingEpisodes:
     """The next episode of every world. What it is does not depend on when it is drawn."""
 
     def __init__(self, draw: Draw, worlds: int) -> None:
-        """Draw nothing yet."""
         self._draw = draw
         self._ready = np.zeros(worlds, dtype=bool)
         self._next: Beginning | None = None

@@ -20,7 +20,6 @@ class UnknownNameError(ConfigError):
     """A name that is not in a closed set, reported with the nearest known one."""
 
     def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
-        """Say what kind of name was not found, and what exists."""
         known = sorted(known)
         super().__init__(f"unknown {what} '{name}'.{did_you_mean(name, known)}")
         self.name = name
@@ -56,11 +55,7 @@ class BagError(FulmarError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Hint for an unknown name: the nearest one if there is one, else all of them.
-
-    Args:
-        name: What was written.
-        known: What would have been allowed.
+    """Hint for an unknown name: the nearest known one, else all of them.
 
     Returns:
         A sentence that begins with a space, ready to be appended to a message.

@@ -1,4 +1,4 @@
-"""What every figure of an evaluation means: the one place where it is written down."""
+"""Figures of an evaluation: title, unit and meaning of each, in the one place where they are defined."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ FIGURES = {
     "goals_bound": Figure(
         "goals bound",
         "",
-        "The most waypoints that physics allows in this very episode, by the bound that fits the robot, which is told "
-        "beside it.",
+        "The most waypoints that physics allows in this very episode, by the bound that fits the robot, which is "
+        "named beside it.",
     ),
     "share_of_bound": Figure(
         "share of the bound",
         "-",
-        "Goals reached over the bound of the same episode; required shares are judged on its mean.",
+        "Goals reached over the bound of the same episode; requirements apply to its mean.",
         "more",
     ),
     "goals_at_top_speed": Figure(

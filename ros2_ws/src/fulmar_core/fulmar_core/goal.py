@@ -1,4 +1,4 @@
-"""What an episode is about: targets in their order, obstacles, and things of the task's own."""
+"""Goal of an episode: targets in their order, obstacles, and things of the task."""
 
 from __future__ import annotations
 
@@ -60,14 +60,7 @@ class Goal:
         return self.ahead(0)
 
     def ahead(self, further: int) -> Array:
-        """Target that comes after some others.
-
-        Args:
-            further: 0 for the current one.
-
-        Returns:
-            Shape (..., 3).
-        """
+        """The target that comes `further` after the current one (0), shape (..., 3)."""
         count = self.targets.shape[-2]
         if count == 1:
             return self.targets[..., 0, :]

@@ -1,4 +1,4 @@
-"""Goals written down: `configs/goals/<name>.yaml`, told apart by `kind`."""
+"""Goal files: `configs/goals/<name>.yaml`, distinguished by `kind`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,6 @@ class Positions:
     positions: tuple[tuple[float, float], ...]  # x, y in the world [m, m]
 
     def __post_init__(self) -> None:
-        """Refuse an empty list."""
         if not self.positions:
             raise ValueError("'positions' must have at least one entry.")
 
@@ -43,7 +42,6 @@ class Poses:
     poses: tuple[tuple[float, float, float], ...]  # x, y, heading in the world [m, m, deg]
 
     def __post_init__(self) -> None:
-        """Refuse an empty list."""
         if not self.poses:
             raise ValueError("'poses' must have at least one entry.")
 
@@ -60,7 +58,6 @@ class HeldVelocity:
     hold_s: float  # [s]
 
     def __post_init__(self) -> None:
-        """Refuse no time."""
         if self.hold_s <= 0.0:
             raise ValueError("'hold_s' must be greater than 0.")
 
@@ -74,7 +71,6 @@ class Velocities:
     velocities: tuple[HeldVelocity, ...]
 
     def __post_init__(self) -> None:
-        """Refuse an empty list."""
         if not self.velocities:
             raise ValueError("'velocities' must have at least one entry.")
 
@@ -103,7 +99,6 @@ class FollowedPath:
     lead_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what leads nowhere."""
         if min(self.speed, self.look_ahead, self.turn_gain, self.max_yaw_rate_deg) <= 0.0:
             raise ValueError("speed, look_ahead, turn_gain and max_yaw_rate_deg must be greater than 0.")
         if self.loops < 0:
@@ -120,11 +115,7 @@ GoalFile = Positions | Poses | Velocities | FollowedPath
 
 
 def single_goal(place: tuple[float, ...]) -> Positions | Poses:
-    """One place as a goal file would hold it.
-
-    Args:
-        place: x [m], y [m] and, for a pose, heading [deg].
-    """
+    """One place x [m], y [m] and, for a pose, heading [deg], as a goal file would hold it."""
     x, y, *heading = place
     if not heading:
         return Positions("positions", f"position x = {x:g} m, y = {y:g} m", ((x, y),))
@@ -133,13 +124,7 @@ def single_goal(place: tuple[float, ...]) -> Positions | Poses:
 
 
 def load_goals(name: str) -> GoalFile:
-    """Read `configs/goals/<name>.yaml`, or a file anywhere.
-
-    Args:
-        name: Name of a file there, or a path that ends in `.yaml`.
-
-    Returns:
-        The goals.
+    """Read `configs/goals/<name>.yaml`, or a file anywhere whose path ends in `.yaml`.
 
     Raises:
         ConfigError: Unknown name, or a mistake in the file.

@@ -1,4 +1,4 @@
-"""What of a goal file is to be told when: from where a robot is and the time, the goal that now counts."""
+"""Goal sequence: which goal of a goal file counts now, from the robot's state and the time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STANDSTILL = goal_at((0.0, 0.0, 0.0))  # as a velocity
 
 
 class GoalSequence(Protocol):
-    """Goals that follow each other; told the state again and again until it is done."""
+    """Goals that follow each other; `step` is called with each state until it is done."""
 
     topic: str  # where the goals belong, one of `topics.GOAL_WIRES`
 
@@ -36,7 +36,7 @@ class GoalSequence(Protocol):
         """How far it has come, for people."""
 
     def step(self, state: PlanarState, time_s: float) -> Goal:
-        """Take note of a state.
+        """Take a state.
 
         Args:
             state: Measured, without a batch axis.
@@ -81,10 +81,10 @@ class Waypoints:
     def step(self, state: PlanarState, time_s: float) -> Goal:
         """The first target that is not reached, or all; see `GoalSequence.step`."""
         if not self.done:
-            self._judge(state, time_s)
+            self._check(state, time_s)
         return self._goals[min(self._reached, len(self._goals) - 1)]
 
-    def _judge(self, state: PlanarState, time_s: float) -> None:
+    def _check(self, state: PlanarState, time_s: float) -> None:
         errors = pose_errors(state, self._targets[self._reached], heading=True)
         inside = float(errors.position) <= self._tolerance.position
         if self._tolerance.heading_deg:
@@ -136,12 +136,7 @@ class Following:
     topic = "goal_velocity"
 
     def __init__(self, file: FollowedPath, *, sideways: bool) -> None:
-        """Follow.
-
-        Args:
-            file: Path, speed and gains.
-            sideways: Whether the robot moves to any side without turning; others turn towards their aim.
-        """
+        """Follow a path; `sideways`: the robot moves to any side without turning, others turn towards their aim."""
         self._file, self._sideways = file, sideways
         self._planner: LookAhead = file.planner()
         self._on_path: Progress | None = None
@@ -185,14 +180,12 @@ def _goal(*targets: np.ndarray) -> Goal:
 
 
 def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> GoalSequence:
-    """Everything that a goal file asks of a robot.
-
-    Tolerances are those of the tasks that take such goals.
+    """Goal sequence of a goal file for a robot, with the tolerances of the tasks that take such goals.
 
     Args:
-        goals: What to do.
-        robot: Who is to do it.
-        as_path: Tell all positions or poses at once, for tasks that pass through them.
+        goals: The goal file.
+        robot: The robot.
+        as_path: Give all positions or poses at once, for tasks that pass through them.
 
     Raises:
         ConfigError: `as_path` with velocities, or with a path that is followed by velocities.
@@ -207,7 +200,7 @@ def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> Go
         return Waypoints(topic, goals.targets(), tolerance, hold_s=HOLD_S, at_once=False)
     if as_path:
         raise ConfigError(
-            f"'{goals.title}' tells velocities one after the other; only positions and poses can be told as a path."
+            f"'{goals.title}' is a sequence of velocities; only positions and poses can be a path."
         )
     if isinstance(goals, Velocities):
         return Schedule(goals.targets(), goals.ends())

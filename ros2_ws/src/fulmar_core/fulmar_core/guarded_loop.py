@@ -1,4 +1,4 @@
-"""The control loop of one robot behind its guards, which decide from what is received whether it acts."""
+"""Guarded control loop of one robot: safety checks decide from what it receives whether its controller acts."""
 
 from __future__ import annotations
 
@@ -73,16 +73,16 @@ class GuardedLoop:
         gate: InputGate | None = None,
         applied: AppliedHistory | None = None,
     ) -> None:
-        """Know nothing yet.
+        """Begin without a goal.
 
         Args:
             robot: The robot.
-            task: What it does.
-            settings: Limits and wires.
+            task: The task.
+            settings: Limits and topics.
             switch: Has the controller.
             estop: Is asked before every step.
             gate: Of the measurements; that of the settings by default.
-            applied: What the actuators did, as far as that is known.
+            applied: Commands that the actuators applied, as far as known.
         """
         self._lock = threading.Lock()
         self.switch = switch
@@ -100,9 +100,8 @@ class GuardedLoop:
         self._bearing: bool | None = None if settings.has_bearing(robot) else True  # None: not received yet
         self._gate = gate or settings.input_gate(robot)
         self._newest_epoch = self._acted_epoch = 0  # of the newest measurement, and of the last control step
-        self._anew = (
-            False  # another goal came; the controller, which may be acting now, forgets at the next step
-        )
+        # Another goal came; the controller, which may be acting now, forgets at the next step.
+        self._anew = False
 
     @property
     def flags(self) -> Flags:
@@ -149,7 +148,7 @@ class GuardedLoop:
             self._change(bearing_off=not on)
 
     def take_goal(self, goal: Goal, stamp_ns: int, now_ns: int) -> str:
-        """Take a goal; none outside the robot's area, and none while a heard e-stop holds."""
+        """Take a goal; none outside the robot's area, and none while a received e-stop holds."""
         with self._lock:
             beyond = self._beyond(goal)
             if beyond:
@@ -189,11 +188,7 @@ class GuardedLoop:
             self._follow_mission()
 
     def take(self, measurement: Measurement, now_ns: int) -> bool:
-        """Take odometry.
-
-        Returns:
-            Whether it is usable; if not, `decide` says why.
-        """
+        """Take odometry; returns whether it is usable. If not, `decide` says why."""
         with self._lock:
             problem = self._gate.problem(measurement) or ""
             if problem:
@@ -208,7 +203,7 @@ class GuardedLoop:
         return True
 
     def switch_controller(self) -> bool:
-        """Let a controller that was proposed take over, between two control steps; whether one has."""
+        """Let a proposed controller take over, between two control steps; whether one has."""
         if not self.switch.apply():
             return False
         self.loop.use(self.switch.current.controller)
@@ -241,10 +236,7 @@ class GuardedLoop:
         return step
 
     def note(self, refusal: str) -> bool:
-        """Count refused actions: several in a row are the fallback's turn, or latch a fault.
-
-        Args:
-            refusal: Of the step; empty if its action was not refused.
+        """Count refused actions (empty: not refused): several in a row switch to the fallback, or latch a fault.
 
         Returns:
             Whether the fallback acts from now on.

@@ -1,4 +1,4 @@
-"""Whether a pose can be held: a linear programme over the share of time that each valve is open.
+"""Holdability: whether a pose can be held, by a linear programme over the share of time that each valve is open.
 
 Over many control steps, valves that open and close give any mean wrench that shares of time can make: shares d_i >= 0,
 with a common pressure line Σ d_i <= 1, since n open valves give 1/n each. A pose can be held where the mean wrench
@@ -95,14 +95,9 @@ def can_hold(
 
 @functools.lru_cache(maxsize=16)
 def uncontrollable_losses(robot: Robot, count: int) -> tuple[tuple[int, ...], ...]:
-    """Thrusters that leave no pose to hold when they are lost together, in a world that does not push.
+    """Numbers, from 0, of thrusters that leave no pose to hold when `count` of them are lost together, without a push.
 
-    Args:
-        robot: Any robot; one without thrusters has none.
-        count: How many are lost.
-
-    Returns:
-        Their numbers, from 0.
+    A robot without thrusters has none.
     """
     if not isinstance(robot.actuators, Thrusters):
         return ()

@@ -38,7 +38,6 @@ class Schedule(Generic[T]):
     """Things that begin one after another; a new one takes the place of all that would begin with it or later."""
 
     def __init__(self) -> None:
-        """Begin empty."""
         self._entries: list[tuple[int, T]] = []  # when each begins [ns], in order; what is over is forgotten
         self._arrived: list[tuple[int, T]] = []  # stamps; when they begin is known once the plant's clock is
 

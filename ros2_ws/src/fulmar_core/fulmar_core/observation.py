@@ -21,7 +21,6 @@ class Observer:
     """
 
     def __init__(self, robot: Robot, task: Task) -> None:
-        """Combine a robot and a task."""
         self._task = task
         self._remembers = robot.actuators.response.remembers
         self._scale = robot.actuators.scale

@@ -37,7 +37,6 @@ class FollowPath(TrackVelocities):
         return dataclasses.replace(self, lead_s=0.0)
 
     def __post_init__(self) -> None:
-        """Refuse paths that end."""
         if not self.path.closed or self.path.loops:
             raise ValueError("a path to be judged on must be closed and have no last round (loops: 0).")
 

@@ -20,7 +20,6 @@ class Recording:
     split_s: float = 3600.0  # so is one that was begun so long ago; 0: never [s]
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be kept."""
         if self.mode not in MODES:
             raise ValueError(f"mode = '{self.mode}' must be one of {', '.join(MODES)}.")
         if not 0.0 < self.before_fault_s < float("inf"):

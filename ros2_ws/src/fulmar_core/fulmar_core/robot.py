@@ -40,7 +40,6 @@ class Body:
     center_of_mass: tuple[float, float] = (0.0, 0.0)  # ahead of the body's origin and to its left [m]
 
     def __post_init__(self) -> None:
-        """Refuse bodies that cannot exist."""
         if min(self.mass, self.radius, self.height, *self.inertia) <= 0.0:
             raise ValueError("mass, inertia, radius and height must be greater than 0.")
         if self.center_of_mass[0] ** 2 + self.center_of_mass[1] ** 2 > self.radius**2:
@@ -61,7 +60,6 @@ class Uncertainty:
     drag: Range = (1.0, 1.0)  # factor on the damping of the water [-]
 
     def __post_init__(self) -> None:
-        """Refuse spans that are empty or not positive."""
         for name in ("mass", "yaw_inertia", "drag"):
             low, high = getattr(self, name)
             if not 0.0 < low <= high:
@@ -84,7 +82,6 @@ class Performance:
     turning_acceleration: float  # speed times turn rate that it can sustain [m/s²]
 
     def __post_init__(self) -> None:
-        """Refuse machines that cannot move."""
         needed = (
             self.force,
             self.torque,
@@ -117,7 +114,6 @@ class Timing:
     control_hz: float  # default command rate [Hz]
 
     def __post_init__(self) -> None:
-        """Refuse rates that do not divide evenly."""
         if self.physics_dt <= 0.0 or self.control_hz <= 0.0:
             raise ValueError("physics_dt and control_hz must be greater than 0.")
         self.substeps(self.control_hz)
@@ -170,7 +166,6 @@ class Limits:
     yaw_rate: float  # largest believable turn rate [rad/s]
 
     def __post_init__(self) -> None:
-        """Refuse limits that nothing could keep."""
         if min(self.geofence, self.speed, self.yaw_rate) <= 0.0:
             raise ValueError("geofence, speed and yaw_rate must be greater than 0.")
 
@@ -193,7 +188,6 @@ class Robot:
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
 
     def __post_init__(self) -> None:
-        """Refuse wheels that swim or stand outside of the body."""
         if isinstance(self.actuators, Rolling) and self.actuators.track > 2.0 * self.body.radius:
             raise ValueError(
                 f"'track' = {self.actuators.track:g} m puts the wheels outside of the outline, whose 'radius' is "

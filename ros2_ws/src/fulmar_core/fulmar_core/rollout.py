@@ -188,7 +188,6 @@ class _Backends:
     """Simulators that are stepped side by side."""
 
     def __init__(self, backends: list[Backend], samples: list[Sample], substeps: int) -> None:
-        """Begin with the samples of their resets."""
         self._backends, self._substeps = backends, substeps
         self._take(samples)
 

@@ -69,7 +69,6 @@ class Keyboard:
     }
 
     def __init__(self) -> None:
-        """Begin with no key down."""
         self._held: dict[str, tuple[float, int]] = {}
 
     def press(self, key: str, now_ns: int) -> bool:
@@ -108,7 +107,6 @@ class Gamepad:
     """The newest state of a gamepad."""
 
     def __init__(self, layout: JoyLayout) -> None:
-        """Begin with nothing pressed."""
         self._layout = layout
         self._wish: Wish | None = None
         self._until_ns = 0

@@ -24,7 +24,6 @@ class Thing:
     body: Block | None = None  # what the robot pushes to the goal; None: the robot touches nothing there
 
     def __post_init__(self) -> None:
-        """Refuse names that no topic can have, and those of other wires."""
         if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise ValueError(f"'{self.name}' is no name of a thing: use lower-case letters, digits and '_'.")
         if any(wire.name == self.wire.name and wire != self.wire for wire in WIRES):

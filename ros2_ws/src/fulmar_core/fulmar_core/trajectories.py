@@ -131,7 +131,6 @@ class TargetCounter:
     """Counts targets by the task's own tolerance, whatever the controller takes for reached."""
 
     def __init__(self, task: Task, goal: Goal, control_dt: float) -> None:
-        """Begin an episode, or a batch of them."""
         self._task, self._dt, self._steps = task.evaluated, control_dt, 0
         self.goal = goal
 

@@ -24,7 +24,6 @@ class YamlError(Exception):
     """A text is no YAML, or none that is read here."""
 
     def __init__(self, what: str, line: int) -> None:
-        """What is amiss, in words; and in which line, counted from 1."""
         super().__init__(what)
         self.line = line
 

@@ -34,7 +34,6 @@ class Ackermann:
     response: Response = Response()
 
     def __post_init__(self) -> None:
-        """Refuse cars that cannot exist."""
         positive = (
             self.wheel_radius, self.track, self.wheelbase, self.max_speed,
             self.max_steering, self.wheel_force, self.friction,

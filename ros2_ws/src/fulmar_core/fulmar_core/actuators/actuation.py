@@ -63,7 +63,7 @@ class ActuationState(MutableState):
             setattr(self, name, values)
 
     def hold(self, command: Array) -> None:
-        """Have every actuator do what it is told, as if it had been so for long.
+        """Let every actuator apply a command, as if it had been held for long.
 
         Args:
             command: Within the actuators' limits, shape (n, worlds).

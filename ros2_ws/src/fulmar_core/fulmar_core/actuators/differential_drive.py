@@ -29,7 +29,6 @@ class DifferentialDrive:
     response: Response = Response()
 
     def __post_init__(self) -> None:
-        """Refuse drives that cannot exist."""
         positive = (
             self.wheel_radius, self.track, self.max_speed, self.max_yaw_rate,
             self.max_wheel_speed, self.wheel_force, self.friction,

@@ -35,7 +35,6 @@ class Propellers:
     response: Response = Response()
 
     def __post_init__(self) -> None:
-        """Refuse propellers of one name, and curves that say nothing."""
         if not self.propellers or len(set(self.names)) != len(self.propellers):
             raise ValueError("'propellers' must not be empty, and each needs a name of its own.")
         if len(self.curve) < 2 or list(self.curve) != sorted(self.curve):
@@ -44,7 +43,7 @@ class Propellers:
             raise ValueError(f"'slew' needs {len(self.propellers)} values, one for each propeller.")
         self.response.refuse_lag_beside_slew()
         if self.thrust(self.safe_command).any():
-            raise ValueError("'curve' must be 0 in its middle: a propeller that is told 0 stands still.")
+            raise ValueError("'curve' must be 0 in its middle: a command of 0 stops a propeller.")
 
     binary = False
 

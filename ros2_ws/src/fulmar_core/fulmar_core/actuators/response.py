@@ -1,4 +1,4 @@
-"""How fast actuators follow: the same three numbers for every family."""
+"""How fast actuators follow their commands, the same numbers for every family."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ class Response:
     slew: tuple[float, ...] = ()  # fastest change of each actuator, in its command's unit [per s]
     lag_s: float = 0.0  # time constant of a first-order lag [s]
     opening_delay_s: float = 0.0  # by which closed valves open later than others close [s]
-    gain: tuple[float, ...] = ()  # what each actuator really does of what it is told; empty: all of it [-]
+    gain: tuple[float, ...] = ()  # applied over commanded, of each actuator; empty: 1 [-]
 
     def __post_init__(self) -> None:
-        """Refuse times and rates without meaning."""
         if min(self.delay_s, self.lag_s, self.opening_delay_s) < 0.0:
             raise ValueError("delay_s, lag_s and opening_delay_s must not be negative.")
         if any(rate <= 0.0 for rate in (*self.slew, *self.gain)):
             raise ValueError("every slew and every gain must be greater than 0.")
 
     def refuse_lag_beside_slew(self) -> None:
-        """Of actuators that follow either way, not both; the servos of wheels have both.
+        """Reject a lag beside a slew; only the servos of wheels have both.
 
         Raises:
             ValueError: Both are given.

@@ -26,7 +26,6 @@ class Nozzle:
     direction: Vector3  # of the force on the body, any length > 0 [-]
 
     def __post_init__(self) -> None:
-        """Refuse a nozzle that points nowhere."""
         if np.linalg.norm(self.direction) < 1e-6:
             raise ValueError(f"nozzle '{self.name}': 'direction' must not be zero.")
 
@@ -48,7 +47,6 @@ class Thrusters:
     response: Response = Response()
 
     def __post_init__(self) -> None:
-        """Refuse banks without thrust or with two valves of one name."""
         if self.thrust <= 0.0:
             raise ValueError("'thrust' must be greater than 0.")
         if not self.nozzles or len(set(self.names)) != len(self.nozzles):

@@ -1,4 +1,4 @@
-"""From the motion that each wire causes to the nozzle, wheel or propeller behind it."""
+"""Match of each wire's pulse response to the nozzle, wheel or propeller behind it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WEAK_SHARE = 0.35
 WORST_MISMATCH = 0.75
 # Of the turn that the other side gives: sides are alike, and a base that still settles turns by a few hundredths of it
 LEAST_OF_OTHER = 0.1
-SAME = 1e-3  # nozzles whose forces and torques differ by less cannot be told apart
+SAME = 1e-3  # nozzles whose forces and torques differ by less cannot be distinguished
 ROUNDS = 3  # of matching and scaling the torque, since yaw inertias are known badly
 
 
@@ -104,9 +104,7 @@ def match_sides(found: Sequence[Response]) -> Match:
     """Find the side of a base or boat that each channel drives, and whether forwards.
 
     A left side that drives ahead turns the robot to the right, a right one to the left; backwards it is the reverse.
-
-    Args:
-        found: Change by each channel's pulse, of a positive value.
+    `found` has the change by each channel's pulse of a positive value.
 
     Returns:
         0 for left and 1 for right, with signs.

@@ -26,12 +26,11 @@ class BodyState:
     goal: Vector  # way to the current target; zeros where velocities are the goal
     turn: np.ndarray  # wanted heading minus heading, 0 where a task has none [rad]
     motion: Twist
-    push: (
-        np.ndarray
-    )  # force and torque from outside, zeros where nothing is estimated, shape (n, 3) [N, N, N·m]
+    # Force and torque from outside, zeros where nothing is estimated, shape (n, 3) [N, N, N·m].
+    push: np.ndarray
     alive: (
         np.ndarray | None
-    )  # 1, or 0 for a valve that should stay closed, shape (n, m); None without an estimate
+    )  # 0 for a valve that should stay closed, else 1, shape (n, m); None: not estimated
 
 
 class BodyFrame:
@@ -45,7 +44,6 @@ class BodyFrame:
     """
 
     def __init__(self, robot: Robot, task: Task) -> None:
-        """Look at what the task asks for."""
         self.tracks, self.passes = task.goal_topic == "goal_velocity", task.goal_topic == "goal_path"
         self.heads = task.goal_topic == "goal_pose" or bool(getattr(task, "heads", False))
         self._around = task if isinstance(task, GoToPositionWithObstacles) else None

@@ -66,12 +66,7 @@ def entry_of(robot: Robot, law: str | None) -> Entry:
 
 
 def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
-    """Refuse a robot and a task that no law here is for.
-
-    Args:
-        robot: The robot.
-        task: The task.
-        law: Name of the only law that is meant; any by default.
+    """Reject a robot and a task that no classical law, or not the named one, is for.
 
     Raises:
         ConfigError: With what would be allowed.
@@ -110,10 +105,7 @@ def load_classical(
         robot: The robot.
         task: The task.
         control_hz: Command rate; the robot's own by default [Hz].
-        law: Name of the only law that is meant; by default the one of the robot's family, called "classical".
-
-    Returns:
-        The controller.
+        law: Name of the law; by default the one of the robot's family, called "classical".
 
     Raises:
         ConfigError: No law for the pair, no gains for this robot, a mistake in them, or a rate that the physics
@@ -134,9 +126,6 @@ def gains_of(robot: Robot, law: str | None = None) -> Any:
     Args:
         robot: The robot.
         law: Name of the law; any other name and None mean the one of the robot's family.
-
-    Returns:
-        The law's dataclass of gains.
 
     Raises:
         ConfigError: A mistake in the file, no file where the law has no default gains, or a robot whose actuators
@@ -159,7 +148,7 @@ def gains_path(robot: Robot, law: str | None = None) -> Path | None:
 
 
 def default_gains_note(robot: Robot, law: str | None = None) -> str:
-    """What to say of a robot that drives with default gains; empty where it has a file; rest as of `gains_of`."""
+    """Note on a robot that drives with default gains; empty where it has a file; rest as of `gains_of`."""
     if gains_path(robot, law) is not None:
         return ""
     name = entry_of(robot, law).law.law

@@ -1,4 +1,4 @@
-"""What a controller is: a function from the inputs of one control step to an actuator command."""
+"""The interface of controllers: a function from the inputs of one control step to an actuator command."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ class Inputs:
 
     state: PlanarState  # as measured, shapes (n,)
     goal: Goal  # with every target; `goal.current` (n, 3) is the one that counts now
-    observation: (
-        np.ndarray
-    )  # the task's terms and the robot's own, in the order of `Observer.names`, shape (n, k)
+    observation: np.ndarray  # terms of the task and the robot, in the order of `Observer.names`, shape (n, k)
     previous: np.ndarray  # command of the step before, after every limit, shape (n, m)
     estimates: ActuatorEstimate | None  # of an estimator that the controller asks for; None without one
     stamp_ns: int  # when the state was measured, on the plant's clock [ns]

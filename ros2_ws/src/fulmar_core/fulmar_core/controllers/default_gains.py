@@ -39,14 +39,11 @@ DIRECTIONS = np.stack([(np.cos(angle), np.sin(angle)) for angle in np.radians(np
 
 
 def lqr_weights(robot: Robot) -> LqrWeights:
-    """Weights of the LQR by Bryson's rule.
+    """Weights of the LQR by Bryson's rule, for a planar robot with thrusters.
 
     The largest force and torque are what the valves bring up in their weakest direction. The largest velocity is the
     largest error divided by the time in which full thrust crosses it, and that time spans a few control steps at least:
     on/off valves cannot act within one.
-
-    Args:
-        robot: A planar robot with thrusters that push and turn in every direction.
 
     Raises:
         ValueError: Its valves do not push in every direction, or do not turn it both ways.
@@ -114,11 +111,7 @@ def _suspicion(robot: Robot, thrusters: Thrusters) -> HealthSettings:
 
 
 def polar_gains(robot: Robot) -> PolarGains:
-    """Gains of the polar law: turning is as fast as wheels and body follow, driving a third of that.
-
-    Args:
-        robot: A robot with a differential drive.
-    """
+    """Gains of the polar law: turning is as fast as wheels and body follow, driving a third of that."""
     drive = robot.actuators
     assert isinstance(drive, DifferentialDrive)
     slew = drive.response.slew or (math.inf, math.inf)
@@ -140,11 +133,7 @@ def polar_gains(robot: Robot) -> PolarGains:
 
 
 def line_of_sight_gains(robot: Robot) -> LineOfSightGains:
-    """Gains of the line of sight: the heading is as fast as propellers and hull follow, the rest in proportion.
-
-    Args:
-        robot: A boat with propellers side by side.
-    """
+    """Gains of the line of sight: the heading is as fast as propellers and hull follow, the rest in proportion."""
     propellers, water = robot.actuators, robot.hydrodynamics
     assert isinstance(propellers, Propellers)
     arms, (astern, ahead) = propellers.lever_arms, (-propellers.curve[0], propellers.curve[-1])
@@ -192,11 +181,7 @@ def _terminal(robot: Robot, axis: int, effort: float) -> float:
 
 
 def pure_pursuit_gains(robot: Robot) -> PurePursuitGains:
-    """Gains of pure pursuit: look as far ahead as the tightest circle is wide, brake as hard as the wheels do.
-
-    Args:
-        robot: A car.
-    """
+    """Gains of pure pursuit: look as far ahead as the tightest circle is wide, brake as hard as the wheels do."""
     car = robot.actuators
     assert isinstance(car, Ackermann)
     slew = car.response.slew[:1] or (math.inf,)

@@ -28,15 +28,7 @@ def disturbance_terms(robot: Robot) -> tuple[str, ...]:
 
 
 def with_disturbances(observer: Observer, inputs: Inputs) -> np.ndarray:
-    """Observation of the estimated motion, which is less noisy than the measured one, with `disturbance_terms`.
-
-    Args:
-        observer: Of the network's robot and task.
-        inputs: With estimates.
-
-    Returns:
-        Shape (n, k).
-    """
+    """Observation of the estimated motion, less noisy than the measured one, with `disturbance_terms`, shape (n, k)."""
     estimate = inputs.estimates
     assert isinstance(estimate, ActuatorEstimate)
     observation = observer(estimate.state, inputs.goal, inputs.previous)

@@ -1,7 +1,7 @@
-"""Commands that make a robot tell what it is: random, and yet it stays where it is allowed to be.
+"""Excitation for identification: random commands that keep the robot in its room.
 
 A run that identifies a model needs every actuator at work, in changing company and for changing times; a controller
-that reaches its goal and stops tells little. Random commands alone let a body without friction drift away. Here several
+that reaches its goal and stops shows little. Random commands alone let a body without friction drift away. So several
 random commands are drawn each time, the core predicts where each would lead, and the one that leads back best is taken:
 few candidates near the goal, which leaves most of the randomness, more of them farther out.
 """
@@ -34,9 +34,7 @@ class Excitation:
     near: int = 3  # candidates around the goal
     far: int = 24  # candidates at the end of the room and beyond
     room: float = 0.25  # radius to stay in, of the geofence's [-]
-    calm: float = (
-        1.0  # how much turning counts against a candidate; water and wheels end it by themselves [-]
-    )
+    calm: float = 1.0  # weight of turning against a candidate; water and wheels end it by themselves [-]
 
 
 # A platform's valves in the rhythm of its commands; propellers and wheels long enough to come up to speed, and to stop.

@@ -79,13 +79,13 @@ def stopping_speed(
 
 
 def passing_speed(goal: Vector, leg: Vector, *, cruise: np.ndarray | float, corner: float) -> np.ndarray:
-    """Speed at which to pass a waypoint, with respect to the corner that the course has there.
+    """Speed at which to pass a waypoint, given the corner of the path there.
 
     Args:
         goal: Way to the waypoint, shapes (...,) [m].
         leg: Way from it to the next one, same shapes [m].
-        cruise: Where the course goes straight on [m/s].
-        corner: Share of it where the course turns by a quarter or more [-].
+        cruise: Where the path goes straight on [m/s].
+        corner: Share of it where the path turns by a quarter or more [-].
 
     Returns:
         Shape (...,) [m/s].
@@ -99,21 +99,24 @@ def straightness(goal: Vector, leg: Vector) -> np.ndarray:
     return np.asarray((goal[0] * leg[0] + goal[1] * leg[1]) / np.maximum(product, 1e-9))
 
 
-CREEP = 0.15  # least distance that is told, so that a robot that stands at an obstacle can still leave [m]
+CREEP = 0.15  # least distance returned: a robot that stands at an obstacle can leave [m]
 
 
-def room_ahead(discs: tuple[np.ndarray, np.ndarray, np.ndarray], course: np.ndarray) -> np.ndarray:
-    """How far it is along the course to the first disc.
+def room_ahead(discs: tuple[np.ndarray, np.ndarray, np.ndarray], direction: np.ndarray) -> np.ndarray:
+    """Distance to the first disc in a direction.
+
+    Speed is limited so that the robot can stop before it (the admissible velocities of Fox, Burgard and Thrun, "The
+    dynamic window approach to collision avoidance", IEEE RAM 4(1), 1997).
 
     Args:
         discs: Centres in the body's frame and widths, three arrays of shape (..., k) [m].
-        course: Direction of travel in the body's frame, shape (...,) [rad].
+        direction: Of travel in the body's frame, shape (...,) [rad].
 
     Returns:
         Shape (...,), infinite where nothing is in the way [m].
     """
     x, y, wide = discs
-    c, s = np.cos(course)[..., None], np.sin(course)[..., None]
+    c, s = np.cos(direction)[..., None], np.sin(direction)[..., None]
     along, beside = c * x + s * y, c * y - s * x
     to_edge = along - np.sqrt(np.maximum(wide * wide - beside * beside, 0.0))
     ahead = (np.abs(beside) < wide) & (along > 0.0)

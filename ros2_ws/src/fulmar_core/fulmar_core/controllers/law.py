@@ -1,4 +1,4 @@
-"""What every classical law is made of: gains, inputs in the body's frame, and a name for itself."""
+"""Base class of the classical laws: gains, inputs in the body's frame, and an identity."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ class Law(ABC):
         passed = 0.7 * getattr(self.task, "reach", 0.0) if self.frame.passes else 0.0
         return max(float(self.gains.near), passed)
 
-    def room(self, inputs: Inputs, course: np.ndarray) -> np.ndarray:
+    def room(self, inputs: Inputs, direction: np.ndarray) -> np.ndarray:
         """What is free in the direction of travel, infinite where nothing stands about; see `room_ahead`."""
         if not self.frame.crosses_obstacles:
-            return np.full_like(course, np.inf)
-        return room_ahead(self.frame.obstacles(inputs), course)
+            return np.full_like(direction, np.inf)
+        return room_ahead(self.frame.obstacles(inputs), direction)
 
     def last_speed(self, goal: Vector, inputs: Inputs, *, cruise: np.ndarray | float) -> np.ndarray:
         """Speed at the current target, shape (...,) [m/s]: that of passing it, or none where the robot shall stay.
@@ -87,7 +87,7 @@ class Law(ABC):
         Args:
             goal: Way to the target, shapes (...,) [m].
             inputs: Hold where the next one is.
-            cruise: Speed where the course goes straight on [m/s].
+            cruise: Speed where the direction goes straight on [m/s].
         """
         if not self.frame.passes:
             return np.zeros_like(goal[0])
@@ -100,7 +100,7 @@ class Law(ABC):
 
     def metadata(self) -> dict[str, Any]:
         """Robot, task, rate and gains, with the SHA-256 of everything that the commands depend on."""
-        told = {
+        identity = {
             "controller": self.name,
             "law": self.law,
             "robot": self.robot.name,
@@ -108,8 +108,8 @@ class Law(ABC):
             "control_hz": self.control_hz,
             "gains": asdict(self.gains),
         }
-        text = json.dumps(told | self.derived(), sort_keys=True)
-        return told | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
+        text = json.dumps(identity | self.derived(), sort_keys=True)
+        return identity | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
 
     def derived(self) -> dict[str, Any]:
         """What else the commands depend on, as JSON-ready values."""

@@ -42,13 +42,12 @@ class LineOfSightGains:
     yaw: float  # angular acceleration for an error of the turn rate [1/s]
     slowing: float  # speed falls with this power of the cosine of the bearing [-]
     sideslip: float  # share of the sideslip angle that the heading makes up for [-]
-    corner: float  # share of the cruising speed at a waypoint where the course turns by a quarter or more [-]
+    corner: float  # share of the cruising speed at a waypoint where the path turns by a quarter or more [-]
     near: float  # what counts as there [m]
     least_thrust: float  # less is not worth a propeller's way through its dead band [N]
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
-        """Refuse gains that do not lead to the goal."""
         positive = (
             self.cruise, self.approach, self.braking, self.surge, self.heading, self.turn_rate, self.yaw,
             self.slowing, self.near, self.least_thrust, self.speed_around,
@@ -75,7 +74,6 @@ class LineOfSight(Law):
         control_hz: float | None = None,
         name: str | None = None,
     ) -> None:
-        """Prepare the allocation; arguments as of `Law`."""
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         assert isinstance(robot.actuators, Propellers)
         self._allocation = PropellerAllocation(robot.actuators, least=gains.least_thrust)

@@ -1,4 +1,4 @@
-"""Discrete linear-quadratic regulator for a planar robot with gas thrusters.
+"""Discrete linear-quadratic regulator for a planar robot with thrusters.
 
 The linear model comes from the core's own dynamics, the gain from the discrete algebraic Riccati equation,
 and the valves from the LQR's own cost-to-go: for x⁺ = A x + B w the cost of a wrench w is, up to a constant,
@@ -79,7 +79,7 @@ class LqrWeights:
     heading_error_limit_deg: float  # same for the turn rate [deg]
     tracking_velocity: float = 0.0  # as 'velocity', where velocities are the goal; 0: the same
     tracking_torque: float = 0.0  # as 'torque', where a turn rate is the goal; 0: the same
-    overshoot: float = 0.0  # how far beyond a waypoint to aim where the course goes straight on [m]
+    overshoot: float = 0.0  # how far beyond a waypoint to aim where the path goes straight on [m]
     open_valve_far: float = 0.0  # same, more of it, from `FAR` on, where precision is worth less
     braking: float = 0.0  # share of the deceleration that valves and push allow; 0: no heed [-]
     least_open_s: float = 0.0  # on/off valves are left as they are for so long [s]
@@ -89,7 +89,6 @@ class LqrWeights:
     speed_around: float = 0.0  # among obstacles, as a share; tasks without any need none [-]
 
     def __post_init__(self) -> None:
-        """Refuse weights without a stabilising solution."""
         if min(self.position, self.heading, self.velocity, self.yaw_rate, self.open_valve) < 0.0:
             raise ValueError("weights must not be negative.")
         if min(self.force, self.torque, self.position_error_limit, self.heading_error_limit_deg) <= 0.0:
@@ -166,7 +165,7 @@ class Lqr(Law):
         self.cost_to_go, self.gain = best.cost_to_go, best.gain
         self._hessian = hessian = best.hessian
         allocation = OpeningAllocation if robot.actuators.continuous else ValveAllocation
-        self.reach = ForceAuthority(robot.actuators)
+        self.authority = ForceAuthority(robot.actuators)
         # How far from the goal the law asks for 1 m/s [s].
         self.lead = 1.0 if self.frame.tracks else float(self.gain[0, used.index(3)] / self.gain[0, 0])
         self.estimator = gains.observer
@@ -219,7 +218,7 @@ class Lqr(Law):
         distance = np.sqrt((to_goal * to_goal).sum(axis=-1, keepdims=True))
         limit = self._weights.position_error_limit * self.share_of_speed
         if self._weights.braking:
-            brake = self.reach.along(-to_goal / np.maximum(distance, 1e-9), now.push[..., :2])[..., None]
+            brake = self.authority.along(-to_goal / np.maximum(distance, 1e-9), now.push[..., :2])[..., None]
             fastest = np.sqrt(2.0 * self._weights.braking * brake / self.robot.body.mass * distance)
             limit = np.minimum(limit, self.lead * fastest) + 1e-9
         parts = [-to_goal * (limit / np.maximum(distance, limit))]
@@ -233,8 +232,8 @@ class Lqr(Law):
         x, y = now.goal
         if self.frame.crosses_obstacles:
             u, v, _ = now.motion
-            course = np.where(np.hypot(u, v) > 0.05, np.arctan2(v, u), np.arctan2(y, x))
-            room = self.room(inputs, course)
+            direction = np.where(np.hypot(u, v) > 0.05, np.arctan2(v, u), np.arctan2(y, x))
+            room = self.room(inputs, direction)
             shorter = np.minimum(1.0, room / np.maximum(np.hypot(x, y), 1e-6))
             return x * shorter, y * shorter
         if self.frame.passes:

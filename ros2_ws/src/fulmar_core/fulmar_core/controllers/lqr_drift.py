@@ -20,7 +20,7 @@ What is different here, and why:
   states that the code has, commands do not reach the threshold of 0.25 three metres away and the platform stays where
   it is: PT5 0 %, AAS 0.02. Its other file of weights, `Optimal_LQR_DAC.yaml`, behaves as Table 3.5 says; it is ours.
 - Differences go through the core's own dynamics in its own steps, not through one step of 0.2 s; and through a copy.
-  The published ones go through the simulation that is being judged, and leave it 0.2 s later than it was.
+  The published ones go through the simulation that is being evaluated, and leave it 0.2 s later than it was.
 - Gains are kept for headings and turn rates that are the same to 1° and 0.05 rad/s, and not solved for again.
 
 Measured in MuJoCo (256 trajectories; published in brackets), PT5 PT1 / OT5 OT1 in per cent, AAS: ideal 63 7 / 59 22,
@@ -62,7 +62,6 @@ class DriftWeights:
     bias: float  # a normalised input opens its valve above one half and this
 
     def __post_init__(self) -> None:
-        """Refuse weights without a solution."""
         if min(self.states) <= 0.0 or self.input <= 0.0:
             raise ValueError("the weights of states and inputs must be greater than 0.")
 
@@ -82,7 +81,6 @@ class LqrDrift(Law):
         control_hz: float | None = None,
         name: str | None = None,
     ) -> None:
-        """Bind the law; arguments as of `Law`."""
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
             raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")

@@ -3,8 +3,8 @@
 The rollout algorithm (Bertsekas, "Rollout, Policy Iteration, and Distributed Reinforcement Learning", 2021, §2.3): of
 the combinations of valves that look best for now, each is followed by the LQR for some seconds on the model, and the
 one that this ends best with is opened. The model has the push and the dead valves that the observer believes in,
-shared pressure, and the thrust turning with the body; the cost has what a benchmark counts, the gas among it, and at
-its end what the LQR says of the rest.
+shared pressure, and the thrust turning with the body. The cost has what a benchmark counts, open valves among it, and
+at its end the LQR's cost-to-go.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fulmar_core.tasks import Task
 
 @dataclass(frozen=True)
 class MpcGains(LqrWeights):
-    """The LQR that choices are followed by, and how far and by what they are judged; from `configs/controllers`."""
+    """Weights of the LQR that follows each choice, and of the cost of the choices; from `configs/controllers`."""
 
     choices: int = 16  # combinations of valves that are tried
     steps: int = 10  # for how many control steps each is followed
@@ -39,7 +39,6 @@ class MpcGains(LqrWeights):
     rest: float = 1.0  # factor on the LQR's cost of what is left at the end [-]
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be followed."""
         super().__post_init__()
         if self.choices < 1 or self.steps < 1:
             raise ValueError("'choices' and 'steps' must be at least 1.")
@@ -62,7 +61,6 @@ class Mpc(Law):
         control_hz: float | None = None,
         name: str | None = None,
     ) -> None:
-        """Build the model; arguments as of `Law`."""
         super().__init__(robot, task, gains, control_hz=control_hz, name=name)
         if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
             raise ValueError("the MPC opens and closes valves; this robot has none of that kind.")
@@ -152,8 +150,8 @@ class Mpc(Law):
     def _brakes(self, place: np.ndarray, turned: np.ndarray, push: np.ndarray) -> np.ndarray:
         """Deceleration that valves and push allow on the straight way to the goal, twice [m/s²]."""
         away = place * np.conj(turned) / np.maximum(np.abs(place), 1e-9)
-        reach = self._base.reach.along(np.stack((away.real, away.imag), axis=-1), push[:, :2])
-        return np.asarray(2.0 * self._gains.braking * reach / self._mass)
+        authority = self._base.authority.along(np.stack((away.real, away.imag), axis=-1), push[:, :2])
+        return np.asarray(2.0 * self._gains.braking * authority / self._mass)
 
     def _cut(self, place: np.ndarray, brakes: np.ndarray) -> np.ndarray:
         """Errors of place as the LQR counts them."""

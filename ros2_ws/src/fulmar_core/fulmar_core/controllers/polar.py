@@ -36,12 +36,11 @@ class PolarGains:
     turn: float  # of the turn on the spot [1/s]
     near: float  # what counts as there [m]
     slowing: float  # speed to a position falls with this power of the cosine of its bearing [-]
-    corner: float  # share of top speed at a waypoint where the course turns by a quarter or more [-]
+    corner: float  # share of top speed at a waypoint where the path turns by a quarter or more [-]
     velocity: float  # share of a velocity error that the command adds [-]
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
-        """Refuse gains that do not lead to the goal."""
         positive = (self.distance, self.bearing, self.turn, self.near, self.slowing, self.speed_around)
         if min(positive) <= 0.0 or self.heading >= 0.0:
             raise ValueError("all gains must be greater than 0, 'heading' less than 0.")

@@ -37,13 +37,12 @@ class PurePursuitGains:
     approach: float  # speed for each metre that is left [1/s]
     braking: float  # deceleration to plan with [m/s²]
     sideways: float  # acceleration that the tyres may be asked for [m/s²]
-    corner: float  # share of the cruising speed at a waypoint where the course turns by a quarter or more [-]
+    corner: float  # share of the cruising speed at a waypoint where the path turns by a quarter or more [-]
     near: float  # what counts as there [m]
     velocity: float  # share of an error of the wanted speed that the command adds [-]
     speed_around: float  # fastest among obstacles, as a share of the speed where nothing stands about [-]
 
     def __post_init__(self) -> None:
-        """Refuse gains that do not lead to the goal."""
         positive = (
             self.look_ahead, self.cruise, self.approach, self.braking, self.sideways, self.near, self.speed_around,
         )  # fmt: skip

@@ -37,7 +37,7 @@ class ValveAllocation:
         Args:
             thrusters: The bank.
             weight: Cost of a wrench error [F_x, F_y, M_z], symmetric positive definite, shape (3, 3).
-            valve_cost: Cost of each open valve, >= 0; settles ties in favour of less gas.
+            valve_cost: Cost of each open valve, >= 0; settles ties in favour of fewer valves.
         """
         count = len(thrusters.nozzles)
         self._thrusters, self._valve_cost, self.weight = thrusters, valve_cost, weight
@@ -51,7 +51,7 @@ class ValveAllocation:
     def best(self, wanted: Array, alive: Array | None = None, dearer: Array | None = None) -> Array:
         """Combination with the least weighted error.
 
-        A dead valve stays closed and takes no gas from the others, so nothing is lost by never opening it.
+        A dead valve stays closed and takes no pressure from the others, so nothing is lost by never opening it.
 
         Args:
             wanted: Wrench [F_x, F_y, M_z] in the body frame, shape (..., 3) [N, N, N·m].
@@ -96,7 +96,7 @@ class ValveAllocation:
         return np.take_along_axis(valves, np.argmin(least, axis=-1)[..., None, None], axis=-2)[..., 0, :]
 
     def _listed(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Commands, their wrenches, and (w - w*)ᵀ H (w - w*) + gas less the part that does not depend on the choice."""
+        """Commands, wrenches, and (w - w*)ᵀ H (w - w*) + valve cost, less what does not depend on the choice."""
         wrench = self._wrench(commands)
         offset = np.einsum("ki,ij,kj->k", wrench, self.weight, wrench)
         return commands, wrench, offset + self._valve_cost * commands.sum(axis=1)

@@ -1,4 +1,4 @@
-"""Which valves to open for the wrench that a network asks for.
+"""Choice of valves for the wrench that a network asks for.
 
 A network that decides about each valve by itself has to find out which of them go together, since n open valves on one
 pressure line give 1/n each; and while it explores, every wrong opening is a kick. One that asks for a wrench explores
@@ -33,23 +33,23 @@ class WrenchChoice:
     """Table of all combinations of valves, with what each costs for a wanted wrench and some dead valves.
 
     In units of the strongest force, and of the strongest torque divided by the root of `TORQUE_WEIGHT`, combination k
-    brings up w_k with gas g_k = VALVE_COST n_k. Where w is wanted, it costs |w_k - w|² + g_k (1 + HASTE_COST |w|²),
-    told less |w|², which does not depend on k.
+    brings up w_k with n_k valves, which cost g_k = VALVE_COST n_k. Where w is wanted, the cost is
+    |w_k - w|² + g_k (1 + HASTE_COST |w|²), less |w|², which does not depend on k.
     """
 
     commands: Array  # open (1) or closed (0), shape (k, n)
     slope: Array  # what a share of the wanted wrench makes each cheaper, shape (3, k)
     offset: Array  # cost where nothing is wanted, shape (k,)
-    gas: Array  # shape (k,)
+    valve_costs: Array  # g_k, shape (k,)
     unit: Array  # shape (3,) [N, N, N·m]
 
     @classmethod
-    def of(cls, robot: Robot, gas: float = 1.0) -> WrenchChoice:
+    def of(cls, robot: Robot, valve_cost: float = 1.0) -> WrenchChoice:
         """The table of a robot.
 
         Args:
             robot: The robot.
-            gas: Multiple of `VALVE_COST` that a valve costs: less is more exact, and uses more.
+            valve_cost: Multiple of `VALVE_COST` that a valve costs: less is more exact, and uses more.
 
         Raises:
             ValueError: It has no on/off valves.
@@ -59,7 +59,7 @@ class WrenchChoice:
         _, wrench, _ = ValveAllocation(robot.actuators, weight=np.eye(WRENCH), valve_cost=0.0).every
         force, torque = np.max(np.hypot(wrench[:, 0], wrench[:, 1])), np.max(np.abs(wrench[:, 2]))
         unit = np.array([force, force, torque / math.sqrt(TORQUE_WEIGHT)])
-        cost = gas * VALVE_COST
+        cost = valve_cost * VALVE_COST
         table = ValveAllocation(robot.actuators, weight=np.diag(unit**-2.0), valve_cost=cost)
         commands, wrench, offset = table.every
         order = ORDER_COST * np.arange(len(commands))
@@ -80,7 +80,9 @@ class WrenchChoice:
         xp = array_namespace(shares)
         commands = xp.asarray(self.commands)
         haste = HASTE_COST * FULL_SHARE**2 * xp.sum(shares * shares, axis=-1, keepdims=True)
-        cost = xp.asarray(self.offset) + haste * xp.asarray(self.gas) - shares @ xp.asarray(self.slope)
+        cost = (
+            xp.asarray(self.offset) + haste * xp.asarray(self.valve_costs) - shares @ xp.asarray(self.slope)
+        )
         return cost if dead is None else cost + DEAD_COST * (dead @ commands.T)
 
     def shares_of(self, wrench: np.ndarray) -> np.ndarray:

@@ -36,7 +36,6 @@ class Push:
     least: float = 0.0  # smallest, as a share of the largest [-]
 
     def __post_init__(self) -> None:
-        """Refuse negative magnitudes."""
         if min(self.force, self.torque) < 0.0 or not 0.0 <= self.least <= 1.0:
             raise ValueError("force and torque must not be negative, and 'least' must lie in [0, 1].")
 
@@ -51,7 +50,6 @@ class Wave:
     wave_number: Range = (0.25, 3.0)  # [rad/m]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if min(self.force, self.torque, self.wave_number[0]) < 0.0 or not 0.0 <= self.least <= 1.0:
             raise ValueError(
                 "force, torque and wave_number must not be negative, 'least' must lie in [0, 1]."
@@ -68,7 +66,6 @@ class Kick:
     every_s: Range = (4.0, 6.0)  # [s]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if self.force < 0.0:
             raise ValueError("'force' must not be negative.")
         if not 0.0 < self.every_s[0] <= self.every_s[1]:
@@ -84,7 +81,6 @@ class Tether:
     lever: float = 0.0  # farthest that the line is fastened from the body's origin [m]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         low, high = self.stiffness
         if min(low, self.reach, self.lever) < 0.0 or low > high:
             raise ValueError(
@@ -100,7 +96,6 @@ class Slope:
     direction_deg: float = 0.0  # in which it falls, in the world [deg]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if not 0.0 <= self.milliradians[0] <= self.milliradians[1] <= 100.0:
             raise ValueError("'milliradians' must be [low, high] with 0 <= low <= high <= 100.")
 
@@ -116,11 +111,10 @@ class Actuation:
     opening_delay_s: Range = (0.0, 0.0)  # by which closed valves open late; closing does not wait [s]
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
-    # Only of such as leave no pose to hold, all at once, where a robot has thrusters that can be lost like that.
+    # Only failures, all at once, after which no pose can be held, where a robot has thrusters that can fail so.
     stranding: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if min(self.noise, self.delay_s, self.failures, self.gain[0], self.failure_chance) < 0.0:
             raise ValueError("noise, delay, gain and failures must not be negative.")
         if self.gain[0] > self.gain[1] or self.failure_chance > 1.0:
@@ -151,7 +145,6 @@ class Sensing:
     yaw_rate_noise: Range = (0.0, 0.0)  # same for the turn rate [rad/s]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:
             raise ValueError("noise, bias, delay and dropout must not be negative, 'dropout' at most 1.")
         for low, high in (self.velocity_noise, self.yaw_rate_noise):
@@ -185,7 +178,6 @@ class Scenario:
     held_s: Range = (0.0, 0.0)  # from when to when, on air, a hand holds the robot where it is [s]
 
     def __post_init__(self) -> None:
-        """Refuse what would do nothing, and times without meaning."""
         for name in ("bearing_late_s", "held_s"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high < math.inf:
@@ -201,13 +193,7 @@ class Scenario:
 
 
 def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:
-    """How long after the start of an episode the air bearing carries the robot [s].
-
-    Args:
-        scenario: Says between which times it lies.
-        seed: Of the run.
-        number: Of the episode.
-    """
+    """Time after the start of an episode, by seed and number, until the air bearing carries the robot [s]."""
     low, high = scenario.bearing_late_s
     if low == high:
         return low
@@ -223,10 +209,10 @@ def longest_delay(robot: Robot, scenario: Scenario) -> float:
 
 
 def check_delays(robot: Robot, scenario: Scenario) -> None:
-    """Refuse a scenario in which a robot would obey later than it is told anew.
+    """Reject a scenario in which commands would be late by more than a control step.
 
     Raises:
-        ConfigError: Commands would be late by more than a control step.
+        ConfigError: They would.
     """
     late_s = longest_delay(robot, scenario)
     if robot.timing.is_over_within(late_s):

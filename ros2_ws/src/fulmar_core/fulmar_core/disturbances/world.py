@@ -27,9 +27,7 @@ class World:
     drag: Array  # factor on the damping of the water [-]
     gain: Array  # (n, ...) factor on what each actuator does [-]
     alive: Array  # (n, ...) 1, or 0 for an actuator that stays closed or still [-]
-    action_noise: (
-        Array  # largest error of what an actuator does, of full command, anew at each control step [-]
-    )
+    action_noise: Array  # largest error of an actuator, of full command, anew at each control step [-]
     action_delay: Array  # until a command acts, beyond the actuators' own, at most one control step [s]
     opening_delay: Array  # until a valve that was closed is open, beyond that; it closes without it [s]
     force_x: Array  # constant, in the world [N]
@@ -118,7 +116,7 @@ def _unpacked(block: Array, rows: tuple[int, ...]) -> World:
 def outside_wrench(
     state: PlanarState, world: World, time_s: Array, control_dt: float
 ) -> tuple[Array, Array, Array]:
-    """What pushes the body from outside; held over a control step, in which a robot moves a few centimetres.
+    """External push on the body, held over a control step, in which a robot moves a few centimetres.
 
     Args:
         state: Where the body is.

@@ -13,7 +13,7 @@ from fulmar_core.rotation import Array
 
 @dataclass(frozen=True)
 class Outline:
-    """Everything within `rounding` of a box; a disc is a box without size."""
+    """Outline of a robot: everything within `rounding` of a box; a disc is a box without size."""
 
     ahead: float  # of the box's middle, from the body's origin [m]
     half_length: float  # [m]
@@ -60,7 +60,6 @@ class Block:
     grip: float  # friction between the robot and the block [-]
 
     def __post_init__(self) -> None:
-        """Refuse blocks that cannot exist."""
         if min(self.radius, self.height, self.mass) <= 0.0 or min(self.floor_friction, self.grip) < 0.0:
             raise ValueError("radius, height and mass must be greater than 0, frictions not negative.")
 
@@ -69,6 +68,13 @@ def push(
     before: PlanarState, after: PlanarState, x: Array, y: Array, block: Block, robot: Robot
 ) -> tuple[Array, Array, PlanarState]:
     """Push a block out of the way that a robot took.
+
+    Quasi-static: friction on the floor takes any speed from the block at once, so that it moves only as far as the
+    robot drives into it. Its disc presses evenly on the floor; what force and moment move it together is an ellipsoid
+    (Howe and Cutkosky, "Practical force-motion models for sliding manipulation", 1996), with a moment arm of 2/3 of
+    the radius. A force along the contact then moves its middle by 1 / (1 + 9/4) = 4/13 of what the contact point
+    moves, as the rest is turning, as long as the contact holds; else by the friction coefficient times the way
+    inwards.
 
     Args:
         before: Robot at the start of a step, shapes (...,).

@@ -29,7 +29,6 @@ class Hydrostatics:
     metacentric_height_pitch: float  # longitudinal GM [m]
 
     def __post_init__(self) -> None:
-        """Refuse hulls that sink or capsize."""
         if min(self.water_density, self.waterplane_area, self.draught) <= 0.0:
             raise ValueError("water_density, waterplane_area and draught must be greater than 0.")
         if min(self.metacentric_height_roll, self.metacentric_height_pitch) <= 0.0:
@@ -65,7 +64,6 @@ class Hydrodynamics:
     hydrostatics: Hydrostatics
 
     def __post_init__(self) -> None:
-        """Refuse water that pushes."""
         if min(*self.linear_damping, *self.quadratic_damping, *self.added_mass) < 0.0:
             raise ValueError("damping and added mass must not be negative.")
 

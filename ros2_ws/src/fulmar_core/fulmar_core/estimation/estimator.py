@@ -1,7 +1,7 @@
 """Poses and inertial readings in any order of arrival, to one estimate at the newest of their times.
 
-A pose tells where the robot was when it was captured, and inertial readings have come since: the filter goes back to
-the time of capture, takes the pose in, and does what came after it again.
+A pose is as old as its capture, and inertial readings have come since: the filter goes back to the time of capture,
+takes the pose in, and repeats what came after it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ READING_LASTS_NS = 60_000_000  # how long after it an inertial reading still sta
 BACK_NS = 1_000_000_000  # stamps that go back further begin anew, as in `fulmar_core.safety.input_gate`
 FORWARD_NS = 10_000_000_000
 TO_BEGIN_ANEW = 10  # outliers in a row that agree with one another: then it is the estimate that is wrong
-KNOWN_SPEED_STD = 0.15  # velocity must be known so well before anybody is told [m/s]
+KNOWN_SPEED_STD = 0.15  # velocity must be known so well before an estimate is published [m/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class _Event:
 
     @property
     def key(self) -> tuple[int, bool]:
-        """Order: by time, and of one time the inertial reading first, which tells how the robot came there."""
+        """Order: by time, and of one time the inertial reading first, which moves the robot there."""
         return self.stamp_ns, self.pose is not None
 
 
@@ -117,11 +117,7 @@ class Estimator:
         return ""
 
     def see_imu(self, sample: ImuSample, stamp_ns: int) -> str:
-        """Take an inertial reading in.
-
-        Args:
-            sample: In the body's frame.
-            stamp_ns: When it was measured [ns].
+        """Take an inertial reading in the body's frame, measured at a stamp [ns].
 
         Returns:
             Why it is not believed; empty if it is.
@@ -178,7 +174,7 @@ class Estimator:
         self._strangers = []
 
     def _time_problem(self, stamp_ns: int, last_ns: int | None, what: str) -> str:
-        """Refuse what is old; a jump of time is told once and begins anew."""
+        """Reject old stamps; a jump of time is reported once and begins anew."""
         if last_ns is None:
             return ""
         ahead = stamp_ns - last_ns

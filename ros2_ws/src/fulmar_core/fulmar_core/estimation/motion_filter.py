@@ -40,7 +40,6 @@ class EstimatorSettings:
     bridge_s: float  # longest time without a believed pose before the estimate is stale [s]
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         positive = ("position_std", "heading_std", "gyroscope_std", "acceleration_noise", "manoeuvre", "spin")
         for name in (*positive, "gate", "bridge_s"):
             if not getattr(self, name) > 0.0:

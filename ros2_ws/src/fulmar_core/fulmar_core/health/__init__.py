@@ -1,1 +1,1 @@
-"""Fault awareness: what the actuators really do, told from what was commanded and how the body moved."""
+"""Fault awareness: what the actuators really do, estimated from commands and motion."""

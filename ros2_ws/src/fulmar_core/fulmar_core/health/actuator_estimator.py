@@ -18,7 +18,10 @@ OPENINGS_S = 0.2
 
 
 class ValveTrials:
-    """Times of the valves of one robot, or of many at once; arrays of shape (..., n)."""
+    """Trials of valves that are believed dead: each is opened again now and then; arrays of shape (..., n).
+
+    A valve that is never opened shows nothing, so a wrong belief would stay, and a valve could not recover.
+    """
 
     def __init__(self, retry_s: float) -> None:
         """Begin with valves that were never believed dead.
@@ -77,18 +80,14 @@ class ActuatorEstimate:
 class ActuatorEstimator:
     """Bank of filters over lost valves, with trials of those that are believed dead; see `ThrusterHealth`."""
 
-    def __init__(self, robot: Robot, suspicion: HealthSettings) -> None:
-        """Build the filters.
-
-        Args:
-            robot: A planar robot on air, with thrusters.
-            suspicion: How far to trust what.
+    def __init__(self, robot: Robot, settings: HealthSettings) -> None:
+        """Build the filters for a planar robot on air with thrusters.
 
         Raises:
             ConfigError: The robot has no thrusters, or swims.
         """
-        self._health = ThrusterHealth(robot, suspicion)
-        self._trials = ValveTrials(suspicion.retry_s) if suspicion.retry_s else None
+        self._health = ThrusterHealth(robot, settings)
+        self._trials = ValveTrials(settings.retry_s) if settings.retry_s else None
 
     def reset(self) -> None:
         """Forget everything."""

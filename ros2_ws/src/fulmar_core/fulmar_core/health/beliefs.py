@@ -33,17 +33,12 @@ class BeliefReader:
     """Finds what is wrong in the estimated health of one robot."""
 
     def __init__(self, robot: Robot) -> None:
-        """Read the estimates of this robot, which has thrusters."""
         assert isinstance(robot.actuators, Thrusters)
         self._names, self._reach = robot.actuators.names, ForceAuthority(robot.actuators)
         self._torque = robot.performance.torque
 
     def read(self, health: Health) -> Beliefs:
-        """Say which valves are believed dead, and whether the push is beyond what the valves can hold.
-
-        Args:
-            health: Of one robot, without a batch axis.
-        """
+        """Warn of valves believed dead, and of a push beyond what the valves can hold; `health` of one robot."""
         shares = dict(zip(self._names, health.effectiveness.tolist(), strict=True))
         dead = tuple(name for name, share in shares.items() if share < DEAD_BELOW)
         words = [f"valve {name} believed dead (effectiveness {shares[name]:.2f})" for name in dead]

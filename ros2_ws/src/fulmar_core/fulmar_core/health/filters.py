@@ -13,7 +13,10 @@ MAY_BE_0 = ("held", "retry_s")
 
 @dataclass(frozen=True)
 class HealthSettings:
-    """Standard deviations and chances; our values, chosen on the conditions of the DRIFT benchmark."""
+    """Settings of the thruster health: how far to trust model and measurements.
+
+    Standard deviations and chances; our values, chosen on the conditions of the DRIFT benchmark.
+    """
 
     position: float = 0.0015  # of a measured coordinate [m]
     heading: float = 0.003  # [rad]
@@ -36,10 +39,9 @@ class HealthSettings:
     surprise: float = 16.0  # largest weight of one measurement against a hypothesis, as log-likelihood [-]
 
     def __post_init__(self) -> None:
-        """Refuse what no filter exists for."""
         if min(getattr(self, field.name) for field in fields(self) if field.name not in MAY_BE_0) <= 0.0:
             raise ValueError(
-                "every number of a suspicion must be greater than 0; 'held' and 'retry_s' may be 0."
+                "every number of the health settings must be greater than 0; 'held' and 'retry_s' may be 0."
             )
         if min(getattr(self, name) for name in MAY_BE_0) < 0.0:
             raise ValueError("'held' and 'retry_s' must not be negative.")
@@ -51,12 +53,17 @@ SETTLED = 1e-4  # relative change of a gain from step to step below which it sta
 
 
 class PushFilter:
-    """Three coordinates (x, y, heading), each with velocity and push; states in the order pose, velocity, push."""
+    """Gains of a Kalman filter for pose, velocity and a constant push, the same for every hypothesis and every robot.
 
-    def __init__(self, robot: Robot, suspicion: HealthSettings, dt: float) -> None:
+    The covariances of a linear filter do not depend on what is measured (Kalman 1960), so hypotheses that differ in
+    their input alone share them, and a step of all of them is a product of matrices. Three coordinates (x, y,
+    heading), each with velocity and push; states in the order pose, velocity, push.
+    """
+
+    def __init__(self, robot: Robot, settings: HealthSettings, dt: float) -> None:
         """Prepare for measurements that come every `dt` seconds, a multiple of the physics step."""
         inertia = np.array([robot.body.mass, robot.body.mass, robot.body.inertia[2]])
-        s = suspicion
+        s = settings
         eye, none = np.eye(3), np.zeros((3, 3))
         # The simulators' semi-implicit Euler steps move a body a little farther than dt²/2.
         half = 0.5 * dt * (dt + robot.timing.physics_dt)
@@ -112,16 +119,17 @@ RELEASE = 6.0  # evidence for motion that ends a standstill: a third of a second
 
 
 class HoldDetector:
-    """Evidence that bodies are held, for one or for many at once; arrays of shape (...,)."""
+    """Evidence that something keeps bodies from moving: a hand, a cable, or the floor under an air bearing without air.
 
-    def __init__(self, suspicion: HealthSettings, shape: tuple[int, ...]) -> None:
-        """Begin with bodies that are free.
+    A body that does not move although its valves open is explained by dead valves and pushes, too, so a bank of
+    hypotheses about those learns nonsense while a person holds the robot. This is the test against it: a cumulative
+    sum (Page 1954, "Continuous inspection schemes") of how much better standing still explains the measurements than
+    the whole bank does. Up to two dead valves explain a standstill as well; what they cannot explain is that none of
+    several valves has an effect. Arrays of shape (...,).
+    """
 
-        Args:
-            suspicion: How well is measured, and how much evidence it takes.
-            shape: Of the bodies.
-        """
-        s = suspicion
+    def __init__(self, settings: HealthSettings, shape: tuple[int, ...]) -> None:
+        s = settings
         self._spread = np.array([s.position, s.position, s.heading, s.velocity, s.velocity, s.yaw_rate])
         self._limit = s.held
         self._evidence = np.zeros(shape)
@@ -134,7 +142,7 @@ class HoldDetector:
         """Where nothing speaks for a hold."""
         return np.asarray((self._evidence <= 0.0) & ~self.held)
 
-    def look(self, seen: np.ndarray, surprise: np.ndarray, thrust: np.ndarray, dt: float) -> None:
+    def update(self, seen: np.ndarray, surprise: np.ndarray, thrust: np.ndarray, dt: float) -> None:
         """Take a measurement.
 
         Args:

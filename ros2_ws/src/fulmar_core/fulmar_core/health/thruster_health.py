@@ -1,9 +1,9 @@
-"""Which valves work, and what pushes from outside, told from commands and odometry.
+"""Thruster health: working valves and external push, estimated from commands and odometry.
 
 A bank of Kalman filters, one for each set of at most two lost valves: multiple-model estimation (Magill 1965, "Optimal
 adaptive estimation of sampled stochastic processes"; Bar-Shalom, Li and Kirubarajan 2001, §11.6). Each filter believes
 in its own set, moves the body under the thrust that the other valves then have, and estimates a force that is constant
-in the world and a constant torque. How well each foretells the next measurement tells how likely its set is.
+in the world and a constant torque. How well each predicts the next measurement gives the likelihood of its set.
 
 A lost valve stays closed, and under a shared pressure line leaves its share to the others, as in the simulators
 (`ActuationState.begin`): with two valves commanded and one of them lost, the other gives the whole thrust.
@@ -32,13 +32,9 @@ class Health:
 
     effectiveness: np.ndarray  # (..., n) expected share of its thrust that each valve gives, 0 to 1 [-]
     alive: np.ndarray  # (..., n) 1 or 0, of the likeliest set [-]
-    motion: (
-        np.ndarray
-    )  # (..., 6) the measured columns without their noise, of the likeliest set [m, rad, m/s, rad/s]
+    motion: np.ndarray  # (..., 6) measured columns without noise, of the likeliest set [m, rad, m/s, rad/s]
     push: np.ndarray  # (..., 3) force from outside along the world's x and y [N], torque [N·m]
-    held: (
-        np.ndarray
-    )  # (...,) whether something keeps the body from moving: then nothing is learned of the others
+    held: np.ndarray  # (...,) whether something holds the body: then nothing is learned of the others
 
     def __getitem__(self, index: int) -> Health:
         """Of one robot out of many."""
@@ -48,31 +44,30 @@ class Health:
 class ThrusterHealth:
     """The bank, for one robot or for many at once."""
 
-    def __init__(self, robot: Robot, suspicion: HealthSettings | None = None) -> None:
+    def __init__(self, robot: Robot, settings: HealthSettings | None = None) -> None:
         """List the hypotheses.
 
         Args:
             robot: A planar robot with thrusters, on air.
-            suspicion: How far to trust what.
+            settings: How far to trust model and measurements.
 
         Raises:
             ConfigError: The robot has no thrusters, or swims.
         """
         if not can_estimate_health(robot):
             raise ConfigError(
-                f"the health of '{robot.name}' cannot be told: it is no body on air with thrusters."
+                f"the health of '{robot.name}' cannot be estimated: it is no body on air with thrusters."
             )
         assert isinstance(robot.actuators, Thrusters)
-        self._robot, self._suspicion = robot, suspicion or HealthSettings()
+        self._robot, self._settings = robot, settings or HealthSettings()
         self._shared = robot.actuators.shared_pressure
         count = len(robot.actuators.nozzles)
         lost = [each for size in range(MOST_LOST + 1) for each in itertools.combinations(range(count), size)]
         self._alive = np.array([[float(i not in each) for i in range(count)] for each in lost])
-        wrench = (
-            robot.actuators.thrust * robot.actuators.wrench_per_newton[:, [0, 1, 5]]
-        )  # ahead, left, yaw moment
+        # Ahead, left, yaw moment.
+        wrench = robot.actuators.thrust * robot.actuators.wrench_per_newton[:, [0, 1, 5]]
         self._doing = np.hstack((wrench, np.ones((count, 1))))  # and how many valves share the pressure
-        failure = self._suspicion.failure
+        failure = self._settings.failure
         chances = [failure ** len(each) * (1.0 - failure) ** (count - len(each)) for each in lost]
         self._prior = np.array(chances) / sum(chances)
         self._filters: dict[int, PushFilter] = {}
@@ -111,7 +106,7 @@ class ThrusterHealth:
         self._chance = np.broadcast_to(self._prior, self._state.shape[:-1])
         self._yaw = seen[..., 2].copy()
         self._count = 0
-        self._hold = HoldDetector(self._suspicion, seen.shape[:-1])
+        self._hold = HoldDetector(self._settings, seen.shape[:-1])
         self._kept = self._state[..., 6:], self._chance  # from before anything spoke for a hold
 
     def _restart_motion(self, seen: np.ndarray) -> None:
@@ -136,12 +131,12 @@ class ThrusterHealth:
         surprise = 0.5 * (odd * odd).sum(axis=-1)
         least = surprise.min(axis=-1, keepdims=True)
         surprise -= least
-        chance = self._chance * np.exp(-np.minimum(surprise, self._suspicion.surprise))
+        chance = self._chance * np.exp(-np.minimum(surprise, self._settings.surprise))
         free = least[..., 0] - np.log(chance.sum(axis=-1))
-        change = self._suspicion.change * dt
+        change = self._settings.change * dt
         chance *= (1.0 - change) / chance.sum(axis=-1, keepdims=True)
         self._chance = chance + change * self._prior
-        if self._suspicion.held:
+        if self._settings.held:
             self._heed_hold(seen, free, applied, dt)
 
     def _heed_hold(
@@ -151,7 +146,7 @@ class ThrusterHealth:
         assert self._state is not None
         commands = applied.commands if isinstance(applied, Applied) else np.asarray(applied)
         thrust = np.asarray(np.any(commands > 0.0, axis=None if isinstance(applied, Applied) else -1))
-        self._hold.look(seen, surprise, thrust, dt)
+        self._hold.update(seen, surprise, thrust, dt)
         push, chance = self._kept
         held, innocent = self._hold.held, self._hold.innocent[..., None]
         if held.any():
@@ -211,7 +206,7 @@ class ThrusterHealth:
         steps = max(1, round(dt / self._robot.timing.physics_dt))
         if steps not in self._filters:
             seconds = steps * self._robot.timing.physics_dt
-            self._filters[steps] = PushFilter(self._robot, self._suspicion, seconds)
+            self._filters[steps] = PushFilter(self._robot, self._settings, seconds)
         return self._filters[steps]
 
     def _believed(self) -> Health:
@@ -234,5 +229,5 @@ def _wrapped(angle: np.ndarray) -> np.ndarray:
 
 
 def can_estimate_health(robot: Robot) -> bool:
-    """Whether the health of a robot's actuators can be told."""
+    """Whether the health of a robot's actuators can be estimated."""
     return isinstance(robot.actuators, Thrusters) and robot.body.planar and robot.hydrodynamics is None

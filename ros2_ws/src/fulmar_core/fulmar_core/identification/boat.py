@@ -1,4 +1,4 @@
-"""A hull on water with propellers: what its runs tell about drag, mass and inertia.
+"""A hull on water with propellers: drag, mass and inertia from its runs.
 
 Motion alone shows drag over mass and thrust over mass. Here the thrust curve of the robot's YAML is what is known (a
 bollard pull measures it), and it sets the scale of everything else: a curve that is wrong by a factor makes mass and
@@ -27,11 +27,7 @@ class BoatModel:
     spans_s: tuple[float, ...] = (5.0, 10.0)
 
     def __init__(self, robot: Robot) -> None:
-        """Prepare.
-
-        Args:
-            robot: The nominal robot; its thrust curve, slew and added mass are taken for true.
-        """
+        """Prepare for the nominal robot; its thrust curve, slew and added mass are taken for true."""
         assert isinstance(robot.actuators, Propellers) and robot.hydrodynamics is not None
         self._robot, self._propellers, self._water = robot, robot.actuators, robot.hydrodynamics
         unknowns = [

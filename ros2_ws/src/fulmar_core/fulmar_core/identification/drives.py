@@ -12,7 +12,7 @@ from fulmar_core.errors import ConfigError
 
 @dataclass(frozen=True)
 class Drive:
-    """Measured poses and the commands behind them, on one clock."""
+    """One driven run: measured poses and the commands behind them, on one clock."""
 
     name: str  # for messages
     time_s: np.ndarray  # (n,) of each pose, increasing [s]
@@ -74,7 +74,10 @@ LEAST_SAMPLES = 5  # in a window: fewer say nothing beyond its start
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows on a grid of integration steps."""
+    """Windows of one length on a grid of integration steps, each with a start of its own.
+
+    A window forgets: a disturbance that the model does not know spoils a few seconds instead of everything after it.
+    """
 
     drives: tuple[Drive, ...]
     drive: np.ndarray  # (w,) which run each window is of

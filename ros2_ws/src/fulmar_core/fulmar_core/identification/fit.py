@@ -70,7 +70,7 @@ def fit(
         Estimates with intervals.
 
     Raises:
-        ConfigError: The runs are too short, or do not tell every unknown.
+        ConfigError: The runs are too short, or do not determine every unknown.
     """
     place = np.array([u.to_search(u.start) for u in model.unknowns])
     for i, value, _ in (_prior(model, each) for each in known):
@@ -117,7 +117,7 @@ class _Search:
             try:
                 step = np.linalg.solve(whole + damping * np.diag(scale), pull)
             except np.linalg.LinAlgError as error:
-                raise ConfigError(_UNTOLD) from error
+                raise ConfigError(_UNDETERMINED) from error
             step = np.clip(step, -0.7, 0.7)
             own_step = self._own_step(residual, slopes, own_slopes, step)
             new_own = own + own_step
@@ -159,7 +159,7 @@ class _Search:
         scale = 1.0 / np.sqrt(np.maximum(np.diag(whole), 1e-300))
         values = np.linalg.eigvalsh(whole * scale[:, None] * scale[None, :])
         if values[0] < 1e-10:
-            raise ConfigError(_UNTOLD)
+            raise ConfigError(_UNDETERMINED)
         white = np.linalg.inv(whole)
         count, unknowns = len(self.windows), len(place)
         pulls = np.stack([self._pull(residual, slopes, own_slopes, w) for w in range(count)])
@@ -251,8 +251,8 @@ class _Search:
         return residuals[0], slopes[:p], slopes[p:]
 
 
-_UNTOLD = (
-    "these runs do not tell every quantity apart. Drive with --controller excite, for longer, and give a known mass: "
+_UNDETERMINED = (
+    "these runs do not distinguish every quantity. Drive with --controller excite, for longer, and give a known mass: "
     "--known mass=5.32+-0.02, or a second run with a weighed ballast: --ballast BAG=2.0"
 )
 

@@ -1,4 +1,4 @@
-"""From driven runs of one robot to its calibration: the model of its family, what sets the scale, and the fit."""
+"""Identification of one robot from driven runs: the model of its family, what sets the scale, and the fit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fulmar_core.identification.wheels import WheelModel
 from fulmar_core.robot import Robot
 
 EXACT = 1e-6  # relative standard deviation of what is said to be known without an error
-NO_MOTION = "the runs tell nothing of the robot: it hardly moved. Drive it, as with --controller excite."
+NO_MOTION = "the runs show nothing of the robot: it hardly moved. Drive it, as with --controller excite."
 SIGMAS = 1.96  # half a 95 % interval, in standard deviations
 
 
@@ -35,14 +35,12 @@ class Weight:
 
 @dataclass(frozen=True)
 class Identified:
-    """What a robot's runs told."""
+    """Result of an identification."""
 
     fit: Fit
     scale: str  # what the scale of forces rests on, in a sentence
     trusted: bool  # whether that was measured; False: it is the robot's YAML
-    undetermined: tuple[
-        str, ...
-    ] = ()  # quantities that the runs tell nothing about: intervals wider than their values
+    undetermined: tuple[str, ...] = ()  # quantities whose intervals are wider than their values
 
 
 def identify(
@@ -52,7 +50,7 @@ def identify(
     known: Sequence[Known] = (),
     ballasts: Mapping[int, Weight] | None = None,
 ) -> Identified:
-    """Estimate everything that a robot's runs tell.
+    """Estimate the quantities of a robot from its runs.
 
     Args:
         robot: The nominal robot.
@@ -98,10 +96,10 @@ def _is_determined(unknown: Unknown, found: Estimate) -> bool:
 
 
 def calibration_of(robot: Robot, identified: Identified, runs: Sequence[str] = ()) -> Calibration:
-    """What a simulation can take over: everything that the runs told, but the ballasts.
+    """What a simulation can take over: everything determined, but the ballasts.
 
     Raises:
-        ConfigError: They told nothing.
+        ConfigError: Nothing is determined.
     """
     allowed = {field.name for field in fields(Calibration)} - set(identified.undetermined)
     measured = {

@@ -1,4 +1,4 @@
-"""What a fit needs to know of a family of robots: its unknowns, and where they would have taken the robot."""
+"""Model of a family of robots for a fit: its unknowns, and the poses that they predict."""
 
 from __future__ import annotations
 
@@ -27,9 +27,7 @@ class Unknown:
     unit: str
     positive: bool = True  # searched by its logarithm: it has a size, and so has its relative error
     scale: float = 1.0  # its usual size, for one that may be 0 or less
-    useful: float = (
-        0.0  # half of the widest interval that still tells something, for one that may be 0 or less
-    )
+    useful: float = 0.0  # half of the widest interval that is of use, for one that may be 0 or less
     blur: float = 0.0  # standard deviation of what the model itself errs by, in the unknown's unit
 
     def to_search(self, value: float) -> float:
@@ -82,12 +80,7 @@ class Model(Protocol):
 
 
 def nominal_world(robot: Robot, **instead: np.ndarray) -> World:
-    """A still world around the nominal robot.
-
-    Args:
-        robot: The robot.
-        instead: Arrays that take the place of nominal values.
-    """
+    """A still world around the nominal robot; arrays in `instead` take the place of nominal values."""
     calm = Scenario("calm", sensor_noise=False, body="nominal")
     nominal = draw_world(robot, calm, Draws(0, np.zeros(1), np.zeros(1)))
     return World(*(instead.get(name, getattr(nominal, name)) for name in FIELDS))

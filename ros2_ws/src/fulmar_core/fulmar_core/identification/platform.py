@@ -1,4 +1,4 @@
-"""A body on air with gas thrusters: what its runs tell about mass, inertia, thrust, centre of mass and delays.
+"""A body on air with thrusters: mass, inertia, thrust, centre of mass and delays from its runs.
 
 Motion alone shows thrust over mass and thrust over inertia, never the three apart: double all of them and nothing
 changes. One known mass ends that. Either the platform was weighed, or it was driven with and without a ballast of known

@@ -1,4 +1,4 @@
-"""Two driven wheels: how far the body goes and turns for what it is told.
+"""Two driven wheels: speed and turn rate over commanded ones.
 
 Commands are speeds, so nothing here has the scale of a force: wheels that are larger than the base believes make every
 speed larger by one factor, and a wheel base that is narrower makes turn rates larger by another one.
@@ -26,11 +26,7 @@ class WheelModel:
     spans_s: tuple[float, ...] = (3.0, 8.0, 15.0)
 
     def __init__(self, robot: Robot) -> None:
-        """Prepare.
-
-        Args:
-            robot: The nominal robot; its limits and slew are taken for true.
-        """
+        """Prepare for the nominal robot; its limits and slew are taken for true."""
         assert isinstance(robot.actuators, DifferentialDrive)
         self._drive = robot.actuators
         response = robot.actuators.response

@@ -32,7 +32,6 @@ class Circle:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse a point."""
         positive(radius=self.radius)
 
     def points(self, count: int) -> np.ndarray:
@@ -53,7 +52,6 @@ class Spiral:
     closed: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse circles and negative radii."""
         positive(turns=self.turns)
         few(turns=self.turns)
         if min(self.start_radius, self.end_radius) < 0.0:
@@ -84,7 +82,6 @@ class Square:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse a point."""
         positive(side=self.side)
 
     def points(self, count: int) -> np.ndarray:
@@ -108,7 +105,6 @@ class InfiniteSquare:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse a point."""
         positive(side=self.side)
 
     def points(self, count: int) -> np.ndarray:
@@ -130,7 +126,6 @@ class Ngon:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse what is no polygon."""
         positive(radius=self.radius)
         if self.corners < 3:
             raise ValueError("'corners' must be 3 or more.")
@@ -153,7 +148,6 @@ class BernoulliLemniscate:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse a point."""
         positive(half_width=self.half_width)
 
     def points(self, count: int) -> np.ndarray:
@@ -178,7 +172,6 @@ class GeronoLemniscate:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse a point."""
         positive(half_width=self.half_width)
 
     def points(self, count: int) -> np.ndarray:
@@ -206,7 +199,6 @@ class Hippopede:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse what is no oval."""
         positive(b=self.b)
         if self.a <= self.b:
             raise ValueError("'a' must be greater than 'b', or the curve falls into two loops.")
@@ -237,7 +229,6 @@ class Lissajous:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse lines, arcs that are driven there and back, and figures that repeat."""
         positive(
             half_width=self.half_width,
             half_height=self.half_height,
@@ -291,7 +282,6 @@ class Hypotrochoid:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse wheels that do not fit, and curves that close too late."""
         positive(ring_radius=self.ring_radius, wheel_radius=self.wheel_radius, pen_distance=self.pen_distance)
         if self.wheel_radius >= self.ring_radius:
             raise ValueError("'wheel_radius' must be smaller than 'ring_radius'.")
@@ -330,7 +320,6 @@ class Sine:
     closed: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse lines."""
         positive(length=self.length, amplitude=self.amplitude, cycles=self.cycles)
         few(cycles=self.cycles)
 

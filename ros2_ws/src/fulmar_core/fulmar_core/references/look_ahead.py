@@ -38,7 +38,6 @@ class LookAhead:
     loops: int = 1  # rounds of a closed path; 0 means for ever
 
     def __post_init__(self) -> None:
-        """Refuse what leads nowhere."""
         if self.speed <= 0.0 or self.look_ahead <= 0.0:
             raise ValueError("'speed' and 'look_ahead' must be greater than 0.")
         if self.loops < 0:

@@ -58,7 +58,6 @@ class RaceTrack:
     closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse what is no track."""
         positive(size=self.size)
         fewest, most = self.corner_counts
         if not 3 <= fewest <= most <= 20:

@@ -79,7 +79,6 @@ class EstopButton:
     """Latched: once pressed it stays so until it is reset while every command is zero."""
 
     def __init__(self) -> None:
-        """Begin released."""
         self.pressed = False
         self._moving: dict[str, tuple[int, bool]] = {}
 

@@ -23,7 +23,6 @@ class ImuSpec:
     delay_s: float = 0.0  # from motion to reading [s]
 
     def __post_init__(self) -> None:
-        """Refuse negative rates and delays."""
         if min(self.rate_hz, self.delay_s) < 0.0:
             raise ValueError("rate_hz and delay_s must not be negative.")
 
@@ -44,7 +43,6 @@ class InertialUnit:
     """The unit of one robot, in one episode after another."""
 
     def __init__(self, spec: ImuSpec) -> None:
-        """Prepare for `reset`."""
         self._spec = spec
         self._std, limit, self._quantum = (spec.part(name) for name in ("std", "limit", "quantum"))
         self._most = largest_reading(limit, self._quantum)

@@ -35,7 +35,6 @@ class Channel:
     quantum: float = 0.0  # readings are whole multiples of this
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning."""
         if min(self.std, self.bias_std, self.scale_std, self.limit, self.quantum) < 0.0:
             raise ValueError("std, bias_std, scale_std, limit and quantum must not be negative.")
 
@@ -60,7 +59,6 @@ class OdometrySpec:
     delay_s: float = 0.0  # from motion to reading [s]
 
     def __post_init__(self) -> None:
-        """Refuse negative rates and delays."""
         if min(self.rate_hz, self.delay_s) < 0.0:
             raise ValueError("rate_hz and delay_s must not be negative.")
 

@@ -69,7 +69,6 @@ class GoToPose(Task):
     goal_topic: ClassVar[str] = "goal_pose"
 
     def __post_init__(self) -> None:
-        """Refuse what cannot saturate."""
         if min(self.fine_heading_deg, self.fine_speed, self.fine_yaw_rate) < 0.0:
             raise ValueError("'fine_heading_deg', 'fine_speed' and 'fine_yaw_rate' must not be negative.")
 

@@ -74,7 +74,6 @@ class PushBlock(Task):
     )
 
     def __post_init__(self) -> None:
-        """Refuse empty spans."""
         for low, high in (self.block_distance, self.training_block_distance, self.start_distance):
             if not 0.0 <= low <= high:
                 raise ValueError(

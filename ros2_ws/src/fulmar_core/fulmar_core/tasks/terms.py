@@ -31,7 +31,6 @@ class Start:
     goal_area: float  # side of the square that goals are drawn from [m]
 
     def __post_init__(self) -> None:
-        """Refuse empty spans."""
         for low, high in (self.distance, self.training_distance):
             if not 0.0 <= low <= high:
                 raise ValueError(
@@ -74,7 +73,6 @@ class Tolerance:
     hold_s: float = 0.0  # length of the window [s]
 
     def __post_init__(self) -> None:
-        """Refuse tolerances that nothing could meet."""
         values = (self.position, self.heading_deg, self.velocity, self.yaw_rate_deg, self.hold_s)
         if min(values) < 0.0 or max(values) == 0.0:
             raise ValueError("tolerances must not be negative, and one must be greater than 0.")

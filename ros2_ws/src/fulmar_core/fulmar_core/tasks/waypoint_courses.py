@@ -22,7 +22,6 @@ class WaypointCourse:
     area: float  # side of the square [m]
 
     def __post_init__(self) -> None:
-        """Refuse courses that do not fit."""
         if self.count < 2 or not 0.0 < self.spacing[0] <= self.spacing[1] or self.area < self.spacing[0]:
             raise ValueError(
                 "'count' must be at least 2, 'spacing' [low, high] with 0 < low <= high <= area."
@@ -74,7 +73,6 @@ class RaceTrack:
     size: float  # side of the square that a track fits into [m]
 
     def __post_init__(self) -> None:
-        """Refuse tracks that enclose nothing."""
         if not 3 <= self.corners[0] <= self.corners[1] <= 2 * self.corners[0] or self.size <= 0.0:
             raise ValueError(
                 "'corners' must be [fewest, most], 3 or more, at most twice as many; 'size' above 0."

@@ -86,7 +86,6 @@ class WaypointTask(Task):
     observation_names: ClassVar[tuple[str, ...]] = path_terms(2, heading=False)
 
     def __post_init__(self) -> None:
-        """Refuse a reach that judges would not count."""
         if not 0.0 < self.reach <= self.tolerance.position:
             raise ValueError("'reach' must be greater than 0 and at most the tolerance of the position.")
         if not 0.0 <= self.start_cone_deg <= 180.0:
@@ -214,7 +213,6 @@ class PoseWaypointTask(WaypointTask):
     observation_names: ClassVar[tuple[str, ...]] = path_terms(2, heading=True)
 
     def __post_init__(self) -> None:
-        """Refuse a reach that judges would not count."""
         super().__post_init__()
         if not 0.0 < self.reach_heading_deg <= self.tolerance.heading_deg:
             raise ValueError(
