@@ -126,7 +126,7 @@ def test_golden_vectors_cover_the_fallback_policy(bundle):
 def test_both_share_the_updates_of_the_run(run):
     record = read_run_record(run)
     assert (record["fallback_policy"]["updates"], record["updates"]) == (2, 4)
-    assert read_run_record(run / FALLBACK_FOLDER)["settings"]["scenario"] == "drift_stranded"
+    assert read_run_record(run / FALLBACK_FOLDER)["settings"]["scenario"] == "drift_uncontrollable"
 
 
 def test_both_share_its_time(tmp_path, settings, quick, monkeypatch):
@@ -196,7 +196,7 @@ def test_another_fallback_policy_makes_another_policy(settings, quick, monkeypat
     [
         ({"scenario": "drift_two_lost"}, "'stranding: true'"),
         ({"disturbance_inputs": False}, "'disturbance_inputs'"),
-        ({"fallback_policy": FallbackPlan("drift_stranded", 0.5)}, "and no fallback"),
+        ({"fallback_policy": FallbackPlan("drift_uncontrollable", 0.5)}, "and no fallback"),
     ],
 )
 def test_fallback_policies_that_could_not_take_over_are_rejected(settings, monkeypatch, change, said):

@@ -14,7 +14,7 @@ from training.vec_env import BatchVecEnv
 from training.worlds import training_task
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
-UNCONTROLLABLE = load_scenario("drift_stranded")
+UNCONTROLLABLE = load_scenario("drift_uncontrollable")
 
 
 def rewards(task, scenario):
@@ -34,8 +34,8 @@ def test_uncontrollable_robots_are_rewarded_by_their_own_weights():
     ("task", "scenario"),
     [
         ("drift_go_to_pose", "drift_two_lost"),
-        ("go_to_pose", "drift_stranded"),
-        ("go_to_position", "drift_stranded"),
+        ("go_to_pose", "drift_uncontrollable"),
+        ("go_to_position", "drift_uncontrollable"),
     ],
 )
 def test_everyone_else_is_asked_for_what_the_task_says(task, scenario):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
+
+if TYPE_CHECKING:  # the command line checks areas without NumPy
+    from fulmar_core.robot import Robot
+    from fulmar_core.tasks import Task
 
 NO_AREA = (0.0, 0.0, 0.0, 0.0)  # an area without extent stands for none
 FARTHEST_M = 1000.0  # of a goal from the origin: a goal beyond it is a mistake of units or of frames
