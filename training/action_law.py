@@ -1,4 +1,4 @@
-"""How actions are drawn from what a policy network puts out, with the gradients that an update needs."""
+"""Distributions of actions, shaped by the outputs of a policy network, with their gradients."""
 
 from __future__ import annotations
 
@@ -68,11 +68,11 @@ class OnOff:
         return gradient
 
 
-class Choice:
-    """Each actuator gets one of some orders, with probabilities from as many outputs, one actuator after another."""
+class Categorical:
+    """Each actuator takes one of `KINDS` actions, with probabilities from as many outputs, actuator by actuator."""
 
     def sample(self, outputs: torch.Tensor) -> torch.Tensor:
-        """Draw numbers of orders (the largest of logits with Gumbel noise is distributed so)."""
+        """Draw numbers of actions, by the largest logit with Gumbel noise."""
         noise = -torch.empty_like(outputs).exponential_().log_()
         return _by_actuator(outputs + noise).argmax(2).float()
 
@@ -138,13 +138,13 @@ def action_law(policy: ActorCriticPolicy) -> ActionLaw:
     """The law that fits a policy's action space.
 
     Raises:
-        ValueError: Neither on/off, orders nor a box.
+        ValueError: Neither MultiBinary, MultiDiscrete nor Box.
     """
     space = policy.action_space
     if isinstance(space, spaces.MultiBinary):
         return OnOff()
     if isinstance(space, spaces.MultiDiscrete):
-        return Choice()
+        return Categorical()
     if isinstance(space, spaces.Box):
         return Gaussian(policy.log_std)
     raise ValueError(f"actions must be MultiBinary, MultiDiscrete or Box, not {type(space).__name__}")

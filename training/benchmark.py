@@ -62,8 +62,8 @@ def compare(jobs: Sequence[Job], executor: Executor, watch: Watch) -> dict[str, 
 
     Args:
         jobs: Those of `benchmark_jobs`.
-        executor: Who runs them.
-        watch: Told how they go on.
+        executor: Runs them.
+        watch: Receives their progress.
 
     Returns:
         For each kind: median speed [control steps/s], success at every check (median, lowest and highest over the
@@ -71,15 +71,15 @@ def compare(jobs: Sequence[Job], executor: Executor, watch: Watch) -> dict[str, 
     """
     outcomes = executor.run(jobs, watch)
     failed = [f"{outcome.job.name}: {outcome.error}" for outcome in outcomes if outcome.record is None]
-    told: dict[str, Any] = {"robot": jobs[0].robot, "task": jobs[0].task, "failed": failed}
+    result: dict[str, Any] = {"robot": jobs[0].robot, "task": jobs[0].task, "failed": failed}
     times = _times(jobs[0])
     for kind in KINDS:
         records = [o.record for o in outcomes if o.record is not None and _kind(o) == kind]
         if records:
-            told[kind] = _figures(records, times)
-    if all(kind in told for kind in KINDS):
-        told["speed_ratio"] = told["fast"]["steps_per_s"] / told["stock"]["steps_per_s"]
-    return told
+            result[kind] = _figures(records, times)
+    if all(kind in result for kind in KINDS):
+        result["speed_ratio"] = result["fast"]["steps_per_s"] / result["stock"]["steps_per_s"]
+    return result
 
 
 def _kind(outcome: Outcome) -> str:

@@ -1,4 +1,4 @@
-"""Several seeds of one training: how much of a result is luck, and which run to keep."""
+"""Several seeds of one training: mean and spread of the success, and the best run."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ def run_campaign(jobs: Sequence[Job], executor: Executor, out: Path, watch: Watc
 
     Args:
         jobs: Jobs that differ in nothing but seed and folder.
-        executor: Who runs them.
+        executor: Runs them.
         out: Folder of the campaign.
-        watch: Told how they go on.
+        watch: Receives their progress.
 
     Returns:
-        What `campaign.json` says: each seed's success, their mean and spread, and the best run.
+        The content of `campaign.json`: each seed's success, their mean and spread, and the best run.
     """
     out.mkdir(parents=True, exist_ok=True)
-    told = summarised(executor.run(jobs, watch))
-    (out / CAMPAIGN_FILE).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-    return told
+    result = summarised(executor.run(jobs, watch))
+    (out / CAMPAIGN_FILE).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    return result
 
 
 def summarised(outcomes: Sequence[Outcome]) -> dict[str, Any]:

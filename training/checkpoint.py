@@ -1,4 +1,4 @@
-"""Everything a run needs to go on exactly where it was, in one file.
+"""Checkpoint of a run in one file, for an exact resume.
 
 It holds pickled objects: it is for resuming one's own run, and never read on a robot.
 """
@@ -23,7 +23,7 @@ from training.learners import learner_class
 from training.settings import Algorithm
 from training.vec_env import BatchVecEnv
 
-_NOT_SAVED = ("_last_lstm_states",)  # what Stable-Baselines3 forgets to save, or builds anew
+_NOT_SAVED = ("_last_lstm_states",)  # not saved by Stable-Baselines3
 
 
 def save_checkpoint(path: Path, learner: BaseAlgorithm, more: dict[str, Any]) -> None:
@@ -32,7 +32,7 @@ def save_checkpoint(path: Path, learner: BaseAlgorithm, more: dict[str, Any]) ->
     Args:
         path: Its file.
         learner: Between two updates.
-        more: Whatever else shall come back.
+        more: Other values to restore.
     """
     normaliser = learner.get_vec_normalize_env()
     assert normaliser is not None
@@ -58,7 +58,7 @@ def save_checkpoint(path: Path, learner: BaseAlgorithm, more: dict[str, Any]) ->
 def load_checkpoint(
     path: Path, settings: Algorithm, worlds: BatchVecEnv
 ) -> tuple[BaseAlgorithm, dict[str, Any]]:
-    """Bring a learner back, with its worlds and every random number generator.
+    """Restore a learner, with its worlds and every random number generator.
 
     Args:
         path: File that `save_checkpoint` wrote.
@@ -69,14 +69,14 @@ def load_checkpoint(
         The learner, and what was saved as `more`.
 
     Raises:
-        ConfigError: No such file, or it is none.
+        ConfigError: No such file, or not a checkpoint.
     """
     try:
         with path.open("rb") as file:
             content = pickle.load(file)
     except OSError as error:
         raise ConfigError(f"{path}: no checkpoint to resume from ({error.strerror}).") from error
-    except Exception as error:  # pickle raises whatever its reader stumbles over
+    except Exception as error:  # pickle raises exceptions of all kinds
         raise ConfigError(f"{path}: is no checkpoint ({type(error).__name__}).") from error
     try:
         return _restored(content, settings, worlds), content["more"]

@@ -1,7 +1,7 @@
 """A batch in NumPy that steps by a compiled kernel.
 
-What a step computes is defined once, in the core. NumPy carries it out array by array; here torch writes one loop over
-the worlds, which a C++ compiler makes machine code of. Both draw the same random numbers, and differ by rounding.
+The core defines the step once. NumPy computes it array by array; here torch writes one loop over the worlds, and a C++
+compiler makes machine code of it. Both draw the same random numbers, and differ by rounding.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fulmar_core.simulation import BatchSimulation
 from training.kernel import (
     ASKED,
     EFFORT,
-    TOLD,
+    RESULTS,
     Kernel,
     check_compiler,
     kernel_of,
@@ -35,13 +35,13 @@ Form = tuple[Any, ...]  # type, shape and strides of each leaf of a part
 
 
 def step_of(batch: BatchSimulation, *, compiled: bool) -> ObservedStep:
-    """How a batch moves: array by array, or as a compiled kernel."""
+    """The step of a batch: array by array, or as a compiled kernel."""
     return CompiledStep(batch) if compiled else partial(observed_step, batch)
 
 
 @dataclass(slots=True)
-class _Seen:
-    """A part of what a step is given, and the memory of its leaves as NumPy and as torch see it."""
+class _Viewed:
+    """A part of the input of a step, with the memory of its leaves as NumPy arrays and torch tensors."""
 
     part: Any
     arrays: tuple[Any, ...]
@@ -56,14 +56,14 @@ class CompiledStep:
     """
 
     def __init__(self, batch: BatchSimulation) -> None:
-        """Prepare; what is not compiled yet is compiled at the first step, which takes 5 to 20 s.
+        """Prepare; the first step compiles the kernel, in 5 to 20 s, unless torch has it on disk.
 
         Raises:
             ConfigError: There is no compiler.
         """
         check_compiler()
         self._batch = batch
-        self._seen: dict[str, _Seen] = {}  # every part, as it was when last looked at
+        self._seen: dict[str, _Viewed] = {}  # every part, as of the last step
         self._kernels: dict[tuple[Form, ...], Kernel] = {}
         self._last: Kernel | None = None  # while the forms of all parts stay
 
@@ -74,38 +74,38 @@ class CompiledStep:
             ConfigError: The compiler fails.
         """
         moving = parts_of(self._batch.mutable_state())
-        seen = self._look({ASKED: command, EFFORT: effort} | moving)
+        viewed = self._view({ASKED: command, EFFORT: effort} | moving)
         kernel = self._kernel()
-        tensors = [tensor for one in seen.values() for tensor in one.tensors]
-        arrays = [array for one in seen.values() for array in one.arrays]
+        tensors = [tensor for one in viewed.values() for tensor in one.tensors]
+        arrays = [array for one in viewed.values() for array in one.arrays]
         returned = kernel.run(*tensors)
-        told = len(tensors)
+        given = len(tensors)
         tensors += returned
         arrays += [_array(tensor) for tensor in returned]
         for name, places in kernel.replaced.items():
-            one = seen[name]
+            one = viewed[name]
             one.tensors = tuple([tensors[place] for place in places])
             one.arrays = tuple([arrays[place] for place in places])
             one.part = moving[name] = rebuilt(one.part, iter(one.arrays))
         self._batch.take(moving_of(moving | kernel.numbers))
-        reward, over, observed = arrays[told : told + TOLD]
+        reward, over, observed = arrays[given : given + RESULTS]
         return reward, over, observed
 
-    def _look(self, parts: dict[str, Any]) -> dict[str, _Seen]:
-        """All parts; what is the same object as before was seen before."""
-        seen = self._seen
+    def _view(self, parts: dict[str, Any]) -> dict[str, _Viewed]:
+        """All parts; what is the same object as before was viewed before."""
+        viewed = self._seen
         for name, part in parts.items():
-            if name not in seen or part is not seen[name].part:
+            if name not in viewed or part is not viewed[name].part:
                 arrays = leaves(part)
                 tensors = tuple([_tensor(array) for array in arrays])
                 form = tuple([(tensor.dtype, tensor.shape, tensor.stride()) for tensor in tensors])
-                if name not in seen or form != seen[name].form:
+                if name not in viewed or form != viewed[name].form:
                     self._last = None
-                seen[name] = _Seen(part, arrays, tensors, form)
-        return seen
+                viewed[name] = _Viewed(part, arrays, tensors, form)
+        return viewed
 
     def _kernel(self) -> Kernel:
-        """What moves parts of these forms."""
+        """The kernel for parts of these forms."""
         if self._last is None:
             forms = tuple(one.form for one in self._seen.values())
             if forms not in self._kernels:
@@ -124,7 +124,7 @@ class CompiledStep:
             control_hz=1.0 / batch.control_dt,
             xp=torch,
         )
-        twin.step(_tensor(np.array(batch.command)))  # fills what it keeps for later steps
+        twin.step(_tensor(np.array(batch.command)))  # fills the caches of later steps
         return kernel_of(
             twin, {name: rebuilt(one.part, iter(one.tensors)) for name, one in self._seen.items()}
         )

@@ -1,4 +1,4 @@
-"""From a learner of any kind to the network that a robot runs."""
+"""Conversion of a learner to the network that a robot runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from training.vec_env import BatchVecEnv
 
 @dataclass(frozen=True)
 class _Trained:
-    """What deterministic actions of a learner come from."""
+    """Layers and decision behind the deterministic actions of a learner."""
 
     layers: list[nn.Module]  # hidden layers and output layer, with activations between
     decision: Decision
@@ -45,7 +45,7 @@ def deployed_network(
         learner: PPO, recurrent PPO, SAC or TD3 with an MLP policy.
         normaliser: Holds the running mean and variance of the observations.
         command_scale: Full command of each actuator, in its own unit.
-        fallback: Who takes over where too many valves are dead.
+        fallback: Policy that takes over when the robot is uncontrollable.
 
     Returns:
         A network that shares nothing with the learner.
@@ -59,7 +59,7 @@ def deployed_network(
     plan = NetworkPlan(
         inputs=len(statistics.mean),
         hidden=tuple(layer.out_features for layer in trained.linear[:-1]),
-        outputs=int(trained.linear[-1].out_features),  # of orders it is a number of NumPy
+        outputs=int(trained.linear[-1].out_features),  # a NumPy number for a MultiDiscrete space
         activation="relu" if any(isinstance(layer, nn.ReLU) for layer in trained.layers) else "tanh",
         decision=trained.decision,
         command_scale=tuple(float(value) for value in command_scale),
@@ -72,7 +72,7 @@ def deployed_network(
         fallback=fallback.network.plan if fallback else None,
         losses=len(fallback.losses) if fallback else 0,
     )
-    with torch.random.fork_rng(devices=[]):  # whoever looks at a learner must not change what it draws next
+    with torch.random.fork_rng(devices=[]):  # must not change what the learner draws next
         network = DeployedNetwork(plan)
     with torch.no_grad():
         network.mean.copy_(torch.as_tensor(statistics.mean, dtype=torch.float32))
@@ -101,8 +101,10 @@ def _trained(learner: BaseAlgorithm, *, wrench: bool) -> _Trained:
     assert isinstance(learner, PPO | RecurrentPPO)
     layers = [*policy.mlp_extractor.policy_net, policy.action_net]
     on_off = isinstance(learner.action_space, spaces.MultiBinary)
-    orders = isinstance(learner.action_space, spaces.MultiDiscrete)
-    decision: Decision = "choose" if wrench else "threshold" if on_off else "increment" if orders else "clamp"
+    incremental = isinstance(learner.action_space, spaces.MultiDiscrete)
+    decision: Decision = (
+        "choose" if wrench else "threshold" if on_off else "increment" if incremental else "clamp"
+    )
     return _Trained(layers, decision, getattr(policy, "lstm_actor", None))
 
 

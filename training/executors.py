@@ -1,4 +1,4 @@
-"""Who runs jobs: processes of this machine, as many at once as asked."""
+"""Runs jobs in processes of this machine, several at once."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from fulmar_core.errors import ConfigError, FulmarError
 from training.jobs import Job, Outcome, read_progress, run_job
 from training.run_folder import read_run_record
 
-LOG_FILE = "log.txt"  # what a job has to say, in its run folder
+LOG_FILE = "log.txt"  # output of a job, in its run folder
 POLL_S = 0.2
 
-# Is told about each job now and then: its number, its state (waiting, running, done, failed), and how far it is.
+# Receives each job's number, state (waiting, running, done, failed) and progress, now and then.
 Watch = Callable[[int, str, dict[str, Any]], None]
 
 
 class Executor(Protocol):
-    """Runs jobs and tells how they end."""
+    """Runs jobs, and returns their outcomes."""
 
     def run(self, jobs: Sequence[Job], watch: Watch) -> list[Outcome]:
-        """Run jobs to their end; one that fails does not stop the others."""
+        """Run jobs to their end; a failed one does not stop the others."""
 
 
 class LocalExecutor:
@@ -87,7 +87,7 @@ def _start(job: Job) -> subprocess.Popen[bytes]:
             stdout=log,
             stderr=log,
             env=os.environ | limits,
-            start_new_session=True,  # a Ctrl-C of the terminal is ours to pass on, once
+            start_new_session=True,  # we pass on a Ctrl-C of the terminal, once
         )
     assert process.stdin is not None
     pickle.dump(job, process.stdin)
@@ -110,7 +110,7 @@ def _last_words(log: Path) -> str:
 
 
 def work() -> int:
-    """Do the job; 0 when it is done, else the last line of standard error says why not."""
+    """Main function of a job's process; returns 0, else the last line of standard error has the reason."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     source = sys.stdin.buffer
     job = pickle.load(source)  # from our own parent, over a pipe
@@ -127,7 +127,7 @@ def work() -> int:
 
 
 def _follow(pipe: int) -> None:
-    """Do as a person with Ctrl-C would once the parent closes the pipe, or dies."""
+    """Interrupt this process once the parent closes the pipe, or dies."""
     while os.read(pipe, 1):
         pass
     os.kill(os.getpid(), signal.SIGINT)

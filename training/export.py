@@ -75,13 +75,13 @@ def export(run: Path, out: Path) -> Passport:
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
         | {key: record[key] for key in ("recipe", "fallback_policy") if key in record}
         | {"curve": _curve(record)}
-        | _verdict(record),
+        | _mujoco_result(record),
     )
     return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
 
 
 def _curve(record: dict[str, Any]) -> list[dict[str, float]]:
-    """Success at each check on held-out episodes, for pictures."""
+    """Success at each check on held-out episodes, for plots."""
     return [
         {
             "wall_s": round(check["wall_s"], 1),
@@ -92,26 +92,28 @@ def _curve(record: dict[str, Any]) -> list[dict[str, float]]:
     ]
 
 
-def _verdict(record: dict[str, Any]) -> dict[str, Any]:
-    """What judging in MuJoCo gave, in its main figures; empty if the run was not judged."""
-    judged = record.get("mujoco")
-    if not judged:
+def _mujoco_result(record: dict[str, Any]) -> dict[str, Any]:
+    """Main metrics of the evaluation in MuJoCo; empty without one."""
+    result = record.get("mujoco")
+    if not result:
         return {}
-    told = {key: judged[key] for key in ("scenario", "seed", "episodes", "success_rate")}
-    means = {key: judged[key]["mean"] for key in judged if key.startswith(("PT", "OT")) or key == "AAS"}
-    return {"mujoco": told | means}
+    main = {key: result[key] for key in ("scenario", "seed", "episodes", "success_rate")}
+    means = {key: result[key]["mean"] for key in result if key.startswith(("PT", "OT")) or key == "AAS"}
+    return {"mujoco": main | means}
 
 
 def _to_onnx(network: DeployedNetwork) -> bytes:
     memory = network.plan.memory
     example = [torch.zeros(2, network.plan.inputs), *([torch.zeros(2, memory)] if memory else [])]
     worlds = torch.export.Dim("worlds")
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of optional packages that nobody needs
+    logging.getLogger("torch.onnx").setLevel(
+        logging.ERROR
+    )  # it warns of optional packages that are not needed
     with warnings.catch_warnings():
         warnings.filterwarnings(
             "ignore", message=".*axis name: worlds will not be used"
         )  # both inputs share it
-        with polite_interrupt() as interrupt:  # the exporter takes Ctrl-C for an error of its own
+        with polite_interrupt() as interrupt:  # the exporter would report a Ctrl-C as its own error
             program = torch.onnx.export(
                 network,
                 tuple(example),
@@ -131,7 +133,7 @@ def _to_onnx(network: DeployedNetwork) -> bytes:
 
 
 def _strip_metadata(model: onnx.ModelProto) -> None:
-    """Take out the stack traces that the exporter leaves: they name files of this machine."""
+    """Remove the exporter's stack traces, which name files of this machine."""
     graph = model.graph
     for part in (
         model,
@@ -147,9 +149,9 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
 
 
 def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
-    """What the network makes of held-out episodes at their start, a few commands later, and at limits.
+    """Golden vectors of held-out episodes at their start, a few commands later, and at limits.
 
-    Where it hands over to a fallback, every other robot is told of a loss that strands it.
+    With a fallback policy, every other robot has an uncontrollable set of dead valves.
     """
     simulation = BatchSimulation(
         robot, task, load_scenario("uncertain"), worlds=GOLDEN_VECTORS // 2, seed=HELD_OUT_SEED, training=True
@@ -169,8 +171,8 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
         seen = seen.astype(np.float32)
         if network.fallback is not None:
             losses = network.losses.numpy()
-            stranded = seen[::2, -losses.shape[1] :]
-            stranded[:] = 1.0 - np.resize(losses, stranded.shape)
+            valves = seen[::2, -losses.shape[1] :]
+            valves[:] = 1.0 - np.resize(losses, valves.shape)
         command, logits, after = network.infer(seen, memory)
         moments.append((seen, memory, command, logits, after))
         simulation.move(loop.take(inputs, command).command)

@@ -41,10 +41,12 @@ def fallback_settings(settings: TrainingSettings, robot: Robot, task: Task) -> T
     name = settings.fallback_policy.settings
     own = load_training_settings(robot, task, name)
     actuation = load_scenario(own.scenario).actuation
-    if not actuation.stranding or not uncontrollable_losses(robot, actuation.failures):
+    total = actuation.stranding  # word: YAML key of scenarios
+    if not total or not uncontrollable_losses(robot, actuation.failures):
         raise ConfigError(
-            f"'fallback_policy': '{own.scenario}', the scenario of '{name}', must have 'stranding: true', and "
-            f"'{robot.name}' thrusters whose loss makes it uncontrollable."
+            f"'fallback_policy': '{own.scenario}', the scenario of '{name}', must have "
+            "'stranding: true', "  # word: YAML key of scenarios
+            f"and '{robot.name}' thrusters whose loss makes it uncontrollable."
         )
     same = ("disturbance_inputs", "action_space")
     if own.fallback_policy is not None or any(getattr(own, key) != getattr(settings, key) for key in same):

@@ -111,7 +111,7 @@ class FastPPO(PPO):
         return True
 
     def _look(self) -> None:
-        """Called before each step of a rollout; a subclass may note what it sees."""
+        """Hook before each step of a rollout."""
 
     @torch.no_grad()
     def _appraise(
@@ -146,15 +146,15 @@ class FastPPO(PPO):
         columns = [rows(getattr(self.rollout_buffer, name)) for name in _COLUMNS]
         widths = [column.shape[1] for column in columns]
         samples = torch.cat(columns, dim=1)
-        told: list[torch.Tensor] = []
+        figures: list[torch.Tensor] = []
         for _ in range(self.n_epochs):
             shuffled = samples.index_select(0, torch.randperm(len(samples)))
-            told = [
+            figures = [
                 self._learn_from(*minibatch.split(widths, dim=1), clip)
                 for minibatch in shuffled.split(self.batch_size)
             ]
             self._n_updates += 1
-        self._tell(torch.stack(told).mean(0), clip)
+        self._record(torch.stack(figures).mean(0), clip)
 
     def _learn_from(
         self,
@@ -203,7 +203,7 @@ class FastPPO(PPO):
             )
         )
 
-    def _tell(self, figures: torch.Tensor, clip: float) -> None:
+    def _record(self, figures: torch.Tensor, clip: float) -> None:
         names = ("policy_gradient_loss", "value_loss", "approx_kl", "clip_fraction")
         for name, value in zip(names, figures.tolist(), strict=True):
             self.logger.record(f"train/{name}", value)

@@ -1,4 +1,4 @@
-"""Golden vectors at both limits of every actuator, where another machine or an adapter is most likely to differ."""
+"""Golden vectors at both limits of every actuator, where another computer or an adapter most likely differs."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from fulmar_core.policy_bundle import Action, Golden
 
 Infer = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 STRETCHES = (1.0, -1.0, 2.0, -2.0, 5.0, -5.0)  # of observations: farther away, faster, on the other side
-CLOSE = 1e-3  # share of full command: a squashed output never is 1
+CLOSE = 1e-3  # share of full command: tanh never reaches 1
 
 
 def reached(commands: np.ndarray, scale: np.ndarray, action: Action) -> np.ndarray:
-    """Which limits of which actuators some commands are at.
+    """Limits of the actuators that some commands reach.
 
     Args:
         commands: Shape (k, n).

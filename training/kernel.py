@@ -1,4 +1,4 @@
-"""A step of worlds as machine code: the core's own functions, traced by torch, written as one loop, and compiled."""
+"""A step of a batch as machine code: the core's functions, traced by torch, and their pytrees."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from fulmar_core.learning_step import observed_step
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.simulation import BatchSimulation
 
-# Parts beside those that move: the command, and what the actuators' effort costs.
+# Parts beside the mutable state: the command, and the cost of the actuators' effort.
 ASKED, EFFORT = "asked", "effort"
-TOLD = 3  # reward, over, seen: what `observed_step` returns
+RESULTS = 3  # of `observed_step`: reward, over, observation
 
 _NO_COMPILER = (
     "steps cannot be compiled here: that takes g++ (or what CXX names) and Python's headers. Install them (Debian: g++ "
@@ -37,7 +37,7 @@ def compiler_found() -> bool:
 
 
 def check_compiler() -> None:
-    """Refuse to go on without one.
+    """Reject machines without one.
 
     Raises:
         ConfigError: There is no compiler.
@@ -48,9 +48,9 @@ def check_compiler() -> None:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A step as a function of tensors alone: it changes nothing, and knows nothing but what it is given."""
+    """A step as a pure function of tensors."""
 
-    # Of the leaves of all parts; returns what was told, then new leaves.
+    # Of the leaves of all parts; returns the results, then new leaves.
     run: Callable[..., Sequence[torch.Tensor]]
     # Parts that a step replaces, by the places of their leaves among those that were given, and then those returned.
     replaced: dict[str, tuple[int, ...]]
@@ -58,13 +58,12 @@ class Kernel:
 
 
 def kernel_of(twin: BatchSimulation, parts: Parts) -> Kernel:
-    """Compile a step of worlds; torch keeps what it compiled on disk and finds it again by what it computes.
+    """Compile a step of worlds; torch caches kernels on disk by what they compute.
 
     Args:
-        twin: Such worlds of torch's. They have stepped before, so that what they keep for later steps is there; what
-            moves of them is of no use afterwards.
-        parts: What a step is given: ASKED, EFFORT and all that moves, as tensors of the shapes, types and strides that
-            the kernel is for.
+        twin: The same batch in torch, after one step, so that its caches are filled; its state is used up.
+        parts: The input of a step: ASKED, EFFORT and the mutable state, as tensors of the kernel's shapes, types and
+            strides.
 
     Raises:
         ConfigError: The compiler fails.
@@ -81,7 +80,7 @@ def kernel_of(twin: BatchSimulation, parts: Parts) -> Kernel:
 def _compiled(
     graph: torch.fx.GraphModule, given: list[torch.Tensor]
 ) -> Callable[..., Sequence[torch.Tensor]]:
-    import torch._inductor as inductor  # 1 s, which nobody else shall wait for
+    import torch._inductor as inductor  # takes 1 s, only where it is used
     from torch._inductor.exc import InductorError
 
     try:
@@ -91,7 +90,7 @@ def _compiled(
 
 
 class _Trace:
-    """A step of leaves, which notes what becomes of each part."""
+    """A step of leaves that records the new leaves of each part."""
 
     def __init__(self, twin: BatchSimulation, parts: Parts) -> None:
         self._twin, self._parts = twin, parts
@@ -99,13 +98,13 @@ class _Trace:
         self.numbers: dict[str, float] = {}
 
     def __call__(self, *given: torch.Tensor) -> list[torch.Tensor]:
-        """What was told, and the new leaves."""
+        """The results, and the new leaves."""
         each = iter(given)
         before = {name: rebuilt(part, each) for name, part in self._parts.items()}
         twin = self._twin
         twin.take(moving_of(before))
-        told = observed_step(twin, before[ASKED], effort=before[EFFORT])
-        places = _Places(given, told)
+        results = observed_step(twin, before[ASKED], effort=before[EFFORT])
+        places = _Places(given, results)
         for name, part in parts_of(twin.mutable_state()).items():
             if isinstance(part, float):
                 self.numbers[name] = part
@@ -115,15 +114,15 @@ class _Trace:
 
 
 class _Places:
-    """Where tensors stand among those that were given, and then those that are returned."""
+    """Positions of tensors among the inputs, and then the outputs."""
 
-    def __init__(self, given: Sequence[torch.Tensor], told: Sequence[torch.Tensor]) -> None:
-        self.returned = list(told)
+    def __init__(self, given: Sequence[torch.Tensor], results: Sequence[torch.Tensor]) -> None:
+        self.returned = list(results)
         self._given = len(given)
         self._known = list(zip(given, range(len(given)), strict=True))
 
     def of(self, new: Sequence[torch.Tensor], old: Sequence[torch.Tensor]) -> tuple[int, ...]:
-        """Places of a part's leaves; those that are not known yet are returned as well."""
+        """Positions of a part's leaves; new ones become outputs."""
         return tuple(self._place(tensor, like) for tensor, like in zip(new, old, strict=True))
 
     def _place(self, tensor: torch.Tensor, like: torch.Tensor) -> int:

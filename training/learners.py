@@ -1,4 +1,4 @@
-"""The explicit table of learning algorithms: which settings build which learner of Stable-Baselines3."""
+"""Learners of Stable-Baselines3 from our settings, and a learning rate that follows the KL divergence."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class KlAdaptiveRate:
 
 
 class KlFeedback(BaseCallback):
-    """Hands the divergence of the last update to the learning rate."""
+    """Passes the divergence of the last update to the learning rate."""
 
     def __init__(self, rate: KlAdaptiveRate) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The shipped policies: which there are, what each is made from, and which have to be made again."""
+"""The shipped policies: their table, their recipes, and the jobs that make them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class PolicyTable:
     """What `configs/policies.yaml` says."""
 
     at_once: int  # runs side by side
-    episodes: int  # of the judgement in MuJoCo
+    episodes: int  # of the evaluation in MuJoCo
     policies: tuple[ShippedPolicy, ...]
 
     def __post_init__(self) -> None:
@@ -68,10 +68,10 @@ def load_policy_table() -> PolicyTable:
 
 
 def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
-    """Hash of everything a policy is made from: robot, task, scenario, settings, seed and number of updates.
+    """Hash of a policy's inputs: robot, task, scenario, settings, seed and number of updates.
 
-    What is at its default does not count, so that a new option leaves policies that do without it as they are. The air
-    bearing does not count either: worlds that train float always.
+    Values at their default do not count, so that a new option keeps the recipes of policies without it. The air bearing
+    does not count either: it is always on in training.
     """
     ingredients = {
         "robot": _chosen(replace(load_robot(policy.robot), air_bearing=False)),
@@ -103,7 +103,7 @@ def policy_job(
 
     Args:
         policy: Line of the table.
-        episodes: Of the judgement in MuJoCo.
+        episodes: Of the evaluation in MuJoCo.
         runs: Folder of the run folders; a run that was broken off there is resumed.
         bundles: Folder of the bundles.
         command: Command line, for the record.
@@ -128,7 +128,7 @@ def policy_job(
 
 
 def is_made(job: Job) -> bool:
-    """Whether a job's bundle is there, intact, and made from the same."""
+    """Whether a job's bundle exists, is intact and up to date."""
     assert job.bundle is not None
     try:
         passport = read_passport(job.bundle)
@@ -138,12 +138,7 @@ def is_made(job: Job) -> bool:
 
 
 def expected_s(jobs: Sequence[Job], at_once: int) -> float:
-    """How long jobs learn, each for as long as when its bundle was made last [s].
-
-    Args:
-        jobs: Of which those without a bundle are guessed by their updates.
-        at_once: Cores that they share.
-    """
+    """Expected time of learning on `at_once` cores [s], from the last run of each job, or from its updates."""
     each = [_took_s(job) for job in jobs]
     return max([sum(each) / at_once, *each])
 
@@ -157,11 +152,7 @@ def _took_s(job: Job) -> float:
 
 
 def set_aside(job: Job) -> Path | None:
-    """Put what a job has made out of its way, so that it is made anew; nothing is lost.
-
-    Returns:
-        Where its run folder, and its bundle in that, are now; None if there was nothing.
-    """
+    """Move a job's run folder and bundle aside, so that the job runs again; returns the new place, None if empty."""
     assert job.bundle is not None
     if not (job.out.exists() or job.bundle.exists()):
         return None
@@ -179,13 +170,13 @@ def set_aside(job: Job) -> Path | None:
 def make_policies(
     table: PolicyTable, jobs: Sequence[Job], executor: Executor, watch: Watch
 ) -> list[dict[str, Any]]:
-    """Make those bundles that are missing, or made from something else.
+    """Make the bundles that are missing or out of date.
 
     Args:
-        table: Says what each policy has to reach.
+        table: Has the success that each policy needs.
         jobs: One for each line of the table that is asked for.
-        executor: Who runs them.
-        watch: Told how they go on; numbers count those that have to be made.
+        executor: Runs them.
+        watch: Receives their progress; numbers count the jobs that run.
 
     Returns:
         One line for each job: name, whether it was made now, success in MuJoCo, what it has to be, what went wrong.

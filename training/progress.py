@@ -1,4 +1,4 @@
-"""What a person sees while a run learns: speed, success and time left."""
+"""Progress of training runs: bars in the terminal, a file, and curves on Weights & Biases."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stable_baselines3.common.logger import KVWriter
 
 
 class Watcher(Protocol):
-    """Is told how a run goes on."""
+    """Receives the progress of a run."""
 
     def begin(self) -> None:
         """The run begins."""
@@ -57,20 +57,20 @@ class LearningBar:
             TextColumn("learning"),
             BarColumn(),
             TextColumn(
-                "{task.fields[steps]:,} steps  {task.fields[rate]:,.0f} steps/s  {task.fields[verdict]}"
+                "{task.fields[steps]:,} steps  {task.fields[rate]:,.0f} steps/s  {task.fields[result]}"
             ),
             TimeRemainingColumn(),
             console=self._console,
             disable=not self._console.is_terminal,
         )
         self._speed = Speed()
-        self._task = self._bar.add_task("learning", total=1.0, steps=0, rate=0.0, verdict="")
+        self._task = self._bar.add_task("learning", total=1.0, steps=0, rate=0.0, result="")
 
     def begin(self) -> None:
         """Start drawing."""
         if self._run is not None:
             self._console.print(f"run folder: {self._run}", markup=False, highlight=False, soft_wrap=True)
-            self._run = None  # said once, also where a run has two parts
+            self._run = None  # printed once, also where a run has two parts
         self._bar.start()
 
     def advance(self, share: float, elapsed_s: float, steps: int) -> None:
@@ -80,7 +80,7 @@ class LearningBar:
 
     def evaluated(self, elapsed_s: float, success: float) -> None:
         """Show the latest check; also as a line where there is no terminal."""
-        self._bar.update(self._task, verdict=f"success {success:.3f}")
+        self._bar.update(self._task, result=f"success {success:.3f}")
         if not self._console.is_terminal:
             rate = f"{self._speed.rate:,.0f} steps/s"
             self._console.print(
@@ -93,13 +93,18 @@ class LearningBar:
 
 
 class ProgressFile:
-    """Writes how far a run is into its folder, now and then, for whoever waits for several runs."""
+    """Writes the progress of a run into its folder, now and then, for the process that runs several."""
 
     EVERY_S = 0.5
 
     def __init__(self, path: Path) -> None:
         self._path, self._speed, self._next = path, Speed(), 0.0
-        self._told: dict[str, float | int | None] = {"share": 0.0, "steps": 0, "rate": 0.0, "success": None}
+        self._progress: dict[str, float | int | None] = {
+            "share": 0.0,
+            "steps": 0,
+            "rate": 0.0,
+            "success": None,
+        }
 
     def begin(self) -> None:
         """Say that there is a run."""
@@ -108,13 +113,13 @@ class ProgressFile:
     def advance(self, share: float, elapsed_s: float, steps: int) -> None:
         """Note how far it is."""
         rate = self._speed.update(elapsed_s, steps)
-        self._told |= {"share": share, "elapsed_s": elapsed_s, "steps": steps, "rate": rate}
+        self._progress |= {"share": share, "elapsed_s": elapsed_s, "steps": steps, "rate": rate}
         if time.monotonic() >= self._next:
             self._write()
 
     def evaluated(self, elapsed_s: float, success: float) -> None:
         """Note the latest check."""
-        self._told["success"] = success
+        self._progress["success"] = success
         self._write()
 
     def end(self) -> None:
@@ -124,12 +129,12 @@ class ProgressFile:
     def _write(self) -> None:
         self._next = time.monotonic() + self.EVERY_S
         new = self._path.with_suffix(".new")
-        new.write_text(json.dumps(self._told), encoding="utf-8")
+        new.write_text(json.dumps(self._progress), encoding="utf-8")
         new.replace(self._path)
 
 
 class JobBars:
-    """Is a `Watch` while its context is open."""
+    """A progress bar for each of several jobs, or a line at its end where there is no terminal: a `Watch`."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._console = Console(stderr=True, highlight=False)
@@ -161,7 +166,7 @@ class JobBars:
         success = progress.get("success")
         known = "" if success is None else f"  success {success:.3f}"
         share = progress.get("share", 0.0)
-        running = "judging" if share >= 1.0 else f"{progress.get('rate', 0.0):,.0f} steps/s"
+        running = "evaluating" if share >= 1.0 else f"{progress.get('rate', 0.0):,.0f} steps/s"
         text = (running if state == "running" else state) + known
         if state == "running":
             self._bars.start_task(task)

@@ -47,7 +47,7 @@ class RayExecutor:
                     outcomes[number] = _outcome(jobs[number], task)
                     watch(number, "failed" if outcomes[number].record is None else "done", {})
         finally:
-            for task in tasks:  # a person has seen enough
+            for task in tasks:  # after an interrupt
                 ray.cancel(task)
         return [outcomes[number] for number in range(len(jobs))]
 
@@ -67,7 +67,7 @@ def _outcome(job: Job, task: Any) -> Outcome:
 
 @ray.remote(num_cpus=0)
 class _Board:
-    """Where jobs on all machines write how far they are."""
+    """Progress of the jobs on all machines."""
 
     def __init__(self) -> None:
         self._progress: dict[int, dict[str, Any]] = {}
@@ -80,27 +80,27 @@ class _Board:
 
 
 class _BoardWatcher:
-    """Tells the board, now and then."""
+    """Writes progress to the board, now and then."""
 
     EVERY_S = 1.0
 
     def __init__(self, number: int, board: Any) -> None:
         self._number, self._board, self._speed, self._next = number, board, Speed(), 0.0
-        self._told: dict[str, Any] = {}
+        self._progress: dict[str, Any] = {}
 
     def begin(self) -> None:
-        """Nothing to tell yet."""
+        """No progress yet."""
 
     def advance(self, share: float, elapsed_s: float, steps: int) -> None:
         """Note how far it is."""
-        self._told |= {"share": share, "steps": steps, "rate": self._speed.update(elapsed_s, steps)}
+        self._progress |= {"share": share, "steps": steps, "rate": self._speed.update(elapsed_s, steps)}
         if time.monotonic() >= self._next:
             self._next = time.monotonic() + self.EVERY_S
-            self._board.write.remote(self._number, self._told)
+            self._board.write.remote(self._number, self._progress)
 
     def evaluated(self, elapsed_s: float, success: float) -> None:
         """Note the latest check."""
-        self._told["success"] = success
+        self._progress["success"] = success
 
     def end(self) -> None:
         """The record says the rest."""

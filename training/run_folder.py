@@ -1,14 +1,14 @@
-"""What lies in a run folder, and how its record is read.
+"""Files of a run folder, their readers and writers, and the lock of a training.
 
-settings.yaml   how it learns
-start.json      what was asked for: robot, task, seed, limits
-run.json        what was done; written at the end
+settings.yaml   its training settings
+start.json      its request: robot, task, seed, limits
+run.json        its record; written at the end
 network.pt      the best weights, as a robot would run them
 checkpoint.pkl  everything a run needs to go on exactly where it was
 tensorboard/    curves
-calibration.yaml what was measured on the robot it learns for, where that was given
+calibration.yaml the calibration of the robot, if one was given
 fallback/     the run folder of the network that takes over from this one, where it has such
-progress.json   how far it is, for whoever watches from outside
+progress.json   its progress, for other processes
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _NEEDED = (
 
 
 def read_run_record(run: Path) -> dict[str, Any]:
-    """What `train` wrote about a run.
+    """The record of a finished run.
 
     Raises:
         ConfigError: If `run` is no finished run folder.
@@ -71,7 +71,7 @@ def read_run_record(run: Path) -> dict[str, Any]:
 
 
 def read_start(run: Path) -> dict[str, Any]:
-    """What a run was asked for: `robot`, `task`, `seed`, `time_limit_s` and `updates`.
+    """The request of a run: `robot`, `task`, `seed`, `time_limit_s` and `updates`.
 
     Raises:
         ConfigError: If `run` is no run folder.
@@ -99,13 +99,13 @@ LOCK_FILE = "learning.lock"
 
 @contextlib.contextmanager
 def learning_in(run: Path) -> Iterator[None]:
-    """Keep others out of a run folder until the context ends; the lock goes with the process, however that ends.
+    """Lock a run folder for one training; the lock ends with the context or the process.
 
     Args:
         run: Made if need be.
 
     Raises:
-        ConfigError: Somebody else learns there.
+        ConfigError: Another process trains there.
     """
     run.mkdir(parents=True, exist_ok=True)
     path = run / LOCK_FILE

@@ -22,14 +22,14 @@ ActionSpace = Literal["actuators", "wrench"]
 
 # Keys of earlier versions, and what to write today.
 RENAMED = {
-    "lessons": "'cloning_updates'",
-    "told": "'disturbance_inputs'",
+    "lessons": "'cloning_updates'",  # word: an old key
+    "told": "'disturbance_inputs'",  # word: an old key
     "wrench": "'action_space: wrench'",
-    "gas": "'valve_cost'",
-    "orders": "'incremental_actions'",
-    "refinement": "'annealing'",
+    "gas": "'valve_cost'",  # word: an old key
+    "orders": "'incremental_actions'",  # word: an old key
+    "refinement": "'annealing'",  # word: an old key
     "updates": "'target_kl' in 'annealing'",
-    "specialist": "'fallback_policy'",
+    "specialist": "'fallback_policy'",  # word: an old key
     "training": "'settings' in 'fallback_policy'",
 }
 

@@ -103,6 +103,7 @@ def training_task(task: Task, scenario: Scenario) -> Task:
     nozzles towards where it brakes can still come to rest at its goal. A reward for the heading on the way keeps it
     from learning that.
     """
-    if not (scenario.actuation.stranding and isinstance(task, GoToPose) and task.stranded_weights):
+    if not (scenario.actuation.stranding and isinstance(task, GoToPose)):  # word: YAML key of scenarios
         return task
-    return replace(task, reward_weights=task.stranded_weights)
+    weights = task.stranded_weights  # word: YAML key of tasks
+    return replace(task, reward_weights=weights) if weights else task

@@ -2,6 +2,6 @@
 
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from sim_nodes.mujoco_model.scene import RobotModel, Scene, build_model, robot_model_of
-from sim_nodes.mujoco_model.surroundings import BODY, IMU_SITE
+from sim_nodes.mujoco_model.scenery import BODY, IMU_SITE
 
 __all__ = ["BODY", "GRAVITY", "IMU_SITE", "RobotModel", "Scene", "build_model", "robot_model_of"]

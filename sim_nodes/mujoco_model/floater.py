@@ -11,7 +11,7 @@ from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from sim_nodes.mujoco_model.surroundings import BODY, add_hull
+from sim_nodes.mujoco_model.scenery import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
 
 # MuJoCo compiles a body whose centre of mass is its origin in a way that keeps it there [m].

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.dynamics.contact import Block
-from sim_nodes.mujoco_model.surroundings import FLOOR_BIT, THING_BIT
+from sim_nodes.mujoco_model.scenery import FLOOR_BIT, THING_BIT
 
 HEIGHT = 1.0  # higher than any robot [m]
 FAR = 1000.0  # place of obstacles that an episode does not use [m]

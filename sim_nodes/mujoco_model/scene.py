@@ -25,7 +25,7 @@ from sim_nodes.mujoco_model.objects import (
     place_block,
     place_obstacles,
 )
-from sim_nodes.mujoco_model.surroundings import add_sensors, add_surroundings
+from sim_nodes.mujoco_model.scenery import add_scenery, add_sensors
 
 PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 
@@ -101,7 +101,7 @@ def _spec(
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     # A diverged state has to stay, so that the backend sees it; MuJoCo would silently reset it.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    add_surroundings(spec, PALE if robot.hydrodynamics is None else WATER)
+    add_scenery(spec, PALE if robot.hydrodynamics is None else WATER)
     add_sensors(spec, robot_model.add(spec))
     add_obstacles(spec, radii)
     for thing in things:

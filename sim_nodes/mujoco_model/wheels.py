@@ -14,7 +14,7 @@ from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.dynamics.rolling import SERVO_S
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from sim_nodes.mujoco_model.surroundings import BODY, DARK, FLOOR_BIT, add_hull
+from sim_nodes.mujoco_model.scenery import BODY, DARK, FLOOR_BIT, add_hull
 
 STEP_S = 0.004  # contacts and wheel servos need finer steps than the robots' physics ticks [s]
 # Our values: no YAML says how heavy a wheel is or how high the weight lies.

@@ -115,7 +115,7 @@ def test_a_boat_that_falls_silent_is_an_error_not_old_odometry(bench, driver):
 
 
 @pytest.mark.parametrize("kind", ["tcp"], indirect=True)
-def test_a_connection_that_ends_is_told_at_once(bench, driver):
+def test_a_closed_connection_is_reported_at_once(bench, driver):
     bench.device.mute = True
     bench.device._link._drop()
     with pytest.raises((DeviceError, OSError)):
@@ -212,7 +212,7 @@ def test_a_serial_autopilot_is_waited_for_and_a_cable_that_takes_no_more_is_an_e
     driver.close()
 
 
-def test_a_serial_port_that_never_comes_is_told_with_a_hint(tmp_path):
+def test_a_missing_serial_port_is_reported_with_a_hint(tmp_path):
     boat = MavlinkBoat("mavlink_boat", str(tmp_path / "none"), THRUST)
     with pytest.raises(DeviceError, match=r"none cannot be opened: .*Is the device connected"):
         MavlinkDriver(load_robot("kingfisher"), boat, patience_s=0.2)

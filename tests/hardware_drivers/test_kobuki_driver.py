@@ -94,7 +94,7 @@ def test_what_touches_stops_the_base_which_may_only_back_off(bench, driver, what
 
 
 @pytest.mark.parametrize("frozen", [0, 1])
-def test_an_encoder_that_stands_while_its_wheel_is_told_to_turn_ends_the_run(bench, driver, frozen):
+def test_an_encoder_that_stands_while_its_wheel_is_commanded_ends_the_run(bench, driver, frozen):
     turning = bench.device._wheels
     drive(driver, (0.2, 0.0), 0.3)
     stood = turning()[frozen]
@@ -103,7 +103,7 @@ def test_an_encoder_that_stands_while_its_wheel_is_told_to_turn_ends_the_run(ben
         drive(driver, (0.2, 0.0), 3.0)
 
 
-def test_a_base_that_is_told_to_stand_may_stand_for_ever(driver):
+def test_a_base_that_is_commanded_to_stop_may_stand(driver):
     drive(driver, (0.2, 0.0), 0.3)
     drive(driver, (0.0, 0.0), 1.5)
     assert drive(driver, (0.2, 0.0), 0.3).odometry is not None
@@ -149,7 +149,7 @@ def test_what_touches_stops_it_at_once(bench, driver):
     stopping.join()
 
 
-def test_a_wheel_that_draws_too_much_current_is_told(bench, driver):
+def test_overcurrent_of_a_wheel_is_reported(bench, driver):
     bench.device.overcurrent = 1
     until(lambda: "too much current" in driver.health()["warning"])
     assert driver.health()["overcurrent"] == "1"

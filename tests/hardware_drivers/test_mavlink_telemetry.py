@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from hardware_drivers.mavlink_telemetry import ARMED, Telemetry
 
-HEARD = ("HEARTBEAT", "SYS_STATUS", "ATTITUDE", "RAW_IMU", "LOCAL_POSITION_NED")
+MESSAGES = ("HEARTBEAT", "SYS_STATUS", "ATTITUDE", "RAW_IMU", "LOCAL_POSITION_NED")
 NOW_NS = 10**18
 INTEGERS = {"uint8_t": (0, 2**8 - 1), "uint16_t": (0, 2**16 - 1), "uint32_t": (0, 2**32 - 1)}
 INTEGERS |= {"int8_t": (-(2**7), 2**7 - 1), "int16_t": (-(2**15), 2**15 - 1)}
@@ -30,7 +30,7 @@ def decoder() -> mavlink.MAVLink:
 @st.composite
 def messages(draw: st.DrawFn) -> mavlink.MAVLink_message:
     """One that the driver listens to, with anything in its fields."""
-    name = draw(st.sampled_from(HEARD))
+    name = draw(st.sampled_from(MESSAGES))
     kind = next(made for made in mavlink.mavlink_map.values() if made.msgname == name)
     values = [
         draw(st.floats(width=32, allow_nan=True, allow_infinity=True))

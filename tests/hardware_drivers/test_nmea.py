@@ -38,7 +38,7 @@ def test_the_real_boat_s_place_motion_and_gravity_are_understood():
     assert (fix.latitude, fix.longitude) == pytest.approx((42.3618524, -71.0908130), abs=1e-6)
     assert fix.heading == pytest.approx(234.32964)
     assert fix.time_s == pytest.approx(16 * 3600 + 49 * 60 + 59.006)
-    # Its GPS told the same at that moment: 0.145 knots on a course of 156.78°.
+    # Its GPS reported the same at that moment: 0.145 knots on a course of 156.78°.
     assert isinstance(rates, Rates)
     assert math.hypot(rates.east, rates.north) == pytest.approx(0.145 * 1852 / 3600, rel=0.01)
     assert math.degrees(math.atan2(rates.east, rates.north)) == pytest.approx(156.78, abs=0.1)

@@ -1,4 +1,4 @@
-"""The thread that reads from a device: however it ends, somebody is told."""
+"""The thread that reads from a device reports its end."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ def reading() -> Iterator[Read]:
 
 
 def test_bytes_are_handed_on(reading):
-    heard = []
-    device, ends = reading(heard.append)
+    received = []
+    device, ends = reading(received.append)
     device.sendall(b"hello")
-    until(lambda: b"".join(heard) == b"hello")
+    until(lambda: b"".join(received) == b"hello")
     assert not ends
 
 
-def test_a_connection_that_ends_is_told_once(reading):
+def test_a_closed_connection_is_reported_once(reading):
     device, ends = reading(lambda _data: None)
     device.close()
     until(lambda: bool(ends))
     assert ends == ["the connection is gone (the other side closed the connection)"]
 
 
-def test_what_cannot_be_taken_is_told_and_does_not_end_the_reading_in_silence(reading):
+def test_an_exception_of_the_receiver_is_reported(reading):
     def take(_data: bytes) -> None:
         raise ZeroDivisionError("by a decoder")
 

@@ -75,7 +75,7 @@ def test_the_asymmetry_of_a_boat_s_thrust_is_declared():
         ("  port", "  prot", ":5: unknown key 'prot'. Did you mean 'port'?"),
     ],
 )
-def test_a_mistake_is_told_with_its_place(tmp_path, old, new, says):
+def test_a_mistake_is_reported_with_its_place(tmp_path, old, new, says):
     path = tmp_path / "mine.yaml"
     path.write_text(TURTLEBOT.replace(old, new))
     with pytest.raises(ConfigError, match=says.replace("'?", r"'\?") if r"\?" not in says else says):

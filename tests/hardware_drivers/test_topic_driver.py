@@ -1,4 +1,4 @@
-"""Devices that somebody else's node drives: what it is told at the end, and when."""
+"""Devices behind another stack's node: the last messages that it receives, and when."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ class Listener:
     """Keeps what is sent, and when."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[float, np.ndarray, bool]] = []
+        self.received: list[tuple[float, np.ndarray, bool]] = []
 
     def __call__(self, command: np.ndarray, bearing: bool = True) -> None:
-        self.heard.append((time.monotonic(), command, bearing))
+        self.received.append((time.monotonic(), command, bearing))
 
 
 def floating(listener: Listener, *, bearing_on: bool, linger_s: float) -> DriverBackend:
@@ -37,10 +37,10 @@ def test_stops_come_one_by_one_and_the_last_has_time_to_arrive():
     driver = backend_of(ROBOT, TopicDriver(listener))
     driver.step(np.ones(8))
     driver.make_safe()
-    times = [at for at, _, _ in listener.heard[1:]] + [time.monotonic()]
+    times = [at for at, _, _ in listener.received[1:]] + [time.monotonic()]
     assert len(times) == STOPS + 1
     assert min(np.diff(times)) >= 0.01
-    assert not any(command.any() for _, command, _ in listener.heard[1:])
+    assert not any(command.any() for _, command, _ in listener.received[1:])
 
 
 def test_wheels_of_another_node_slow_down_first():
@@ -48,7 +48,7 @@ def test_wheels_of_another_node_slow_down_first():
     driver = backend_of(base, TopicDriver(listener))
     driver.step(np.array([0.3, -0.6]))
     driver.make_safe()
-    sent = np.array([command for _, command, _ in listener.heard])
+    sent = np.array([command for _, command, _ in listener.received])
     most = np.asarray(base.actuators.response.slew) * 0.02 + 1e-9
     assert (np.abs(np.diff(sent, axis=0)) <= most).all()
     assert not sent[-STOPS:].any()
@@ -60,7 +60,7 @@ def test_at_the_end_the_valves_close_first_and_the_platform_is_let_down_later():
     driver.step(np.ones(8))
     driver.close()
     assert not driver.bearing_on
-    carried, down = ([entry for entry in listener.heard[1:] if entry[2] is on] for on in (True, False))
+    carried, down = ([entry for entry in listener.received[1:] if entry[2] is on] for on in (True, False))
     assert not any(command.any() for _, command, _ in (*carried, *down))
     assert len(carried) == len(down) == STOPS
     assert down[0][0] - carried[-1][0] >= 0.3
@@ -72,7 +72,7 @@ def test_a_bearing_that_is_off_needs_no_time():
     began = time.monotonic()
     driver.close()
     assert time.monotonic() - began < 0.5
-    assert not any(on for _, _, on in listener.heard)
+    assert not any(on for _, _, on in listener.received)
 
 
 @pytest.mark.parametrize("linger_s", [-0.1, LONGEST_LINGER_S + 0.1, float("nan")])

@@ -122,10 +122,10 @@ def counting_network(*, gives="next_memory", memory=2):
         helper.make_tensor_value_info("observation", kind, ["worlds", inputs]),
         helper.make_tensor_value_info("memory", kind, ["worlds", memory]),
     ]
-    tells = [
+    results = [
         helper.make_tensor_value_info(name, kind, ["worlds", 2]) for name in ("command", "logits", gives)
     ]
-    graph = helper.make_graph(nodes, "g", takes, tells, constants)
+    graph = helper.make_graph(nodes, "g", takes, results, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
     seen = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
     before = np.random.default_rng(3).normal(size=(4, 2)).astype(np.float32)

@@ -24,7 +24,7 @@ PLATFORM = ROBOTS["floating_platform"]
 FREE = replace(PLATFORM, body=replace(PLATFORM.body, planar=False, inertia=(0.1, 0.2, 0.3)))
 
 
-def test_a_body_that_is_lighter_than_its_wheels_is_told_with_the_robot_s_name():
+def test_a_body_lighter_than_its_wheels_is_rejected_with_the_robot_s_name():
     robot = ROBOTS["turtlebot2"]
     feather = replace(
         robot,

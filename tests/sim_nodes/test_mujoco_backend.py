@@ -1,4 +1,4 @@
-"""MuJoCo begins where it is told, and its sensors tell the truth plus the YAML's noise."""
+"""MuJoCo begins at the given start, and its sensors have the noise of the YAML."""
 
 from __future__ import annotations
 

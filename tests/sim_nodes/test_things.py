@@ -43,7 +43,7 @@ def test_an_obstacle_holds_a_robot_up_and_touching_is_seen_by_the_task_s_measure
     for _ in range(60):
         state = planar_of(backend.step(ahead(robot), 10).truth)
         gaps.append(float(clearance(state, AHEAD, robot)))
-    assert min(gaps) < TOUCH  # it came there, and whoever judges collisions sees it
+    assert min(gaps) < TOUCH  # it came there, where collision checks count it
     assert min(gaps) > -0.015  # it was not let in
 
 

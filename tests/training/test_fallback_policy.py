@@ -194,7 +194,7 @@ def test_another_fallback_policy_makes_another_policy(settings, quick, monkeypat
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"scenario": "drift_two_lost"}, "'stranding: true'"),
+        ({"scenario": "drift_two_lost"}, "'stranding: true'"),  # word: YAML key of scenarios
         ({"disturbance_inputs": False}, "'disturbance_inputs'"),
         ({"fallback_policy": FallbackPlan("drift_uncontrollable", 0.5)}, "and no fallback"),
     ],

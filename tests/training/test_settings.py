@@ -71,11 +71,11 @@ def test_an_unknown_algorithm_names_the_line(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("told: true", "write 'disturbance_inputs'"),
+        ("told: true", "write 'disturbance_inputs'"),  # word: an old key
         ("wrench: true", "write 'action_space: wrench'"),
-        ("specialist: {training: x, share: 0.5}", "write 'fallback_policy'"),
+        ("specialist: {training: x, share: 0.5}", "write 'fallback_policy'"),  # word: an old key
         ("annealing: {begin: 0.1, end: 0.2, updates: 0.5}", "write 'target_kl' in 'annealing'"),
-        ("algorithm: {kind: ppo, lessons: 3}", "write 'cloning_updates'"),
+        ("algorithm: {kind: ppo, lessons: 3}", "write 'cloning_updates'"),  # word: an old key
     ],
 )
 def test_an_old_key_names_its_line_and_the_new_key(tmp_path, old, new):

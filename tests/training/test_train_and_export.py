@@ -81,7 +81,7 @@ def test_the_bundle_of_a_run_is_accepted_by_the_policy_server(bundle, robot, tas
     assert Policy(folder, robot, task).control_hz == passport.control_hz == robot.timing.control_hz
 
 
-def test_the_passport_tells_how_the_policy_was_made(bundle, run):
+def test_the_passport_records_how_the_policy_was_made(bundle, run):
     training = bundle[1].training
     assert (training["command"], training["seed"], training["git_revision"]) == ("fulmar train", 3, "abc")
     assert training["steps"] == run[1]["steps"]

@@ -124,7 +124,7 @@ def test_worlds_that_did_not_end_have_nothing_to_say(build):
 
 
 def test_the_same_seed_gives_the_same_story_and_another_gives_another(build):
-    def story(env):
+    def run(env):
         rng = np.random.default_rng(5)
         parts = [env.reset()]
         for _ in range(20):
@@ -132,15 +132,15 @@ def test_the_same_seed_gives_the_same_story_and_another_gives_another(build):
             parts += [seen, rewards[:, None]]
         return np.concatenate(parts, axis=1)
 
-    first = story(build("uncertain", seed=1))
-    np.testing.assert_array_equal(first, story(build("uncertain", seed=1)))
-    assert not np.array_equal(first, story(build("uncertain", seed=2)))
+    first = run(build("uncertain", seed=1))
+    np.testing.assert_array_equal(first, run(build("uncertain", seed=1)))
+    assert not np.array_equal(first, run(build("uncertain", seed=2)))
     reseeded = build("uncertain", seed=2)
     assert reseeded.seed(1) == [1] * WORLDS
-    np.testing.assert_array_equal(first, story(reseeded))
+    np.testing.assert_array_equal(first, run(reseeded))
 
 
-def test_a_second_reset_tells_the_same_story_again(build):
+def test_a_second_reset_repeats_the_same_episodes(build):
     env = build("uncertain")
     first = env.reset()
     env.step(OPEN_ONE)

@@ -24,9 +24,10 @@ def rewards(task, scenario):
 
 
 def test_uncontrollable_robots_are_rewarded_by_their_own_weights():
-    meant = replace(TASK, reward_weights=TASK.stranded_weights, stranded_weights=None)
+    plain_task = replace(TASK, stranded_weights=None)  # word: YAML key of tasks
+    meant = replace(plain_task, reward_weights=TASK.stranded_weights)  # word: YAML key of tasks
     np.testing.assert_array_equal(rewards(TASK, UNCONTROLLABLE), rewards(meant, UNCONTROLLABLE))
-    plain = rewards(replace(TASK, stranded_weights=None), UNCONTROLLABLE)
+    plain = rewards(plain_task, UNCONTROLLABLE)
     assert np.abs(plain - rewards(meant, UNCONTROLLABLE)).max() > 0.1
 
 
@@ -38,6 +39,6 @@ def test_uncontrollable_robots_are_rewarded_by_their_own_weights():
         ("go_to_position", "drift_uncontrollable"),
     ],
 )
-def test_everyone_else_is_asked_for_what_the_task_says(task, scenario):
+def test_other_tasks_and_scenarios_keep_their_weights(task, scenario):
     plain = load_task(task)
     assert training_task(plain, load_scenario(scenario)) is plain

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fulmar_core.errors import ConfigError
 
-if TYPE_CHECKING:  # the command line checks areas without NumPy
+if TYPE_CHECKING:  # the command line checks areas without loading NumPy
     from fulmar_core.robot import Robot
     from fulmar_core.tasks import Task
 

@@ -11,7 +11,7 @@ HULL_COLOUR = [0.25, 0.45, 0.7, 1.0]
 DARK = [0.15, 0.15, 0.17, 1.0]
 
 
-def add_surroundings(spec: mujoco.MjSpec, colour: list[float]) -> None:
+def add_scenery(spec: mujoco.MjSpec, colour: list[float]) -> None:
     """Add a floor at z = 0, a sun and a camera above.
 
     Args:
