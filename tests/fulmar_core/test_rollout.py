@@ -185,7 +185,7 @@ def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
     np.testing.assert_allclose(np.cos(batch.yaw - alone.yaw), 1.0, rtol=0, atol=1e-5)
 
 
-def test_evaluating_works_where_training_is_not_installed(monkeypatch):
+def test_evaluation_works_where_training_is_not_installed(monkeypatch):
     from fulmar_cli.main import app
 
     for name in [name for name in sys.modules if name.split(".")[0] == "training"]:

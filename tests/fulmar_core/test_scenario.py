@@ -28,10 +28,10 @@ from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 
-TOGETHER = {"stranding": True}  # word: YAML key
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 PLATFORM, BOAT = ROBOTS["floating_platform"], ROBOTS["kingfisher"]
 COUNT = 2000
+UNCONTROLLABLE = {"stranding": True}  # word: key of scenario files
 STILL = Scenario("nothing happens", sensor_noise=False, body="nominal")
 SEEING = replace(STILL, sensor_noise=True)
 ALL = Scenario(
@@ -93,7 +93,7 @@ ENTRIES = {
     ),
     "actuation.stranding": (  # word: key of scenario files
         replace(STILL, actuation=Actuation(failures=2, failure_chance=0.1)),
-        {"actuation": Actuation(failures=2, failure_chance=1.0, **TOGETHER)},
+        {"actuation": Actuation(failures=2, failure_chance=1.0, **UNCONTROLLABLE)},
         {"alive"},
     ),
     "sensing.noise": (SEEING, {"sensing": Sensing(noise=2.0)}, {"noise"}),
@@ -240,9 +240,9 @@ def test_no_more_actuators_fail_than_may_and_each_candidate_with_its_chance(most
         np.testing.assert_allclose(1.0 - alive.mean(axis=1), most * 0.5 / 8, atol=0.035)
 
 
-def test_losses_that_make_a_robot_uncontrollable_come_together_each_set_as_often_and_with_one_chance():
-    uncontrollable = Actuation(failures=2, failure_chance=0.75, **TOGETHER)
-    alive = worlds(replace(STILL, actuation=uncontrollable)).alive.T
+def test_uncontrollable_failures_come_together_each_set_as_often_and_with_the_chance_of_one():
+    together = Actuation(failures=2, failure_chance=0.75, **UNCONTROLLABLE)
+    alive = worlds(replace(STILL, actuation=together)).alive.T
     sets, counts = np.unique(alive, axis=0, return_counts=True)
     lost = {tuple(np.flatnonzero(row < 0.5)): count for row, count in zip(sets, counts, strict=True)}
     assert lost.pop(()) == pytest.approx(0.25 * COUNT, rel=0.15)
@@ -251,15 +251,15 @@ def test_losses_that_make_a_robot_uncontrollable_come_together_each_set_as_often
         assert count == pytest.approx(0.75 * COUNT / len(lost), rel=0.35)
 
 
-def test_robots_that_nothing_makes_uncontrollable_lose_whatever_may_fail():
+def test_robots_without_uncontrollable_failures_lose_whatever_may_fail():
     loses = Actuation(failures=1, failure_chance=1.0)
-    plain, asked = (replace(STILL, actuation=each) for each in (loses, replace(loses, **TOGETHER)))
+    plain, asked = (replace(STILL, actuation=each) for each in (loses, replace(loses, **UNCONTROLLABLE)))
     np.testing.assert_array_equal(worlds(asked, BOAT).alive, worlds(plain, BOAT).alive)
 
 
-def test_to_be_uncontrollable_something_has_to_fail():
+def test_uncontrollable_failures_need_failures():
     with pytest.raises(ValueError, match="needs 'failures'"):
-        Actuation(**TOGETHER)
+        Actuation(**UNCONTROLLABLE)
 
 
 def test_a_robot_with_fewer_actuators_than_may_fail_can_lose_all():
@@ -365,3 +365,12 @@ def test_the_air_bearing_is_late_within_its_span_and_the_same_for_one_seed():
 def test_times_that_end_before_they_begin_are_refused(name):
     with pytest.raises(ValueError, match=name):
         replace(STILL, **{name: (2.0, 1.0)})
+
+
+def test_an_old_name_of_a_scenario_works_and_warns(caplog):
+    old, new = "drift_stranded", "drift_uncontrollable"  # word: old name of a scenario
+    with caplog.at_level("WARNING", logger="fulmar_core"):
+        assert load_scenario(old) == load_scenario(new)
+    (record,) = caplog.records
+    assert old in record.getMessage()
+    assert new in record.getMessage()

@@ -66,11 +66,11 @@ def check_episodes(
 
 
 def free_memory(meminfo: Path = MEMINFO, cgroup: Path = CGROUP) -> int:
-    """Memory that this process may still take [bytes]; without bound where the system does not tell.
+    """Memory that this process may still take [bytes]; without bound where the system does not report it.
 
     Args:
-        meminfo: What Linux reports of the machine.
-        cgroup: What Linux reports of the container or unit that this process runs in.
+        meminfo: Linux's report on the computer.
+        cgroup: Linux's report on the container or unit that this process runs in.
     """
     try:
         lines = dict(line.split(":", 1) for line in meminfo.read_text().splitlines())

@@ -32,7 +32,7 @@ class MpcGains(LqrWeights):
     aligned: float = 1.0  # same of a second away from the heading [1/s]
     position_scale: float = 0.01  # where half of the cost is lost [m]
     heading_scale_deg: float = 1.0  # [deg]
-    gas: float = 0.01  # cost of one open valve for a second [1/s]  # word: key of gains files
+    gas: float = 0.01  # cost of one open valve for a second [1/s] # word: key of gains files
     pace: float = 10.0  # cost of a second at another velocity than the LQR asks for [s/m²]
     rest: float = 1.0  # factor on the LQR's cost of what is left at the end [-]
 

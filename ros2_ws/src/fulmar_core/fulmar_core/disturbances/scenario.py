@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass
 from typing import Literal
@@ -23,6 +24,10 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
 Range = tuple[float, float]
+
+RENAMED = {"drift_stranded": "drift_uncontrollable"}  # word: old name of a scenario
+logger = logging.getLogger(__name__)
+logger.addHandler(logging.NullHandler())
 
 BEARING = 4  # stream of random numbers, beside those of `counter_rng` and of the simulation
 
@@ -112,7 +117,7 @@ class Actuation:
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
     # Only failures, all at once, after which no pose can be held, where a robot has thrusters that can fail so.
-    stranding: bool = False  # word: YAML key
+    stranding: bool = False  # word: key of scenario files
 
     def __post_init__(self) -> None:
         if min(self.noise, self.delay_s, self.failures, self.gain[0], self.failure_chance) < 0.0:
@@ -125,8 +130,9 @@ class Actuation:
             raise ValueError(
                 "'failures' and 'failure_chance' need one another: how many may fail, and how often."
             )
-        if self.stranding and not self.failures:  # word: YAML key
-            raise ValueError("'stranding' needs 'failures': how many are lost together.")  # word: YAML key
+        if self.stranding and not self.failures:  # word: key of scenario files
+            needs = "'stranding' needs 'failures'"  # word: key of scenario files
+            raise ValueError(f"{needs}, the number of those that are lost together.")
         if not 0.0 <= self.least_noise <= 1.0:
             raise ValueError("'least_noise' must lie in [0, 1].")
 
@@ -224,12 +230,14 @@ def check_delays(robot: Robot, scenario: Scenario) -> None:
 
 
 def load_scenario(name: str) -> Scenario:
-    """Read `configs/scenarios/<name>.yaml`.
+    """Read `configs/scenarios/<name>.yaml`; a name of old works for one release, and warns.
 
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
     """
-    path = config_path("scenarios", name)
+    if name in RENAMED:
+        logger.warning("scenario '%s' is called '%s' now; use that name.", name, RENAMED[name])
+    path = config_path("scenarios", RENAMED.get(name, name))
     scenario = load_config(Scenario, path)
     check_plausible(scenario, SCENARIO, path)
     return scenario
@@ -263,7 +271,8 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     offset = uncertain * draws.uniform(0.0, spans.center_of_mass)
     xp = array_namespace(mass)
     faults, sensing = scenario.actuation, scenario.sensing
-    together = uncontrollable_losses(robot, faults.failures) if faults.stranding else ()  # word: YAML key
+    uncontrollable = faults.stranding  # word: key of scenario files
+    together = uncontrollable_losses(robot, faults.failures) if uncontrollable else ()
     force, torque = robot.performance.force, robot.performance.torque
     push, wave, kick = scenario.push, scenario.wave, scenario.kick
     size = force * push.force * draws.uniform(push.least, 1.0)
