@@ -15,8 +15,7 @@ from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
 from fulmar_core.errors import FAILED, UnknownNameError
-from hardware_drivers.settings import MavlinkBoat, load_hardware
-from tests.benchmarks.closed_loops import Campaign, Command, measure
+from tests.benchmarks.closed_loops import Command
 
 
 @dataclass(frozen=True)
@@ -29,16 +28,22 @@ class HardwareCase:
     @property
     def robot(self) -> str:
         """Whose device it is."""
+        from hardware_drivers.settings import load_hardware
+
         return load_hardware(self.name).robot
 
     def prepared(self, _seed: int) -> contextlib.AbstractContextManager[Command]:
         """An emulator stands in for the device."""
+        from hardware_drivers.settings import MavlinkBoat, load_hardware
+
         arm = ("--arm",) if isinstance(load_hardware(self.name).driver, MavlinkBoat) else ()
         device = ("--backend", "hardware", "--hardware", self.name, "--emulate", *arm)
         return contextlib.nullcontext(Command((), device, {}))
 
     def about(self) -> dict[str, Any]:
         """The device and what drives it."""
+        from hardware_drivers.settings import load_hardware
+
         return {"hardware": self.name, "driver": load_hardware(self.name).driver.kind}
 
 
@@ -80,7 +85,8 @@ def hardware(
         typer.Option(metavar="S", min=5.0, help="Length of an episode; the task's own by default."),
     ] = None,
     jobs: Annotated[
-        int, typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each.")
+        int,
+        typer.Option(metavar="N", min=1, max=32, help="Systems beside each other, five processes each."),
     ] = 3,
     out: Annotated[
         Path | None,
@@ -91,7 +97,7 @@ def hardware(
     """Drive emulated devices to their goals, through driver and wire protocol, in real time, with the shipped policies.
 
     Each episode is `fulmar run --backend hardware --emulate` with a seed of its own. Success is that of `fulmar run`,
-    by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
+    judged by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
     With --out, a campaign that was broken off goes on where it was. The exit code is 1 where a device reaches its goal
     too rarely.
 
@@ -101,6 +107,7 @@ def hardware(
     """
     from fulmar_bringup.system import modules_of
     from fulmar_cli.extras import require
+    from tests.benchmarks.closed_loops import Campaign, measure
 
     cases = cases_of([name.strip() for name in only.split(",")] if only else None)
     for case in cases:

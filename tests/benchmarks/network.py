@@ -6,17 +6,18 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import FAILED, ConfigError
-from fulmar_evaluation.faults.two_hosts import ACROSS, Quality, two_hosts, why_not
-from tests.benchmarks.closed_loops import Campaign, Command, measure
+from tests.benchmarks.closed_loops import Command
+
+if TYPE_CHECKING:
+    from fulmar_evaluation.faults.two_hosts import Quality
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,13 @@ class NetworkCase:
     robot: str
     task: str
     quality: Quality
-    copies: int = MOST_COPIES  # of each command
+    copies: int  # of each command
 
     @contextlib.contextmanager
     def prepared(self, seed: int) -> Iterator[Command]:
         """Two hosts; the run is on one of them, its controller on the other."""
+        from fulmar_evaluation.faults.two_hosts import ACROSS, two_hosts
+
         with two_hosts(seed=seed) as hosts:
             hosts.cable.quality = self.quality
             controller = ("--controller-in", hosts.other, "--copies", str(self.copies))
@@ -77,6 +80,8 @@ def network(
     """
     from fulmar_bringup.system import modules_of
     from fulmar_cli.extras import require
+    from fulmar_evaluation.faults.two_hosts import Quality, why_not
+    from tests.benchmarks.closed_loops import Campaign, measure
 
     if why_not():
         raise ConfigError(f"{why_not()}.")

@@ -156,7 +156,7 @@ def test_full_commands_for_a_second_stay_within_its_believable_limits(robot):
 
 
 @EACH
-def test_commands_come_twice_before_the_watchdog_bites_or_at_least_once(robot):
+def test_commands_come_twice_before_the_watchdog_trips_or_at_least_once(robot):
     assert default_timeout(1.0 / robot.timing.control_hz) > 1.0 / robot.timing.control_hz
 
 

@@ -107,8 +107,8 @@ def test_a_dataset_names_the_robot_that_only_its_bag_knows(tmp_path, monkeypatch
 
 
 def test_a_dataset_that_grows_beyond_a_file_goes_on_in_the_next_one(tmp_path, monkeypatch):
-    monkeypatch.setattr("fulmar_bringup.bags.lerobot.FILE_MB", 0)
-    monkeypatch.setattr("fulmar_bringup.bags.lerobot.CHUNK", 2)
+    monkeypatch.setattr("fulmar_bags.lerobot.FILE_MB", 0)
+    monkeypatch.setattr("fulmar_bags.lerobot.CHUNK", 2)
     answer("export", POLICY, POLICY, POLICY, "--to", "lerobot", "--out", tmp_path / "set")
     data = tmp_path / "set/data"
     files = [data / "chunk-000/file-000.parquet", data / "chunk-000/file-001.parquet"]

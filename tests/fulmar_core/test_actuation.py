@@ -33,7 +33,7 @@ def course(state, steps, *, latest_s=0.0):
     return [float(state.advance(DT, latest_s=latest_s)[0, 0]) for _ in range(steps)]
 
 
-def test_without_a_response_of_its_own_an_actuator_does_at_once_what_it_is_told():
+def test_without_a_response_of_its_own_an_actuator_applies_its_command_at_once():
     state = actuation()
     state.begin(full(), NOMINAL, None)
     assert course(state, 2) == [1.0, 1.0]

@@ -68,9 +68,15 @@ def test_an_episode_is_the_same_among_few_and_among_many(robot, task, scenario):
 
 def test_progress_counts_every_control_step_once():
     robot, task = load_robot("turtlebot2"), replace(load_task("go_to_pose"), episode_s=0.4)
-    told = []
+    steps_done = []
     run = roll_out_in_batch(
-        Eager(robot, task), robot, task, load_scenario("nominal"), episodes=5, seed=1, progress=told.append
+        Eager(robot, task),
+        robot,
+        task,
+        load_scenario("nominal"),
+        episodes=5,
+        seed=1,
+        progress=steps_done.append,
     )
     assert run.x.shape == (5, 4)
-    assert told == [5, 10, 15, 20]
+    assert steps_done == [5, 10, 15, 20]

@@ -85,7 +85,7 @@ def test_a_key_is_never_overwritten_and_the_private_one_is_for_its_owner_alone(k
         make_keys(*keys)
 
 
-def test_what_is_no_key_is_told(bundle, tmp_path):
+def test_a_file_without_a_key_is_rejected(bundle, tmp_path):
     (tmp_path / "no.pem").write_text("hello")
     for call in (
         lambda: verify_bundle(read_bundle(bundle), tmp_path / "no.pem"),

@@ -1,4 +1,4 @@
-"""What was measured on one machine takes the place of what the YAML of its kind says."""
+"""Calibration: values measured on one robot take the place of those in its YAML."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_a_file_that_does_not_fit_is_refused_in_words(tmp_path, nobody, calibrat
     assert load_robot("floating_platform").body.mass == 5.32
 
 
-def test_a_mistake_in_a_file_is_told_with_its_line(tmp_path, nobody):
+def test_a_mistake_in_a_file_is_reported_with_its_line(tmp_path, nobody):
     (tmp_path / "c.yaml").write_text("robot: floating_platform\nmas: {value: 5, low: 4, high: 6}\n")
     with pytest.raises(ConfigError, match=r"c\.yaml:2: unknown key 'mas'\. Did you mean 'mass'"):
         use_calibration(tmp_path / "c.yaml", "floating_platform")

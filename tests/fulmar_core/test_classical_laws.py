@@ -149,15 +149,15 @@ def test_a_car_that_cannot_turn_so_slowly_drives_as_much_too_fast_as_it_turns_to
 
 
 @pytest.mark.parametrize("name", ["turtlebot2", "jetbot"])
-def test_a_base_at_the_wanted_velocity_is_told_to_keep_it(name):
-    told = command(ROBOTS[name], TASKS["track_velocities"], at(vx=0.3, yaw_rate=-0.5), (0.3, 0.0, -0.5))
-    assert told == pytest.approx([0.3, -0.5])
+def test_a_base_at_the_wanted_velocity_is_commanded_to_keep_it(name):
+    commanded = command(ROBOTS[name], TASKS["track_velocities"], at(vx=0.3, yaw_rate=-0.5), (0.3, 0.0, -0.5))
+    assert commanded == pytest.approx([0.3, -0.5])
 
 
 def test_a_boat_at_the_wanted_velocity_pushes_against_the_water_alone():
     u, r = 0.4, 0.2
-    told = command(BOAT, TASKS["track_velocities"], at(vx=u, yaw_rate=r), (u, 0.0, r))
-    ahead, _, moment = BOAT.actuators.planar_wrench(told, np.ones(2))
+    commanded = command(BOAT, TASKS["track_velocities"], at(vx=u, yaw_rate=r), (u, 0.0, r))
+    ahead, _, moment = BOAT.actuators.planar_wrench(commanded, np.ones(2))
     drag, _, brake = BOAT.hydrodynamics.planar_damping(np.asarray(u), np.asarray(0.0), np.asarray(r))
     assert (ahead, moment) == pytest.approx((-drag, -brake))
 
@@ -182,9 +182,9 @@ def test_the_metadata_hash_changes_with_every_gain(robot, name):
     entry = LAWS[robot.actuators.kind]
     gains = load_config(entry.gains, config_path("controllers", f"{robot.name}_{entry.law.law}"))
     task, other = TASKS["go_to_position"], replace(gains, **{name: 1.01 * getattr(gains, name)})
-    told = entry.law(robot, task, other).metadata()
-    assert told["gains"] == asdict(other)
-    assert told["sha256"] != entry.law(robot, task, gains).metadata()["sha256"]
+    metadata = entry.law(robot, task, other).metadata()
+    assert metadata["gains"] == asdict(other)
+    assert metadata["sha256"] != entry.law(robot, task, gains).metadata()["sha256"]
 
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)

@@ -97,7 +97,7 @@ def test_a_nozzle_that_the_robot_file_does_not_have_is_reported():
     assert any("as none of its nozzles would" in problem for problem in match.problems)
 
 
-def test_nozzles_of_one_force_and_torque_cannot_be_told_apart():
+def test_nozzles_of_one_force_and_torque_cannot_be_distinguished():
     robot = PLATFORMS["floating_platform"]
     assert indistinct(robot) == []
     nozzles = robot.actuators.nozzles
@@ -123,7 +123,7 @@ def test_a_side_and_its_sign_follow_from_way_and_turn(ahead, turn, side, sign):
 
 
 def test_a_base_that_still_settles_is_no_answer_of_a_dead_channel():
-    """As a Kobuki with a dead left channel did it on a busy machine."""
+    """As a Kobuki with a dead left channel did it on a busy computer."""
     sigma = np.array([1e-4, 1e-4, 1e-4])
     settles, drives = (
         Response(np.array(change), sigma) for change in ((1.1e-3, 0.0, 8.7e-3), (0.028, 0.0, 0.24))

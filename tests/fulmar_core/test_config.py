@@ -151,7 +151,7 @@ def test_exponents_without_a_dot_or_a_sign_are_numbers(read, text, value):
         ("# nothing but words\n", 1, "the file is empty"),
     ],
 )
-def test_a_mistake_is_told_with_its_file_and_line(read, tmp_path, text, line, words):
+def test_a_mistake_is_reported_with_its_file_and_line(read, tmp_path, text, line, words):
     with pytest.raises(ConfigError) as caught:
         read(text)
     assert str(caught.value).startswith(f"{tmp_path / 'file.yaml'}:{line}: ")
@@ -182,7 +182,7 @@ def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
         load_config(Everything, tmp_path)
 
 
-def test_a_union_of_dataclasses_is_told_apart_by_its_kind(tmp_path):
+def test_a_union_of_dataclasses_is_distinguished_by_its_kind(tmp_path):
     path = tmp_path / "shape.yaml"
     path.write_text("kind: round\nradius: 2\n")
     assert load_config(Round | Square, path) == Round("round", 2.0)

@@ -102,7 +102,7 @@ def test_the_observer_expects_errors_in_proportion_to_the_thrust():
     )
 
 
-def test_a_robot_that_cannot_be_watched_has_no_observer():
+def test_a_robot_without_a_health_estimate_has_no_observer():
     assert (
         gains_of(without_file(PLATFORM, hydrodynamics=BOAT.hydrodynamics, air_bearing=False)).observer is None
     )

@@ -72,16 +72,16 @@ def test_the_batch_starts_the_very_episodes_whatever_its_size(worlds):
             np.testing.assert_array_equal(getattr(mine, name), getattr(getattr(drawn, part), name))
 
 
-def test_judged_episodes_start_in_the_ring_of_the_task_and_training_reaches_the_goal():
+def test_evaluated_episodes_start_in_the_ring_of_the_task_and_training_reaches_the_goal():
     def distances(training):
         drawn = draw(range(400), training=training)
         target = drawn.goal.current
         return np.hypot(drawn.start.x - target[:, 0], drawn.start.y - target[:, 1])
 
-    judged, learned = distances(False), distances(True)
+    evaluated, learned = distances(False), distances(True)
     low, high = TASK.start.distance
-    assert low <= judged.min()
-    assert judged.max() <= high
+    assert low <= evaluated.min()
+    assert evaluated.max() <= high
     assert learned.min() < 0.2 < low  # 400 draws of [0, 5] miss [0, 0.2] with a chance of 1e-7
     assert learned.max() <= TASK.start.training_distance[1]
 

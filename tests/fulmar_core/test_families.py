@@ -130,7 +130,7 @@ def test_what_slews_has_no_lag_beside_it_but_for_the_servos_of_wheels():
         replace(PROPELLERS, response=both)
 
 
-def test_propellers_that_push_when_told_0_are_refused():
+def test_propellers_that_push_at_a_command_of_0_are_rejected():
     with pytest.raises(ValueError, match="'curve' must be 0 in its middle"):
         replace(PROPELLERS, curve=(0.0, 10.0, 20.0))
 

@@ -26,7 +26,7 @@ def at(x: float, y: float, degrees: float = 0.0):
 
 
 def drive(sequence, robot_moves_sideways: bool, *, seconds: float, start=(1.2, 0.0, 90.0), dt: float = 0.05):
-    """A robot that does at once what it is told; the places it passes, and the last goal."""
+    """A robot that applies its command at once; the places it passes, and the last goal."""
     x, y, yaw = start[0], start[1], math.radians(start[2])
     places, goal = [], None
     for step in range(int(seconds / dt)):
@@ -87,7 +87,7 @@ def test_a_pose_is_not_reached_with_another_heading():
     assert sequence.done
 
 
-def test_as_a_path_all_targets_are_told_and_passing_them_is_enough():
+def test_as_a_path_all_targets_are_published_and_passing_them_is_enough():
     sequence = goal_sequence(CORNERS, PLATFORM, as_path=True)
     assert sequence.topic == "goal_path"
     assert sequence.step(at(0.0, 0.0), 0.0).targets.shape == (2, 3)
@@ -105,8 +105,8 @@ def test_velocities_are_no_path_of_waypoints(name):
 def test_velocities_follow_the_clock_and_end_in_standstill():
     held = (HeldVelocity((0.3, 0.0, 0.0), 2.0), HeldVelocity((0.0, 0.1, 90.0), 1.0))
     sequence = goal_sequence(Velocities("velocities", "two", held), PLATFORM)
-    told = [sequence.step(at(0.0, 0.0), time_s).current for time_s in (0.0, 1.9, 2.0, 2.9)]
-    np.testing.assert_allclose(told, [[0.3, 0, 0], [0.3, 0, 0], [0, 0.1, np.pi / 2], [0, 0.1, np.pi / 2]])
+    goals = [sequence.step(at(0.0, 0.0), time_s).current for time_s in (0.0, 1.9, 2.0, 2.9)]
+    np.testing.assert_allclose(goals, [[0.3, 0, 0], [0.3, 0, 0], [0, 0.1, np.pi / 2], [0, 0.1, np.pi / 2]])
     assert not sequence.done
     assert not sequence.step(at(0.0, 0.0), 3.0).current.any()
     assert sequence.done

@@ -31,7 +31,7 @@ def test_it_adds_its_two_noises_to_the_truth():
     assert abs(np.corrcoef(forces[:, 0], turns[:, 0])[0, 1]) < 0.06  # four sigma of independent noises
 
 
-def test_without_errors_it_tells_the_truth():
+def test_without_errors_it_reports_the_truth():
     measured = begun(ImuSpec()).measure(TRUTH, 0.0)
     assert measured.specific_force.tolist() == TRUTH.specific_force.tolist()
     assert measured.angular_velocity.tolist() == TRUTH.angular_velocity.tolist()

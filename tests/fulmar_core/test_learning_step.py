@@ -94,7 +94,7 @@ def test_a_robot_that_leaves_its_block_behind_is_outside_too():
 
 
 @pytest.mark.parametrize("name", config_names("tasks"))
-def test_torch_judges_as_numpy_does(name):
+def test_torch_rewards_as_numpy_does(name):
     torch = pytest.importorskip("torch")
     task = load_task(name)
     simulation = BatchSimulation(BASE, task, load_scenario("randomised"), worlds=40, seed=2, dtype=np.float64)

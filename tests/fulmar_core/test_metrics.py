@@ -226,7 +226,7 @@ def test_success_by_the_words_of_the_thesis_looks_at_the_last_step_or_at_means()
     assert figure(trajectories(1.0, NAN, goals=1.0), "thesis_success", WAYPOINTS) == 1.0
 
 
-def test_the_beginning_of_episodes_is_judged_like_episodes():
+def test_the_beginning_of_episodes_is_evaluated_like_episodes():
     run = trajectories(first(10, 1.0, 0.0), goals=np.arange(STEPS) // 5, shares=1.0)
     cut = first_steps(run, 10)
     assert cut.shares.shape == (1, 10, 2)
@@ -273,7 +273,7 @@ def test_the_log_of_one_episode_has_the_axis_of_episodes_too():
     assert run.outside.tolist() == [[True]], "beyond the geofence of 8 m"
 
 
-def test_the_judge_counts_waypoints_by_the_tolerance_and_not_by_the_reach_of_controllers():
+def test_waypoints_count_by_the_tolerance_and_not_by_the_radius_of_controllers():
     goal = goal_at((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
     counter = TargetCounter(WAYPOINTS, goal, DT)
     between = 0.5 * (WAYPOINTS.reach + WAYPOINTS.tolerance.position)

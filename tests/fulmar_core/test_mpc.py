@@ -37,7 +37,7 @@ def test_it_holds_its_pose_against_a_force_and_without_a_valve(scenario):
 
 
 @pytest.mark.slow
-def test_dearer_gas_is_saved():
+def test_a_higher_valve_cost_opens_fewer_valves():
     saved, spent = (figures("drift_ideal", replace(GAINS, gas=gas), episodes=4) for gas in (1.0, 0.0))
     assert saved["AAS"] < 0.8 * spent["AAS"]
 

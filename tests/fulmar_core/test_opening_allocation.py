@@ -50,7 +50,7 @@ def test_the_wrench_is_that_of_the_thrusters_own_model():
     np.testing.assert_allclose(np.stack((ahead, left, moment), axis=-1), openings @ ALONE, atol=1e-12)
 
 
-def test_what_can_be_had_exactly_is_had_where_gas_costs_nothing():
+def test_a_reachable_wrench_is_exact_where_valves_cost_nothing():
     free = OpeningAllocation(THRUSTERS, weight=WEIGHT, valve_cost=0.0)
     wanted = np.random.default_rng(4).dirichlet(np.ones(9), size=20)[:, 1:] @ ALONE
     np.testing.assert_allclose(free.best(wanted) @ ALONE, wanted, atol=1e-9)

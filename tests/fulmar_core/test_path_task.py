@@ -1,4 +1,4 @@
-"""A path as a task tells and judges what the goal node tells a robot."""
+"""Path following as a task: goals as the goal node publishes them, and errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def drawn(task, worlds=6):
 
 
 @pytest.mark.parametrize("goals", PATHS)
-def test_many_robots_are_told_what_the_goal_node_tells_each(goals):
+def test_many_robots_get_the_goals_that_the_goal_node_publishes_to_each(goals):
     file = load_goals(goals)
     task = path_task(TRACK, file)
     rng = np.random.default_rng(3)
@@ -34,8 +34,8 @@ def test_many_robots_are_told_what_the_goal_node_tells_each(goals):
     nodes = [Following(file, sideways=True) for _ in range(len(state.x))]
     for step in range(150):
         for world, node in enumerate(nodes):
-            told = node.step(state[world], 0.2 * step).current
-            np.testing.assert_allclose(goal.current[world], told, atol=1e-12)
+            target = node.step(state[world], 0.2 * step).current
+            np.testing.assert_allclose(goal.current[world], target, atol=1e-12)
         speed = goal.current[:, :2]
         c, s = np.cos(state.yaw), np.sin(state.yaw)
         vx = c * speed[:, 0] - s * speed[:, 1] + rng.normal(0.0, 0.01, len(c))
@@ -52,7 +52,7 @@ def test_starts_lie_on_the_path_and_differ():
     assert not np.any(state.speed)
 
 
-def test_errors_count_against_the_velocity_that_is_wanted_here_not_the_one_told_ahead():
+def test_errors_count_against_the_velocity_that_is_wanted_here_not_the_one_published_ahead():
     task = path_task(TRACK, load_goals("drift_circle"))
     assert task.lead_s > 0.0
     state, goal = drawn(task, worlds=1)

@@ -46,7 +46,7 @@ def test_shipped_files_have_usual_values(family, name, caplog):
 
 
 @pytest.mark.parametrize(
-    ("file", "change", "told"),
+    ("file", "change", "words"),
     [
         (PLATFORM, ("radius: 0.31", "radius: 310"), r":12: 'body.radius' = 310 m .*0.03 to 6 m.*310 mm are 0.31 m"),
         (PLATFORM, ("thrust: 1.0", "thrust: 1000.0"), r"'actuators.thrust' = 1000 N .*1000 mN are 1 N"),
@@ -82,13 +82,13 @@ def test_shipped_files_have_usual_values(family, name, caplog):
     ],
     ids=lambda value: value[1] if isinstance(value, tuple) else "",
 )  # fmt: skip
-def test_a_mistake_of_unit_is_refused_with_key_value_range_and_unit(load, file, change, told):
-    with pytest.raises(ConfigError, match=told):
+def test_a_mistake_of_unit_is_refused_with_key_value_range_and_unit(load, file, change, words):
+    with pytest.raises(ConfigError, match=words):
         load(file, change)
 
 
 @pytest.mark.parametrize(
-    ("file", "change", "told"),
+    ("file", "change", "words"),
     [
         (PLATFORM, ("thrust: 1.0", "thrust: 40.0"), "'actuators.thrust' = 40 N is unusual; usual is 0.000532 to 26.6"),
         (PLATFORM, ("geofence: 8.0", "geofence: 20000"), "'limits.geofence' = 20000 m is unusual"),
@@ -97,11 +97,11 @@ def test_a_mistake_of_unit_is_refused_with_key_value_range_and_unit(load, file, 
     ],
     ids=lambda value: value[1] if isinstance(value, tuple) else "",
 )  # fmt: skip
-def test_an_unusual_value_loads_with_a_warning(load, caplog, file, change, told):
+def test_an_unusual_value_loads_with_a_warning(load, caplog, file, change, words):
     with caplog.at_level(logging.WARNING, logger="fulmar_core"):
         load(file, change)
     (message,) = caplog.messages
-    assert told in message
+    assert words in message
 
 
 def test_a_geofence_smaller_than_the_starts_of_a_task_is_refused(load):

@@ -181,7 +181,7 @@ def test_another_format_is_refused(folder):
         read_passport(folder)
 
 
-def test_a_passport_of_an_older_format_is_told_as_one_and_not_by_what_it_lacks(folder):
+def test_a_passport_of_an_older_format_is_reported_as_one_and_not_by_what_it_lacks(folder):
     (folder / PASSPORT).write_text('{"format": 1, "robot": "floating_platform"}')
     with pytest.raises(BundleError, match=f"has format 1, this Fulmar reads {FORMAT}"):
         read_passport(folder)

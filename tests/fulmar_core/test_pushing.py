@@ -228,7 +228,7 @@ def test_a_robot_sees_whether_it_stands_behind_the_block_or_beside_it(x, y, behi
     assert (seen["behind_block"][0], seen["beside_block"][0]) == pytest.approx((behind, beside), abs=1e-12)
 
 
-def test_a_judge_is_told_where_the_block_is():
+def test_a_target_counter_takes_the_pose_of_the_block():
     counter = TargetCounter(TASK, at((1.0, 0.0)), 0.1)
     moved = counter.update(body(), {"block": np.array([0.05, 0.0, 0.0])})
     assert float(TASK.errors(body(), moved).position) == pytest.approx(0.05)

@@ -44,7 +44,7 @@ class Habit:
 
 
 class Counted(MockBackend):
-    """A mock that knows how many of its kind are open, and fails when told to."""
+    """A mock that knows how many of its kind are open, and fails on request."""
 
     open = 0
     fail_at_step = fail_at_number = 10**9

@@ -1,4 +1,4 @@
-"""What begins when: at once, at a time that was told ahead, or never because something else came."""
+"""Start of goals: at once, at a time sent ahead, or never because another goal came."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_a_stamp_of_the_past_or_of_another_clock_means_at_once(stamp_ns):
     assert given(("now", stamp_ns)).at(5 * S) == "now"
 
 
-def test_things_told_ahead_begin_one_after_another():
+def test_goals_sent_ahead_begin_one_after_another():
     schedule = given(("one", 5 * S), ("two", 6 * S), ("three", 8 * S))
     assert [schedule.at(round(t * S)) for t in (5, 5.9, 6, 7.9, 8, 99)] == [
         "one", "one", "two", "two", "three", "three",

@@ -277,7 +277,7 @@ def test_a_valve_that_failed_does_nothing_and_the_others_share_the_line():
     broken = build(replace(STILL, actuation=Actuation(failures=8, failure_chance=1.0)))
     broken.step(np.ones((5, 8)))
     assert not broken.truth.vx.any()
-    assert np.all(broken.command == 1.0)  # it was told to
+    assert np.all(broken.command == 1.0)  # it was commanded to
 
 
 def test_noise_of_the_actuators_is_new_at_each_step_and_has_a_stream_of_its_own():

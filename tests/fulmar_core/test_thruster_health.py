@@ -1,4 +1,4 @@
-"""Which valves work, told from commands and odometry alone."""
+"""Thruster health from commands and odometry alone."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DT = 0.2
 WORLDS = 32
 
 
-class Watched:
+class Run:
     """Worlds whose valves open at random, one or two at a time, and an estimator that looks on."""
 
     def __init__(self, scenario, *, robot=PLATFORM, worlds=WORLDS, seed=3):
@@ -53,76 +53,76 @@ CONDITIONS = [name for name in config_names("scenarios") if name.startswith("dri
 
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_under_every_condition_of_the_benchmark_lost_valves_are_found_and_no_other_is_accused(name):
-    watched = Watched(load_scenario(name))
-    seen = watched.go(75)
-    working = np.broadcast_to(~watched.dead, seen.shape)
+    run = Run(load_scenario(name))
+    seen = run.go(75)
+    working = np.broadcast_to(~run.dead, seen.shape)
     assert seen[working].min() > 0.5
-    assert np.all(seen[-1][watched.dead] < 0.1)
-    assert np.all(watched.believed.alive == ~watched.dead)
+    assert np.all(seen[-1][run.dead] < 0.1)
+    assert np.all(run.believed.alive == ~run.dead)
 
 
 def test_a_lost_valve_is_found_with_its_first_or_second_command():
     scenario = replace(STILL, actuation=Actuation(failures=1, failure_chance=1.0))
-    watched = Watched(scenario)
-    before = watched.believed
+    run = Run(scenario)
+    before = run.believed
     for _ in range(2):
-        command = watched.dead.astype(float)
-        watched.simulation.step(command)
-        watched.believed = watched.health.see(watched.simulation.measured, command, DT)
+        command = run.dead.astype(float)
+        run.simulation.step(command)
+        run.believed = run.health.see(run.simulation.measured, command, DT)
     assert np.all(before.effectiveness > 0.9)
-    assert np.all(watched.believed.effectiveness[watched.dead] < 0.2)
-    assert np.all(watched.believed.effectiveness[~watched.dead] > 0.8)
+    assert np.all(run.believed.effectiveness[run.dead] < 0.2)
+    assert np.all(run.believed.effectiveness[~run.dead] > 0.8)
 
 
-def test_force_and_torque_from_outside_are_told_from_lost_valves():
+def test_force_and_torque_from_outside_are_distinguished_from_lost_valves():
     scenario = replace(
         STILL, push=Push(0.2, 0.16, least=1.0), actuation=Actuation(failures=2, failure_chance=1.0)
     )
-    watched = Watched(scenario)
-    watched.go(100)
-    world, push = watched.simulation.world, watched.believed.push
+    run = Run(scenario)
+    run.go(100)
+    world, push = run.simulation.world, run.believed.push
     np.testing.assert_allclose(push[:, 0], world.force_x, atol=0.06)
     np.testing.assert_allclose(push[:, 1], world.force_y, atol=0.06)
     np.testing.assert_allclose(push[:, 2], world.torque, atol=0.02)
-    assert np.all(watched.believed.alive == ~watched.dead)
+    assert np.all(run.believed.alive == ~run.dead)
 
 
 def test_a_valve_that_dies_in_the_middle_of_an_episode_is_found_and_one_that_comes_back_is_believed_again():
-    watched = Watched(STILL, worlds=4)
-    watched.go(50)
-    watched.simulation.world.alive[2] = 0.0
-    seen = watched.go(75)
+    run = Run(STILL, worlds=4)
+    run.go(50)
+    run.simulation.world.alive[2] = 0.0
+    seen = run.go(75)
     assert np.all(seen[-1][:, 2] < 0.1)
-    watched.simulation.world.alive[2] = 1.0
-    seen = watched.go(75)
+    run.simulation.world.alive[2] = 1.0
+    seen = run.go(75)
     assert np.all(seen[-1] > 0.9)
 
 
 def test_what_is_never_commanded_is_neither_accused_nor_acquitted():
-    watched = Watched(replace(STILL, push=Push(0.1, 0.0, least=1.0)), worlds=4)
+    run = Run(replace(STILL, push=Push(0.1, 0.0, least=1.0)), worlds=4)
     for _ in range(50):
-        watched.simulation.step(np.zeros((4, 8)))
-        watched.believed = watched.health.see(watched.simulation.measured, np.zeros((4, 8)), DT)
-    np.testing.assert_allclose(watched.believed.effectiveness, 1.0 - HealthSettings().failure, atol=0.01)
-    np.testing.assert_allclose(np.hypot(*watched.believed.push[:, :2].T), 0.1, atol=0.01)
+        run.simulation.step(np.zeros((4, 8)))
+        run.believed = run.health.see(run.simulation.measured, np.zeros((4, 8)), DT)
+    np.testing.assert_allclose(run.believed.effectiveness, 1.0 - HealthSettings().failure, atol=0.01)
+    np.testing.assert_allclose(np.hypot(*run.believed.push[:, :2].T), 0.1, atol=0.01)
 
 
 def test_an_uneven_floor_is_no_lost_valve():
-    watched = Watched(replace(STILL, wave=Wave(0.2, least=1.0, wave_number=(3.0, 3.0))))
-    assert watched.go(100).min() > 0.5
+    run = Run(replace(STILL, wave=Wave(0.2, least=1.0, wave_number=(3.0, 3.0))))
+    assert run.go(100).min() > 0.5
 
 
 @pytest.mark.parametrize("shared", [True, False], ids=["one pressure line", "a pressure line each"])
-def test_valves_that_open_by_degrees_are_watched_as_well(shared):
+def test_valves_that_open_by_degrees_are_estimated_as_well(shared):
     robot = ROBOTS["modular_freeflyer"]
     robot = replace(robot, actuators=replace(robot.actuators, shared_pressure=shared))
-    watched = Watched(replace(STILL, actuation=Actuation(failures=1, failure_chance=1.0)), robot=robot)
-    watched.go(60)
-    assert np.all(watched.believed.alive == ~watched.dead)
+    run = Run(replace(STILL, actuation=Actuation(failures=1, failure_chance=1.0)), robot=robot)
+    run.go(60)
+    assert np.all(run.believed.alive == ~run.dead)
 
 
-def test_one_robot_is_judged_as_in_a_batch():
-    many = Watched(load_scenario("drift_one_lost"), worlds=3)
+def test_one_robot_is_estimated_as_in_a_batch():
+    many = Run(load_scenario("drift_one_lost"), worlds=3)
     alone = ThrusterHealth(PLATFORM)
     rng = np.random.default_rng(1)
     one = None
@@ -140,11 +140,11 @@ def test_one_robot_is_judged_as_in_a_batch():
 
 
 def test_after_a_reset_nothing_of_the_past_counts():
-    watched = Watched(load_scenario("drift_two_lost"), worlds=4)
-    watched.go(60)
-    assert watched.believed.effectiveness.min() < 0.1
-    watched.health.reset()
-    fresh = watched.health.see(watched.simulation.measured, np.zeros((4, 8)), DT)
+    run = Run(load_scenario("drift_two_lost"), worlds=4)
+    run.go(60)
+    assert run.believed.effectiveness.min() < 0.1
+    run.health.reset()
+    fresh = run.health.see(run.simulation.measured, np.zeros((4, 8)), DT)
     assert fresh.effectiveness.min() > 0.9
     assert not fresh.push.any()
 
@@ -165,7 +165,7 @@ def test_robots_that_roll_or_swim_are_refused():
         ThrusterHealth(ROBOTS["kingfisher"])
 
 
-def test_suspicions_without_meaning_are_refused():
+def test_settings_without_meaning_are_refused():
     with pytest.raises(ValueError, match="greater than 0"):
         HealthSettings(velocity=0.0)
     with pytest.raises(ValueError, match="one half"):

@@ -87,7 +87,7 @@ def test_a_position_within_reach_is_done_whichever_way_one_looks():
     assert POSITIONS.advance(square(), body(0.18), 0.0).done.tolist() == [0.0]
 
 
-def test_a_judge_counts_by_the_tolerance_and_a_controller_by_its_reach():
+def test_evaluation_counts_by_the_tolerance_and_a_controller_by_its_radius():
     counter = TargetCounter(POSITIONS, square(), 0.1)
     assert counter.update(body(0.18)).done.tolist() == [1.0]
     assert POSITIONS.advance(square(), body(0.18), 0.0).done.tolist() == [0.0]
@@ -171,7 +171,7 @@ def test_gates_are_counted_step_by_step_and_once_each():
     assert goal.done.tolist() == counter.goal.done.tolist() == [1.0]
 
 
-def test_between_controller_and_post_is_a_margin_that_only_judges_count():
+def test_between_controller_and_post_is_a_margin_that_only_evaluation_counts():
     near_the_post = square(place=(-0.1, 0.36))
     assert GATES.advance(near_the_post, body(0.1, 0.36), 0.0).done.tolist() == [0.0]
     assert GATES.counted(near_the_post, body(0.1, 0.36), 0.0).done.tolist() == [1.0]
@@ -268,7 +268,7 @@ def test_targets_look_from_the_one_before_to_the_one_after(task):
 
 
 @pytest.mark.parametrize("name", ["go_through_positions", "go_through_poses"])
-def test_a_course_keeps_its_spacing_and_its_square_also_where_it_closes(name):
+def test_random_waypoints_keep_their_spacing_and_square_also_where_they_close(name):
     course = TASKS[name].course
     places = course.draw(draws())
     assert places.shape == (MANY, course.count, 2)
@@ -328,7 +328,7 @@ def test_a_track_of_fewer_corners_has_the_middles_of_its_longest_straights_too()
         np.testing.assert_allclose(places[world], expected, rtol=0, atol=1e-12)
 
 
-def test_courses_and_tracks_that_cannot_be_are_refused():
+def test_impossible_waypoints_and_tracks_are_rejected():
     with pytest.raises(ValueError, match="'count' must be at least 2"):
         WaypointCourse(1, (1.0, 2.0), 5.0)
     with pytest.raises(ValueError, match="'corners' must be"):

@@ -54,7 +54,7 @@ def test_no_other_combination_comes_nearer_to_what_is_asked_for_its_valve_cost()
     )  # the order in the table counts a little
 
 
-def test_cheaper_gas_comes_nearer_to_what_is_asked():
+def test_cheaper_valves_come_nearer_to_the_wrench():
     small = 0.2 * SHARES
     misses = [
         float(

@@ -30,17 +30,17 @@ def test_what_is_nested_too_deeply_is_refused_before_anything_is_built(read, bef
         read(before + opening * 100_000)
 
 
-def test_what_is_nested_too_deeply_is_told_with_its_line():
+def test_too_deep_nesting_is_reported_with_its_line():
     with pytest.raises(YamlError, match="nested too deeply, at most 100 levels are read") as caught:
         compose("a: 1\nb:\n  " + "- " * 1000)
     assert caught.value.line == 3
 
 
 def test_as_many_levels_as_are_allowed_are_read():
-    told = load("[" * DEEPEST + "]" * DEEPEST)
+    value = load("[" * DEEPEST + "]" * DEEPEST)
     for _ in range(DEEPEST - 1):
-        (told,) = told
-    assert told == []
+        (value,) = value
+    assert value == []
 
 
 @pytest.mark.parametrize(
@@ -56,14 +56,14 @@ def test_as_many_levels_as_are_allowed_are_read():
         ("a: \x80", 1),
     ],
 )
-def test_what_is_no_yaml_is_told_with_its_line(text, line):
+def test_invalid_yaml_is_reported_with_its_line(text, line):
     for read in (compose, load):
         with pytest.raises(YamlError) as caught:
             read(text)
         assert caught.value.line == line
 
 
-def test_what_was_begun_and_not_ended_is_told_with_the_line_where_it_began():
+def test_an_unclosed_part_is_reported_with_the_line_where_it_began():
     with pytest.raises(YamlError, match="while parsing a flow sequence of line 2"):
         compose("a: 1\nb: [1, 2\nc: 3\n")
 

@@ -42,17 +42,17 @@ def outcome_with(
     monkeypatch: pytest.MonkeyPatch, folder: Path, ends: list[Ended], lost: int = 0
 ) -> RunOutcome:
     """A short lock-stepped run whose children end otherwise, or whose plant has done more steps than it did."""
-    stop_all, heard = ProcessGroup.stop_all, Supervisor._hear
+    stop_all, receives = ProcessGroup.stop_all, Supervisor._on_diagnostics
 
-    def hear(self: Supervisor, message: DiagnosticArray) -> None:
-        heard(self, message)
+    def receive(self: Supervisor, message: DiagnosticArray) -> None:
+        receives(self, message)
         if lost:
             self.plant.values["steps"] = str(10 + lost)
 
     def stop_otherwise(self: ProcessGroup) -> list[Ended]:
         return stop_all(self) and ends
 
-    monkeypatch.setattr(Supervisor, "_hear", hear)
+    monkeypatch.setattr(Supervisor, "_on_diagnostics", receive)
     if ends:
         monkeypatch.setattr(ProcessGroup, "stop_all", stop_otherwise)
     return run_and_evaluate(

@@ -314,7 +314,7 @@ def test_an_adapter_passes_on_nothing_but_finite_commands_of_the_right_length(
     # Copies: a writer fills the same message again and again.
     node._publisher.publish = lambda message: passed.append(copy.deepcopy(message))  # type: ignore[method-assign]
     for message in data.draw(st.lists(arrays[hardware], max_size=6)):
-        node._hear(message)
+        node._receive(message)
     for command in passed:
         if isinstance(command, TwistStamped):
             values = [command.twist.linear.x, command.twist.angular.z]
@@ -354,11 +354,11 @@ def test_a_recorder_keeps_any_bytes_and_loses_none(
             spoilt = bytearray(error)
             spoilt[data[0] % len(spoilt)] = data[1]
             data = bytes(spoilt)
-        node._keep(topic)(data)
+        node._keep(topic)(data, {"source_timestamp": 1})
         count += 1
 
     hear()
-    node._keep("/diagnostics")(error)
+    node._keep("/diagnostics")(error, {"source_timestamp": 1})
     assert node.stop() == 0
     node.destroy_node()
     with next((tmp_path / "bag").glob("*.mcap")).open("rb") as stream:

@@ -50,7 +50,7 @@ from tests.ros.neighbour import NAMESPACE, Neighbour, until
         ("policy_server.controller_node", "policy:='nowhere'", "policy 'nowhere': the folder does not exist"),
         ("policy_server.controller_node", "control_hz:=10.0", "was trained at 5 Hz, but would run at 10 Hz"),
         ("hardware_drivers.driver_node", "hardware:='zero_g_lap'", "Did you mean 'zero_g_lab'?"),
-        ("hardware_drivers.driver_node", "rate:=2.0", "a real device neither waits nor hurries"),
+        ("hardware_drivers.driver_node", "rate:=2.0", "a real device runs in real time"),
         (
             "hardware_drivers.adapter_node",
             "hardware:='turtlebot2'",

@@ -86,12 +86,12 @@ def test_velocity_is_right_to_centimetres_while_poses_come_at_25_hz():
 
 
 def test_a_constant_latency_that_is_known_is_taken_off():
-    told, untold = Track(latency_s=0.1), Track(latency_s=0.0)
-    assert told.run(4.0, late_s=0.1) == 0
-    assert untold.run(4.0, late_s=0.1) > 0  # what it sees and what it feels do not go together
-    true = told.at(4.0)[0]
-    assert told.estimator.estimate().state.position_in_world[0] == pytest.approx(true, abs=0.005)
-    assert abs(untold.estimator.estimate().state.position_in_world[0] - true) > 0.02
+    known, unknown = Track(latency_s=0.1), Track(latency_s=0.0)
+    assert known.run(4.0, late_s=0.1) == 0
+    assert unknown.run(4.0, late_s=0.1) > 0  # what it sees and what it feels do not go together
+    true = known.at(4.0)[0]
+    assert known.estimator.estimate().state.position_in_world[0] == pytest.approx(true, abs=0.005)
+    assert abs(unknown.estimator.estimate().state.position_in_world[0] - true) > 0.02
 
 
 def test_poses_that_come_before_or_after_the_reading_of_their_time_give_one_and_the_same_estimate():
@@ -150,7 +150,7 @@ def test_without_an_inertial_unit_poses_alone_give_a_velocity():
     assert track.velocity()[0] == pytest.approx(0.4, abs=0.05)
 
 
-def test_nothing_is_told_before_the_velocity_is_known():
+def test_there_is_no_estimate_before_the_velocity_is_known():
     track = Track()
     assert track.estimator.estimate() is None
     track.pose(0.01)
@@ -183,7 +183,7 @@ def test_a_senseless_pose_is_refused_with_its_reason(position, quat, words):
     assert words in track.estimator.see_pose(np.array(position), np.array(quat), BEGIN)
 
 
-def test_a_jump_of_time_begins_a_new_epoch_and_is_told_once():
+def test_a_jump_of_time_begins_a_new_epoch_and_is_reported_once():
     track = Track()
     assert track.run(3.0) == 0
     stamp = BEGIN - 100_000 * MS

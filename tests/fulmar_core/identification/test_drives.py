@@ -41,9 +41,9 @@ def test_headings_do_not_jump_at_a_half_turn():
 
 
 def test_a_run_that_is_too_short_is_refused_with_what_to_do():
-    with pytest.raises(ConfigError, match=r"the longest of 1 runs has 1\.0 s; at least 4 s") as told:
+    with pytest.raises(ConfigError, match=r"the longest of 1 runs has 1\.0 s; at least 4 s") as error:
         cut([drive(np.linspace(0.0, 1.0, 50))], length_s=4.0, dt=0.02)
-    assert "--controller excite" in str(told.value)
+    assert "--controller excite" in str(error.value)
 
 
 def test_a_bag_without_commands_or_with_broken_poses_is_refused():

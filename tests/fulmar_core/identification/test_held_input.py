@@ -42,7 +42,7 @@ def test_slow_actuators_ramp_and_remember_what_came_before_a_window():
     assert applied[-1, 3] == pytest.approx(1.0)
 
 
-def test_a_staircase_as_fast_as_an_actuator_can_go_still_tells_its_delay():
+def test_a_staircase_as_fast_as_an_actuator_can_go_still_shows_its_delay():
     """Commands are limited to the slew of the actuators, so that their steps join to one ramp without a flat part."""
     switch_s, wanted = np.arange(0.0, 1.0, 0.1), 0.1 * np.arange(1.0, 11.0)
     t = np.arange(0.0, 2.0 + DT / 2, DT)

@@ -72,7 +72,7 @@ def check(found, **truth):
         assert e.low - 0.5 * width <= value <= e.high + 0.5 * width, (name, value, e)
 
 
-def test_a_ballast_tells_mass_thrust_inertia_centre_and_delays_apart(bare, heavy):
+def test_a_ballast_determines_mass_thrust_inertia_centre_and_delays(bare, heavy):
     found = identify(PLATFORM, [bare, heavy], ballasts={1: Weight(2.0, 0.002)})
     assert found.trusted
     check(
@@ -90,7 +90,7 @@ def test_a_ballast_tells_mass_thrust_inertia_centre_and_delays_apart(bare, heavy
         assert found.fit.estimates[name].value == pytest.approx(value, rel=0.03)
 
 
-def test_a_known_mass_tells_thrust_and_inertia_from_one_run(bare):
+def test_a_known_mass_determines_thrust_and_inertia_from_one_run(bare):
     found = identify(PLATFORM, [bare], known=[Known("mass", 4.9, 0.005)])
     assert found.trusted
     check(found, thrust=1.15, yaw_inertia=0.16)
@@ -98,7 +98,7 @@ def test_a_known_mass_tells_thrust_and_inertia_from_one_run(bare):
     assert (thrust.high - thrust.low) / thrust.value < 0.02
 
 
-def test_a_known_thrust_tells_the_mass(bare):
+def test_a_known_thrust_determines_the_mass(bare):
     found = identify(PLATFORM, [bare], known=[Known("thrust", 1.15, 0.002)])
     assert found.trusted
     check(found, mass=4.9, yaw_inertia=0.16)
@@ -175,9 +175,9 @@ def test_what_cannot_be_asked_is_refused_in_words(bare, robot, more, message):
         identify(load_robot(robot), [bare], **more)
 
 
-def test_a_robot_that_stood_still_tells_nothing():
+def test_a_robot_that_stood_still_determines_nothing():
     t = np.arange(0.0, 30.0, 0.02)
     rng = np.random.default_rng(0)
     still = drive_of("still", t, 1e-3 * rng.normal(size=(len(t), 2)), 0.0 * t, t[:1], np.zeros((1, 8)))
-    with pytest.raises(ConfigError, match="do not tell every quantity apart"):
+    with pytest.raises(ConfigError, match="do not distinguish every quantity"):
         identify(PLATFORM, [still], known=[Known("mass", 5.3, 0.01)])

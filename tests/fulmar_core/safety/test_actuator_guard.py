@@ -163,7 +163,7 @@ def test_wheels_slow_down_as_fast_as_they_may_when_commands_stop():
     assert guard.output(800 * MS).tolist() == [0.0, 0.0]
 
 
-def test_wheels_that_were_told_to_stop_stay_still_when_commands_stop():
+def test_wheels_that_were_commanded_to_stop_stay_still_when_commands_stop():
     guard = ActuatorGuard(WHEELS, Watchdog(200 * MS))
     guard.offer(WHEELS.names, [0.0, 0.0], 0)
     assert not guard.output(210 * MS).any()

@@ -53,17 +53,17 @@ def test_each_thing_that_is_wrong_stops_it_with_its_reason(wrong, mode, words):
 
 
 @pytest.mark.parametrize("rung", range(len(LADDER) - 1))
-def test_of_two_things_wrong_the_more_severe_is_told(rung):
+def test_of_two_problems_the_more_severe_is_reported(rung):
     upper, mode, words = LADDER[rung]
     for lower, _, _ in LADDER[rung + 1 :]:
         if "last_input_ns" in upper and "input_problem" in lower:
-            continue  # these two are told together, see below
+            continue  # these two are reported together, see below
         decision = arbitrate(replace(FINE, **{**lower, **upper}), NOW)
         assert decision.mode is mode
         assert words in decision.reason
 
 
-def test_what_is_lacking_beside_a_goal_is_told():
+def test_a_missing_input_beside_a_goal_is_reported():
     assert arbitrate(replace(FINE, has_goal=False, lacking="obstacles"), NOW).reason == "no obstacles yet"
 
 
@@ -71,7 +71,7 @@ def test_the_geofence_and_the_timeout_themselves_are_allowed():
     assert arbitrate(replace(FINE, goal_distance=8.0, last_input_ns=NOW - 400 * MS), NOW).may_act
 
 
-def test_a_stale_input_is_told_with_what_was_wrong_with_the_newest():
+def test_a_stale_input_is_reported_with_the_problem_of_the_newest():
     flags = replace(FINE, last_input_ns=NOW - 500 * MS, input_problem="odom is NaN")
     assert arbitrate(flags, NOW).reason.endswith("(odom is NaN)")
 

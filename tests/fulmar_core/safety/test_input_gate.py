@@ -99,7 +99,7 @@ SECOND = 1_000_000_000
 
 
 @pytest.mark.parametrize(("jump_s", "words"), [(-1.1, "jumped by -1.1 s"), (10.1, "jumped by +10.1 s")])
-def test_a_jump_of_time_is_told_once_and_begins_a_new_epoch(jump_s, words):
+def test_a_jump_of_time_is_reported_once_and_begins_a_new_epoch(jump_s, words):
     gate = InputGate(LIMITS)
     assert gate.problem(measurement(100 * SECOND)) is None
     there = 100 * SECOND + round(jump_s * SECOND)
@@ -140,7 +140,7 @@ def test_repetition_counts_anew_in_a_new_epoch():
     assert reasons[4] == ""
 
 
-def test_a_jump_of_place_is_told_once_and_begins_a_new_epoch():
+def test_a_jump_of_place_is_reported_once_and_begins_a_new_epoch():
     gate = InputGate(LIMITS, jump_m=1.0)
     assert gate.problem(measurement(100 * SECOND)) is None
     first = gate.problem(measurement(100 * SECOND + 20_000_000, x=500.0)) or ""

@@ -18,72 +18,60 @@ class Figure:
 
 FIGURES = {
     "final_position_error_m": Figure(
-        "final distance", "m", "Distance from the goal at the last step.", "less"
+        "final distance", "m", "Distance from the goal at the last step.", "less",
     ),
     "final_heading_error_deg": Figure(
-        "final heading error", "°", "Size of the heading error at the last step.", "less"
+        "final heading error", "°", "Size of the heading error at the last step.", "less",
     ),
     "time_to_target_s": Figure(
-        "time to target",
-        "s",
-        "Time from which the episode stays inside every tolerance until its end; an episode that does not has none.",
-        "less",
+        "time to target", "s",
+        "Time from which the episode stays inside every tolerance until its end; an episode that does not has "
+        "none.", "less",
     ),
     "first_inside_s": Figure(
-        "first inside",
-        "s",
-        "Time at which every tolerance is met for the first time, also if it is left again.",
-        "less",
+        "first inside", "s",
+        "Time at which every tolerance is met for the first time, also if it is left again.", "less",
     ),
     "inside_percent": Figure("time inside", "%", "Share of the time inside every tolerance.", "more"),
     "goals_reached": Figure(
-        "goals reached",
-        "",
+        "goals reached", "",
         "Waypoints passed within the tolerance, in their order, by the true state at the ends of control steps.",
         "more",
     ),
     "time_to_first_goal_s": Figure(
-        "time to first goal", "s", "Time at which the first waypoint is reached.", "less"
+        "time to first goal", "s", "Time at which the first waypoint is reached.", "less",
     ),
     "goals_bound": Figure(
-        "goals bound",
-        "",
+        "goals bound", "",
         "The most waypoints that physics allows in this very episode, by the bound that fits the robot, which is "
         "named beside it.",
     ),
     "share_of_bound": Figure(
-        "share of the bound",
-        "-",
-        "Goals reached over the bound of the same episode; requirements apply to its mean.",
-        "more",
+        "share of the bound", "-",
+        "Goals reached over the bound of the same episode; requirements apply to its mean.", "more",
     ),
     "goals_at_top_speed": Figure(
-        "bound at top speed",
-        "",
+        "bound at top speed", "",
         "The most waypoints if nothing but the top speed held the robot: no turning, no slew.",
     ),
     "share_at_top_speed": Figure(
-        "share of that bound", "-", "Goals reached over the bound at top speed of the same episode.", "more"
+        "share of that bound", "-", "Goals reached over the bound at top speed of the same episode.", "more",
     ),
     "velocity_error_m_s": Figure(
-        "velocity error",
-        "m/s",
-        "Length of wanted minus true velocity in the body's frame, mean over the whole episode, changes of the target "
-        "included.",
-        "less",
+        "velocity error", "m/s",
+        "Length of wanted minus true velocity in the body's frame, mean over the whole episode, changes of the "
+        "target included.", "less",
     ),
     "yaw_rate_error_deg_s": Figure(
-        "turn-rate error", "°/s", "Size of wanted minus true turn rate, mean over the whole episode.", "less"
+        "turn-rate error", "°/s", "Size of wanted minus true turn rate, mean over the whole episode.", "less",
     ),
     "settling_time_s": Figure(
-        "settling time",
-        "s",
-        "From the coming of a target until both errors stay inside the tolerance to the end of its time, mean over the "
-        "targets; one that is never held counts with all of its time.",
-        "less",
+        "settling time", "s",
+        "From the coming of a target until both errors stay inside the tolerance to the end of its time, mean "
+        "over the targets; one that is never held counts with all of its time.", "less",
     ),
     "targets_held_percent": Figure(
-        "targets held", "%", "Share of targets inside the tolerance for the whole end of their time.", "more"
+        "targets held", "%", "Share of targets inside the tolerance for the whole end of their time.", "more",
     ),
     "PT5_percent": Figure("within 5 cm", "%", "Share of the time nearer to the goal than 5 cm.", "more"),
     "PT2_percent": Figure("within 2 cm", "%", "Share of the time nearer to the goal than 2 cm.", "more"),
@@ -96,31 +84,25 @@ FIGURES = {
     "AAS": Figure("actuators in use", "-", "Mean share of actuators with a command other than zero.", "less"),
     "effort": Figure("effort", "-", "Mean share of full command, over time and actuators.", "less"),
     "control_variation": Figure(
-        "control variation",
-        "-",
-        "Sum over the actuators of the change of their shares of full command from one step to the next, mean over "
-        "time (the code of RoboRAN sums it).",
-        "less",
+        "control variation", "-",
+        "Sum over the actuators of the change of their shares of full command from one step to the next, mean "
+        "over time (the code of RoboRAN sums it).", "less",
     ),
     "control_deviation": Figure(
-        "control deviation",
-        "-",
+        "control deviation", "-",
         "Standard deviation over time of the share of full command, mean over the actuators (the words of the "
-        "thesis); at most 0.5 for a valve.",
-        "less",
+        "thesis); at most 0.5 for a valve.", "less",
     ),
     "collided": Figure("collided", "-", "Share of episodes that touched an obstacle.", "less"),
     "left_the_geofence": Figure(
-        "left the geofence", "-", "Share of episodes that were beyond the geofence at any step.", "less"
+        "left the geofence", "-", "Share of episodes that were beyond the geofence at any step.", "less",
     ),
     "thesis_success": Figure(
-        "success by the thesis' words",
-        "-",
+        "success by the thesis' words", "-",
         "Share of episodes inside the tolerances at the last step; for velocities, whose mean errors are; for "
-        "waypoints, with at least one reached.",
-        "more",
+        "waypoints, with at least one reached.", "more",
     ),
-}
+}  # fmt: skip
 
 
 SUCCESS = (

@@ -1,4 +1,4 @@
-"""What a control step is worth to a learner, and whether it ends an episode: one rule for everyone who steps worlds."""
+"""Reward of a control step and the end of an episode: one rule for everyone who steps worlds."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def learning_step(
     command: Array,
     effort: float,
 ) -> tuple[Array, Array]:
-    """TargetCounter one control step of some worlds.
+    """Reward of one control step of some worlds, and whether it ends their episodes.
 
     Args:
         robot: Says what changing its commands costs, and how far off it may be.
@@ -59,7 +59,7 @@ def learning_step(
 def observed_step(
     simulation: BatchSimulation, command: Array, *, effort: float
 ) -> tuple[Array, Array, Array]:
-    """Move a batch one control step, judge it, and look.
+    """Move a batch one control step; return its reward, ends and observation.
 
     Args:
         simulation: The worlds.

@@ -1,7 +1,7 @@
-"""How runs are judged: success, errors, times, dwell percentages, effort. `figures.FIGURES` says what each means.
+"""Metrics of runs: success, errors, times, dwell percentages, effort. `figures.FIGURES` says what each means.
 
 PT, OT, ALV, AAV and AAS are the figures of DRIFT (thesis Table 3.5) as defined in RANS `utils/eval_metrics.py`;
-success, times, velocity errors, goals and control variation are those of thesis Tables 4.5 and 4.7. All are judged
+success, times, velocity errors, goals and control variation are those of thesis Tables 4.5 and 4.7. All are computed
 from true states.
 """
 
@@ -30,17 +30,10 @@ __all__ = [
 
 
 def successes(run: Trajectories, task: Task) -> np.ndarray:
-    """Which episodes succeeded.
+    """Which episodes succeeded, shape (episodes,).
 
     An episode succeeds if it stayed inside every tolerance of the task for the whole closing window, or, where the
     task counts targets, if it reached as many as are required; and if it touched nothing on its way.
-
-    Args:
-        run: What happened.
-        task: Has the tolerances and the window.
-
-    Returns:
-        One truth value an episode, shape (episodes,).
     """
     clean = ~np.any(run.touching, axis=1)
     if task.required is not None:
@@ -55,10 +48,6 @@ def counts_targets(task: Task) -> bool:
 
 def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     """Every figure of every episode.
-
-    Args:
-        run: What happened.
-        task: Has the tolerances.
 
     Returns:
         Arrays of shape (episodes,) by the names of `figures.FIGURES`; NaN where an episode has no such figure, as the

@@ -1,4 +1,4 @@
-"""What one robot was asked to do: goal, obstacles and things, as they were received."""
+"""Mission of one robot: goal, obstacles and things as received, and goals that begin at a time of their own."""
 
 from __future__ import annotations
 
@@ -13,24 +13,15 @@ from fulmar_core.control_loop import ControlLoop
 from fulmar_core.goal import Goal, stack_goals
 from fulmar_core.planar import PlanarState
 
-LONGEST_AHEAD_NS = (
-    600_000_000_000  # a stamp further ahead is of another clock, as a person's beside a simulation's
-)
+# A stamp further ahead is of another clock, as a person's beside a simulation's.
+LONGEST_AHEAD_NS = 600_000_000_000
 SLACK_NS = 1_000  # of rounding between a sender's seconds and the plant's
 
 T = TypeVar("T")
 
 
 def begins_ns(stamp_ns: int, now_ns: int) -> int:
-    """When something begins.
-
-    Args:
-        stamp_ns: Its stamp; 0 or the past mean at once [ns].
-        now_ns: The plant's clock when it came [ns].
-
-    Returns:
-        The plant's clock when it begins [ns].
-    """
+    """Start on the plant's clock of what came at `now_ns`: its stamp, or at once where that is past or 0 [ns]."""
     return stamp_ns if now_ns < stamp_ns <= now_ns + LONGEST_AHEAD_NS else now_ns
 
 
@@ -74,12 +65,7 @@ class Mission:
     """
 
     def __init__(self, loop: ControlLoop, *, streamed: bool = False) -> None:
-        """Begin without a goal.
-
-        Args:
-            loop: Of one robot; gets a goal as soon as everything is known that its task needs.
-            streamed: Goals come with each odometry, stamped as it is, mostly the same again.
-        """
+        """Begin without a goal; `streamed`: goals come with each odometry, stamped as it is, mostly the same again."""
         self._loop, self._task, self._streamed = loop, loop.task, streamed
         self._given_goal: Goal | None = None  # as it came, without a batch axis
         # Velocities may come ahead of their time; a place counts from when it comes, whatever clock stamped it.

@@ -1,4 +1,4 @@
-"""What of an object steps change: to be copied, to be resumed from, or to be lent to another library's arrays."""
+"""The mutable state of a simulation, for copying and checkpoints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 
 class MutableState:
-    """Something that steps, and tells by name what they change: arrays, what is made of arrays, and numbers."""
+    """Something that steps; `MUTABLE` names what steps change: arrays, what is made of arrays, and numbers."""
 
     MUTABLE: ClassVar[tuple[str, ...]]
 
@@ -14,7 +14,7 @@ class MutableState:
         """Everything that steps change, by name; not copied."""
         return {name: getattr(self, name) for name in self.MUTABLE}
 
-    def take(self, moving: dict[str, Any]) -> None:
-        """Go on from what `moving` told of one that was built alike; not copied."""
+    def take(self, state: dict[str, Any]) -> None:
+        """Go on from the `mutable_state` of another one that was built alike; not copied."""
         for name in self.MUTABLE:
-            setattr(self, name, moving[name])
+            setattr(self, name, state[name])

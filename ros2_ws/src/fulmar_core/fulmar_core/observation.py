@@ -1,4 +1,4 @@
-"""The vector that a controller is fed, defined once for training, evaluation and the robot."""
+"""The observation vector of a controller, defined once for training, evaluation and the robot."""
 
 from __future__ import annotations
 
@@ -63,9 +63,6 @@ def slewed(command: Array, previous: Array, robot: Robot, control_dt: float) -> 
         previous: The one before, same shape.
         robot: Says how fast its actuators follow.
         control_dt: Time of one control step [s].
-
-    Returns:
-        Shape (..., n).
     """
     if not robot.actuators.response.slew:
         return command

@@ -129,12 +129,7 @@ def source_of(cls: type[Any]) -> Path:
 
 
 def one_line(error: BaseException, module_name: str) -> str:
-    """Type, message and place of an error in a user's module.
-
-    Args:
-        error: What was raised.
-        module_name: The module; the innermost line of its files is the place.
-    """
+    """Type, message and place of an error: the innermost line of the user's module that it came through."""
     text = " ".join(str(error).split())
     place = _place(error, module_name)
     return f"{type(error).__name__}: {text}" + (f" ({place})" if place else "")

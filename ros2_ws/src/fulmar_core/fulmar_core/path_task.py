@@ -1,4 +1,4 @@
-"""A path that is followed by velocities, as a task: what the goal node tells a robot, for many at once."""
+"""Path following as a task: velocities along a path, as the goal node publishes them, for many robots at once."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class FollowPath(TrackVelocities):
 
     @property
     def evaluated(self) -> FollowPath:
-        """What errors are told against: the velocity that counts where the robot is."""
+        """The task with the errors of evaluations: against the velocity that counts where the robot is."""
         return dataclasses.replace(self, lead_s=0.0)
 
     def __post_init__(self) -> None:
         if not self.path.closed or self.path.loops:
-            raise ValueError("a path to be judged on must be closed and have no last round (loops: 0).")
+            raise ValueError("a path for an evaluation must be closed and have no last round (loops: 0).")
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw a start at rest, anywhere on the path and with any heading."""
@@ -77,12 +77,12 @@ class FollowPath(TrackVelocities):
 
 def path_task(task: TrackVelocities, file: FollowedPath) -> FollowPath:
     """The task of following a path, with the tolerances and the observation of tracking velocities."""
-    told = {field.name: getattr(task, field.name) for field in dataclasses.fields(task)}
-    return FollowPath(**told, path=file.planner(), lead_s=file.lead_s)
+    values = {field.name: getattr(task, field.name) for field in dataclasses.fields(task)}
+    return FollowPath(**values, path=file.planner(), lead_s=file.lead_s)
 
 
 def evaluated_task(name: str, *, episode_s: float = 0.0, goals: str = "") -> Task:
-    """The task that episodes are judged by.
+    """The task that evaluates episodes.
 
     Args:
         name: As of `load_task`.
@@ -90,7 +90,7 @@ def evaluated_task(name: str, *, episode_s: float = 0.0, goals: str = "") -> Tas
         goals: Goal file whose path is followed; empty: none.
 
     Raises:
-        ConfigError: Unknown name, a goal file that is no path for ever, or a task that tracks no velocities.
+        ConfigError: Unknown name, a goal file that is no endless path, or a task that tracks no velocities.
     """
     task = load_task(name)
     if episode_s:
@@ -99,7 +99,7 @@ def evaluated_task(name: str, *, episode_s: float = 0.0, goals: str = "") -> Tas
         return task
     file = load_goals(goals)
     if not isinstance(file, FollowedPath) or not isinstance(task, TrackVelocities):
-        raise ConfigError(f"episodes are judged along paths of velocities alone; '{goals}' is none.")
+        raise ConfigError(f"episodes follow paths of velocities alone; '{goals}' is none.")
     try:
         return path_task(task, file)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Where configuration files lie, and which names they define."""
+"""Configuration files: where they lie, and which names they define."""
 
 from __future__ import annotations
 
@@ -15,9 +15,6 @@ def config_directory() -> Path:
 
     Looked for in this order: a copy beside this package (an installed wheel), an ament `share` folder (a colcon
     workspace), and a `configs` folder above (a checkout).
-
-    Returns:
-        The folder.
 
     Raises:
         ConfigError: If none of the places has a `robots` folder.
@@ -51,14 +48,7 @@ def config_directories() -> tuple[Path, ...]:
 
 
 def config_files(family: str) -> dict[str, Path]:
-    """All files of one family by their names; where two folders have a name, the first counts.
-
-    Args:
-        family: Folder below the configuration folders, such as `robots`.
-
-    Returns:
-        YAML files by their names without `.yaml`, sorted.
-    """
+    """YAML files of one family, such as `robots`, by their names, sorted; the first folder with a name counts."""
     found: dict[str, Path] = {}
     for folder in reversed(config_directories()):
         found |= {path.stem: path for path in (folder / family).glob("*.yaml")}
@@ -71,14 +61,7 @@ def config_names(family: str) -> list[str]:
 
 
 def config_path(family: str, name: str) -> Path:
-    """File that defines a name.
-
-    Args:
-        family: Folder below the configuration folders, such as `robots`.
-        name: A known name.
-
-    Returns:
-        The YAML file, printed relative to the working folder where that is shorter.
+    """File of a name in a family such as `robots`, relative to the working folder where that is shorter.
 
     Raises:
         UnknownNameError: If there is no such file.

@@ -20,12 +20,7 @@ logger.addHandler(logging.NullHandler())
 
 
 def check_plausible(config: Any, table: Sequence[Plausible], path: Path) -> None:
-    """Refuse values that no robot, task or scenario has; log a warning for those that few have.
-
-    Args:
-        config: A loaded file.
-        table: What its keys may be.
-        path: The file, for messages.
+    """Reject values that no robot, task or scenario has; log a warning for those that few have.
 
     Raises:
         ConfigError: A value lies outside of what is possible; the message starts with `file:line`.

@@ -104,10 +104,10 @@ class Bundle:
 
 
 def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passport) -> Passport:
-    """Write a bundle; hashes are filled in here.
+    """Write a bundle with its hashes; one in the same folder is replaced when the new one is complete.
 
     Args:
-        folder: Made if need be; a bundle in it is replaced when the new one is complete.
+        folder: Made if need be.
         network: ONNX model.
         golden: Vectors computed with this very model.
         passport: Its hashes are ignored.
@@ -137,13 +137,7 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
 
 
 def read_bundle(folder: Path) -> Bundle:
-    """Read every file of a bundle once and check every hash.
-
-    Args:
-        folder: The bundle.
-
-    Returns:
-        The bundle; its signature, if there is one, is not looked at.
+    """Read every file of a bundle once and check every hash; its signature, if there is one, is not checked.
 
     Raises:
         BundleError: No bundle, unreadable, of another format, or a file that is not the one it was sealed with.
@@ -184,11 +178,7 @@ def read_passport(folder: Path) -> Passport:
 
 
 def check_folder(folder: Path, known: Iterable[Path] = ()) -> None:
-    """Refuse a path that is no folder, and name the nearest bundles.
-
-    Args:
-        folder: What was given for a bundle.
-        known: Bundles to offer beside those in the same parent folder.
+    """Reject a path that is no folder, and name the nearest bundles, of `known` and of the same parent folder.
 
     Raises:
         BundleError: There is no such folder.

@@ -14,10 +14,7 @@ CONTROL_PRIORITY, PLANT_PRIORITY = 10, 20
 
 
 def take_priority(priority: int) -> bool:
-    """Put the calling thread before every ordinary one (SCHED_FIFO), where this process may.
-
-    Args:
-        priority: Among such threads, 1 to 99; the higher interrupts the lower.
+    """Put the calling thread before every ordinary one (SCHED_FIFO, 1 to 99), where this process may.
 
     Returns:
         Whether it could; without the right to it the thread keeps its place and is late when others are busy.
@@ -34,9 +31,6 @@ def take_priority_with_helpers(priority: int) -> None:
 
     Messages pass through threads of the middleware. One of them that waits for the processor holds up, with the locks
     that it holds, also who stands before every ordinary thread. The main thread only starts and ends a node.
-
-    Args:
-        priority: See `take_priority`.
     """
     try:
         threads = [int(name) for name in os.listdir("/proc/self/task")]

@@ -53,7 +53,7 @@ def _git(folder: Path, *words: str) -> str | None:
 
 
 def made_by() -> dict[str, Any]:
-    """Code, interpreter, machine and the version of every installed package, ready for JSON."""
+    """Code, interpreter, platform and the version of every installed package, ready for JSON."""
     return {
         "fulmar_version": fulmar_version(),
         "git_revision": git_revision(),
@@ -85,7 +85,7 @@ def uncommitted_changes() -> bytes:
 
 
 def attachments() -> dict[str, bytes]:
-    """Files that tell a reader of a bag the code and the packages; the patch only where there is one."""
+    """Files with the code and the packages, for a reader of a bag; the patch only where there is one."""
     patch = uncommitted_changes()
     return {
         MADE_BY: json.dumps(made_by(), indent=1).encode(),

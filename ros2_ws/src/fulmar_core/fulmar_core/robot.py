@@ -70,7 +70,7 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class Performance:
-    """What the machine can do at its best; tasks, scenarios and scores scale with it."""
+    """What the robot can do at its best; tasks, scenarios and scores scale with it."""
 
     force: float  # push in its strongest direction [N]
     torque: float  # largest yaw moment [N·m]
@@ -209,13 +209,7 @@ class Robot:
 
 
 def load_robot(name: str) -> Robot:
-    """Read `configs/robots/<name>.yaml`, and what `fulmar_core.calibration` says instead of it.
-
-    Args:
-        name: A name that `fulmar list robots` shows.
-
-    Returns:
-        The robot, as calibrated where a calibration of it is in use.
+    """Read `configs/robots/<name>.yaml`, with the calibration in use if it is for this robot.
 
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
@@ -238,14 +232,10 @@ def load_robot(name: str) -> Robot:
 
 
 def use_calibration(path: Path | None, robot: str) -> None:
-    """Let this process, and whatever it starts from now on, load a robot as calibrated.
-
-    Args:
-        path: The file; None changes nothing.
-        robot: Whom it shall be for.
+    """Let this process, and whatever it starts from now on, load a robot as calibrated; None changes nothing.
 
     Raises:
-        ConfigError: It cannot be read, is for another robot, or says what this robot does not have.
+        ConfigError: The file cannot be read, is for another robot, or has values that this robot does not have.
     """
     if path is None:
         return

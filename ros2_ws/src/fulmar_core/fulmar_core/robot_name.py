@@ -1,4 +1,4 @@
-"""What a robot is called, apart from its type: its namespace, and its frames where the two differ."""
+"""Names of robots: namespace, and frames where name and type differ."""
 
 from __future__ import annotations
 
@@ -72,10 +72,5 @@ PLAIN = Frames()
 
 
 def frames_of(name: str, robot: str) -> Frames:
-    """Frames of a robot.
-
-    Args:
-        name: What it is called.
-        robot: Its type.
-    """
+    """Frames of a robot with a name and a type."""
     return PLAIN if name == robot else Frames(f"{name}/")

@@ -1,4 +1,4 @@
-"""Closed loops without ROS: a controller in the core's batch, or in an independent simulator."""
+"""Closed loops without ROS: a controller in the core's batch, or in simulators side by side."""
 
 from __future__ import annotations
 
@@ -58,14 +58,14 @@ def batches(
     """Run some episodes of a seed in the core's own dynamics, some at once.
 
     Args:
-        controller: Whom to judge.
+        controller: The controller.
         robot: The robot.
         task: The task.
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
         worlds: How many run at once, >= 1; what happens does not depend on it.
-        progress: Told how many control steps have been done.
+        progress: Receives the number of control steps done.
 
     Yields:
         What happened, from the true states, for the next so many episodes.
@@ -105,13 +105,13 @@ def roll_out_in_backends(
     """Run some episodes of a seed, each in a backend of its own, stepped side by side.
 
     Args:
-        controller: Whom to judge.
+        controller: The controller.
         make_backend: Builds one simulator.
         task: The task.
         scenario: What episodes are drawn from.
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
-        progress: Told how many control steps have been done.
+        progress: Receives the number of control steps done.
 
     Returns:
         What happened, from the true states.

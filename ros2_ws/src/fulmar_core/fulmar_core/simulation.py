@@ -84,9 +84,7 @@ class BatchSimulation(MutableState):
         self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
         self.observer = Observer(robot, task)
-        self._xp = array_namespace(
-            xp.empty(0)
-        )  # the library itself may lack what the array standard asks for
+        self._xp = array_namespace(xp.empty(0))  # the library itself may lack parts of the array standard
         self._device, self._dtype = device, dtype or xp.float32
         self._numbers = self._whole(first + np.arange(worlds))
         self._repeats = self._whole(np.zeros(worlds))
@@ -117,25 +115,14 @@ class BatchSimulation(MutableState):
         return self.substeps * self.robot.timing.physics_dt
 
     def observe(self, worlds: np.ndarray | None = None) -> Array:
-        """What controllers see now.
-
-        Args:
-            worlds: Numbers of the worlds to look at; all by default.
-
-        Returns:
-            Shape (worlds, n).
-        """
+        """Observations of some worlds, all by default, shape (worlds, n)."""
         if worlds is None:
             return self.observer(self.measured, self.goal, self.command)
         index = self._whole(worlds)
         return self.observer(self.measured[index], self.goal[index], self.command[index])
 
     def reset(self, worlds: Sequence[int] | np.ndarray | range) -> None:
-        """Begin a new episode in some worlds.
-
-        Args:
-            worlds: Numbers of the worlds.
-        """
+        """Begin a new episode in the worlds of these numbers."""
         which = np.asarray(worlds, dtype=int)
         if which.size == 0:
             return
@@ -221,15 +208,15 @@ class BatchSimulation(MutableState):
         self._measure()
 
     def mutable_state(self) -> dict[str, Any]:
-        """As `MutableState.moving`, with what moves of actuators and odometer as dictionaries of their own."""
+        """As `MutableState.mutable_state`, with that of actuators and odometer as dictionaries of their own."""
         parts = {"_actuation": self._actuation.mutable_state(), "_odometer": self._odometer.mutable_state()}
         return super().mutable_state() | parts
 
-    def take(self, moving: dict[str, Any]) -> None:
+    def take(self, state: dict[str, Any]) -> None:
         """As `MutableState.take`."""
-        super().take(moving)
-        self._actuation.take(moving["_actuation"])
-        self._odometer.take(moving["_odometer"])
+        super().take(state)
+        self._actuation.take(state["_actuation"])
+        self._odometer.take(state["_odometer"])
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that moves, as a copy of its own that pickles."""

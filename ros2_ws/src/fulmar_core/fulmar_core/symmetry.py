@@ -1,8 +1,8 @@
-"""The mirror image of what a robot sees and does: left for right, or front for back.
+"""Mirror image of observations and commands: left for right, or front for back.
 
-A robot that is built alike on both sides may answer every situation as it would answer its mirror image, and one whose
-two ends are alike as it would if it were turned round. A policy that only ever sees one of the two learns each turn
-once, and cannot come to prefer one side or one end.
+A robot that is built alike on both sides may answer every observation as it would answer its mirror image, and one
+whose two ends are alike as it would if it were turned round. A policy that only ever sees one of the two learns each
+turn once, and cannot come to prefer one side or one end.
 """
 
 from __future__ import annotations
@@ -39,19 +39,14 @@ class Mirror:
 
     @classmethod
     def of(cls, robot: Robot, task: Task, alike: Symmetry) -> Mirror:
-        """The mirror of a robot at a task.
-
-        Args:
-            robot: The robot.
-            task: The task.
-            alike: What is exchanged: its sides, or its ends.
+        """The mirror of a robot at a task, which exchanges its sides or its ends.
 
         Raises:
             ConfigError: The two sides, or ends, of the robot differ, or they do at the task, or its goal lies at none.
         """
         names = Observer(robot, task).names
-        telling, flipped = (SIDES, _SIDEWAYS) if alike == "sides" else (ENDS, _TURNED)
-        side = next((names.index(name) for name in telling if name in names), None)
+        signs, flipped = (SIDES, _SIDEWAYS) if alike == "sides" else (ENDS, _TURNED)
+        side = next((names.index(name) for name in signs if name in names), None)
         if side is None:
             raise ConfigError(
                 f"'mirror': task '{task.name}' has no goal that lies on a side. Leave 'mirror' out."

@@ -1,4 +1,4 @@
-"""A person's hand on a robot: wishes to commands, and the dead-man switch. No ROS, no clock."""
+"""Teleoperation: a person's input to commands, and the dead-man switch. No ROS, no clock."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _valves(robot: Robot, thrusters: Thrusters) -> Callable[[Wish], np.ndarray]:
 
 
 class Keyboard:
-    """Keys that are held down, as a terminal tells them: by repeating them."""
+    """Keys that are held down: a terminal repeats them."""
 
     WISHES = {  # noqa: RUF012 - a table
         "w": ("ahead", 1.0),

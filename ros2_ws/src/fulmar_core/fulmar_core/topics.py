@@ -47,186 +47,91 @@ class Wire:
 
 
 ODOMETRY = Wire(
-    "odom",
-    "nav_msgs/msg/Odometry",
-    "plant",
-    "stream",
-    "every plant tick",
-    "measured pose and twist, stamped at measurement",
-    unit="m, m/s, rad/s",
+    "odom", "nav_msgs/msg/Odometry", "plant", "stream", "every plant tick",
+    "measured pose and twist, stamped at measurement", unit="m, m/s, rad/s",
     frame="`odom`; twist in `base_link`",
-)
+)  # fmt: skip
 IMU = Wire(
-    "imu/data",
-    "sensor_msgs/msg/Imu",
-    "plant",
-    "stream",
-    "every plant tick",
-    "specific force (+g at rest) and turn rate; no orientation",
-    unit="m/s², rad/s",
-    frame="`imu_link`",
-)
+    "imu/data", "sensor_msgs/msg/Imu", "plant", "stream", "every plant tick",
+    "specific force (+g at rest) and turn rate; no orientation", unit="m/s², rad/s", frame="`imu_link`",
+)  # fmt: skip
 MOCAP = Wire(
-    "mocap/pose",
-    "geometry_msgs/msg/PoseStamped",
-    "plant",
-    "best_effort",
+    "mocap/pose", "geometry_msgs/msg/PoseStamped", "plant", "best_effort",
     "every capture, where an estimator runs or `mocap_hz` is set",
-    "pose as motion capture reports it, Z up, stamped at capture or a constant time after",
-    unit="m",
+    "pose as motion capture reports it, Z up, stamped at capture or a constant time after", unit="m",
     frame="`odom`, `map` or `world`",
-)
+)  # fmt: skip
 TRUTH = Wire(
-    "ground_truth/odom",
-    "nav_msgs/msg/Odometry",
-    "plant",
-    "stream",
-    "every plant tick",
-    "true state of the simulator; never read by a deployed controller",
-    unit="m, m/s, rad/s",
+    "ground_truth/odom", "nav_msgs/msg/Odometry", "plant", "stream", "every plant tick",
+    "true state of the simulator; never read by a deployed controller", unit="m, m/s, rad/s",
     frame="`map`; twist in `base_link`",
-)
+)  # fmt: skip
 ACTUATORS_STATE = Wire(
-    "actuators/state",
-    "sensor_msgs/msg/JointState",
-    "plant",
-    "stream",
-    "every plant tick",
-    "command that was applied, after limits and watchdog; `effort` by actuator name",
-    unit=EFFORT_UNIT,
-)
+    "actuators/state", "sensor_msgs/msg/JointState", "plant", "stream", "every plant tick",
+    "command that was applied, after limits and watchdog; `effort` by actuator name", unit=EFFORT_UNIT,
+)  # fmt: skip
 ACTUATORS_HEALTH = Wire(
-    "actuators/health",
-    "sensor_msgs/msg/JointState",
-    "controller",
-    "stream",
+    "actuators/health", "sensor_msgs/msg/JointState", "controller", "stream",
     "control rate, from a controller that estimates it",
     "the controller's estimate of each valve's thrust; `effort` by actuator name",
     unit="share of nominal thrust, 0 to 1",
-)
+)  # fmt: skip
 CLOCK = Wire(
-    "/clock",
-    "rosgraph_msgs/msg/Clock",
-    "plant",
-    "best_effort",
-    "every plant tick, at most 200 Hz",
-    "simulated time",
-    unit="s, ns",
-)
+    "/clock", "rosgraph_msgs/msg/Clock", "plant", "best_effort", "every plant tick, at most 200 Hz",
+    "simulated time", unit="s, ns",
+)  # fmt: skip
 COMMAND = Wire(
-    "actuators/command",
-    "sensor_msgs/msg/JointState",
-    "controller",
-    "stream",
-    "control rate",
-    "`effort` by actuator name, stamped as the observation it answers",
-    unit=EFFORT_UNIT,
-)
+    "actuators/command", "sensor_msgs/msg/JointState", "controller", "stream", "control rate",
+    "`effort` by actuator name, stamped as the observation it answers", unit=EFFORT_UNIT,
+)  # fmt: skip
 OBSERVATION = Wire(
-    "controller/observation",
-    "sensor_msgs/msg/JointState",
-    "controller",
-    "stream",
-    "control rate",
+    "controller/observation", "sensor_msgs/msg/JointState", "controller", "stream", "control rate",
     "input vector of the controller; names are its terms",
-    unit="of each term, see [observations.md](observations.md)",
-    frame="of each term",
-)
+    unit="of each term, see [observations.md](observations.md)", frame="of each term",
+)  # fmt: skip
 ACTION = Wire(
-    "controller/action",
-    "sensor_msgs/msg/JointState",
-    "controller",
-    "stream",
-    "control rate",
-    "output vector of the controller, before limits",
-    unit=EFFORT_UNIT,
-)
+    "controller/action", "sensor_msgs/msg/JointState", "controller", "stream", "control rate",
+    "output vector of the controller, before limits", unit=EFFORT_UNIT,
+)  # fmt: skip
 METADATA = Wire(
-    "controller/metadata",
-    "std_msgs/msg/String",
-    "controller",
-    "latched",
-    "at load",
+    "controller/metadata", "std_msgs/msg/String", "controller", "latched", "at load",
     "JSON: name of the controller and SHA-256 of its definition",
-)
+)  # fmt: skip
 STATUS = Wire(
-    "controller/status",
-    "diagnostic_msgs/msg/DiagnosticArray",
-    "controller",
-    "latched",
+    "controller/status", "diagnostic_msgs/msg/DiagnosticArray", "controller", "latched",
     "on change and at least 2 Hz",
-    "mode, reason, ages, latencies, overruns, rejections",
-    unit="in the name of each value",
-)
+    "mode, reason, ages, latencies, overruns, rejections", unit="in the name of each value",
+)  # fmt: skip
 DIAGNOSTICS = Wire(
-    "/diagnostics",
-    "diagnostic_msgs/msg/DiagnosticArray",
-    "every node",
-    "stream",
+    "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "every node", "stream",
     "on change and at least 1 Hz",
     "health of each node: `<robot>: plant`, `<robot>: controller`, `<robot>: recorder`",
-)
+)  # fmt: skip
 GOAL_POSE = Wire(
-    "goal_pose",
-    "geometry_msgs/msg/PoseStamped",
-    "operator",
-    "latched",
-    "on demand",
-    "goal with heading, as RViz's 2D Goal Pose publishes it",
-    unit="m",
-    frame="`odom`",
-)
+    "goal_pose", "geometry_msgs/msg/PoseStamped", "operator", "latched", "on demand",
+    "goal with heading, as RViz's 2D Goal Pose publishes it", unit="m", frame="`odom`",
+)  # fmt: skip
 GOAL_POINT = Wire(
-    "goal_point",
-    "geometry_msgs/msg/PointStamped",
-    "operator",
-    "latched",
-    "on demand",
-    "goal without heading",
-    unit="m",
-    frame="`odom`",
-)
+    "goal_point", "geometry_msgs/msg/PointStamped", "operator", "latched", "on demand",
+    "goal without heading", unit="m", frame="`odom`",
+)  # fmt: skip
 GOAL_PATH = Wire(
-    "goal_path",
-    "nav_msgs/msg/Path",
-    "operator",
-    "latched",
-    "on demand",
-    "waypoints in order, repeated from the first after the last",
-    unit="m",
-    frame="`odom`",
-)
+    "goal_path", "nav_msgs/msg/Path", "operator", "latched", "on demand",
+    "waypoints in order, repeated from the first after the last", unit="m", frame="`odom`",
+)  # fmt: skip
 GOAL_POSES = Wire(
-    "goal_poses",
-    "geometry_msgs/msg/PoseArray",
-    "operator",
-    "latched",
-    "on demand",
-    "the same as `goal_path`, for publishers of PoseArray",
-    unit="m",
-    frame="`odom`",
-)
+    "goal_poses", "geometry_msgs/msg/PoseArray", "operator", "latched", "on demand",
+    "the same as `goal_path`, for publishers of PoseArray", unit="m", frame="`odom`",
+)  # fmt: skip
 GOAL_VELOCITY = Wire(
-    "goal_velocity",
-    "geometry_msgs/msg/TwistStamped",
-    "operator",
-    "latched",
-    "on demand",
-    "velocity and turn rate to track until the next one; a stamp in the future says when it begins",
-    latest=100,
-    unit="m/s, rad/s",
-    frame="`base_link`",
-)
+    "goal_velocity", "geometry_msgs/msg/TwistStamped", "operator", "latched", "on demand",
+    "velocity and turn rate to track until the next one; a stamp in the future says when it begins", latest=100,
+    unit="m/s, rad/s", frame="`base_link`",
+)  # fmt: skip
 OBSTACLES = Wire(
-    "obstacles",
-    "visualization_msgs/msg/MarkerArray",
-    "operator",
-    "latched",
-    "on demand",
-    "cylinders to avoid; `scale.x` is the diameter",
-    unit="m",
-    frame="`odom`",
-)
+    "obstacles", "visualization_msgs/msg/MarkerArray", "operator", "latched", "on demand",
+    "cylinders to avoid; `scale.x` is the diameter", unit="m", frame="`odom`",
+)  # fmt: skip
 
 
 def thing_wire(name: str) -> Wire:
@@ -245,116 +150,53 @@ def thing_wire(name: str) -> Wire:
 
 BLOCK = thing_wire("block")
 AIR_BEARING = Wire(
-    "air_bearing/state",
-    "std_msgs/msg/Bool",
-    "plant",
-    "latched",
+    "air_bearing/state", "std_msgs/msg/Bool", "plant", "latched",
     "on change and at 1 Hz, where there is an air bearing",
     "whether air flows through the bearing; the service `air_bearing/enable` switches it",
-)
+)  # fmt: skip
 DEVICE_STATE = Wire(
-    "emulator/actuators",
-    "sensor_msgs/msg/JointState",
-    "plant",
-    "stream",
+    "emulator/actuators", "sensor_msgs/msg/JointState", "plant", "stream",
     "every physics step of an emulated device",
     "actuator state inside an emulated device, also after its driver died; `effort` by actuator name",
     unit=EFFORT_UNIT,
-)
+)  # fmt: skip
 ESTOP = Wire(
-    "estop",
-    "std_msgs/msg/Bool",
-    "operator",
-    "latched",
-    "10 Hz, where there is one",
+    "estop", "std_msgs/msg/Bool", "operator", "latched", "10 Hz, where there is one",
     "true, once and from any publisher, stops the robot until a reset; so does the silence of an e-stop node",
-)
+)  # fmt: skip
 ESTOP_RELEASED = Wire(
-    "estop/released",
-    "std_msgs/msg/String",
-    "operator",
-    "stream",
-    "once per reset",
+    "estop/released", "std_msgs/msg/String", "operator", "stream", "once per reset",
     "name of the node that reset the e-stop",
-)
+)  # fmt: skip
 TELEOP = Wire(
-    "teleop/command",
-    "sensor_msgs/msg/JointState",
-    "operator",
-    "stream",
-    "20 Hz while a person drives",
+    "teleop/command", "sensor_msgs/msg/JointState", "operator", "stream", "20 Hz while a person drives",
     "a person's command, `effort` by actuator name; overrides the controller until control is given back",
     unit=EFFORT_UNIT,
-)
+)  # fmt: skip
 JOY = Wire(
-    "joy",
-    "sensor_msgs/msg/Joy",
-    "operator",
-    "stream",
-    "10 Hz and more, where there is a gamepad",
-    "axes and buttons of a gamepad, for teleoperation",
-    unit="-1 to 1",
-)
+    "joy", "sensor_msgs/msg/Joy", "operator", "stream", "10 Hz and more, where there is a gamepad",
+    "axes and buttons of a gamepad, for teleoperation", unit="-1 to 1",
+)  # fmt: skip
 SWAP = Wire(
-    "controller/swap",
-    "std_msgs/msg/String",
-    "operator",
-    "stream",
-    "on demand",
+    "controller/swap", "std_msgs/msg/String", "operator", "stream", "on demand",
     "folder of the policy bundle to load; `controller/status` reports the result",
-)
+)  # fmt: skip
 VELOCITY_COMMAND = Wire(
-    "cmd_vel",
-    "geometry_msgs/msg/TwistStamped",
-    "controller",
-    "stream",
-    "control rate",
+    "cmd_vel", "geometry_msgs/msg/TwistStamped", "controller", "stream", "control rate",
     "command of a differential drive: `linear.x` and `angular.z`, stamped as the observation it answers",
-    unit="m/s, rad/s",
-    frame="`base_link`",
-)
+    unit="m/s, rad/s", frame="`base_link`",
+)  # fmt: skip
 TRANSFORMS = Wire(
-    "/tf",
-    "tf2_msgs/msg/TFMessage",
-    "device",
-    "stream",
-    "of its publishers",
-    "frames, recorded where tf2_msgs is installed; not used for control",
-    unit="m",
-    frame="each its own",
-)
+    "/tf", "tf2_msgs/msg/TFMessage", "device", "stream", "of its publishers",
+    "frames, recorded where tf2_msgs is installed; not used for control", unit="m", frame="each its own",
+)  # fmt: skip
 
 WIRES: tuple[Wire, ...] = (
-    ODOMETRY,
-    IMU,
-    MOCAP,
-    TRUTH,
-    ACTUATORS_STATE,
-    ACTUATORS_HEALTH,
-    CLOCK,
-    COMMAND,
-    VELOCITY_COMMAND,
-    OBSERVATION,
-    ACTION,
-    METADATA,
-    STATUS,
-    DIAGNOSTICS,
-    GOAL_POSE,
-    GOAL_POINT,
-    GOAL_PATH,
-    GOAL_POSES,
-    GOAL_VELOCITY,
-    OBSTACLES,
-    BLOCK,
-    AIR_BEARING,
-    DEVICE_STATE,
-    ESTOP,
-    ESTOP_RELEASED,
-    TELEOP,
-    JOY,
-    SWAP,
+    ODOMETRY, IMU, MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
+    OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
+    GOAL_VELOCITY, OBSTACLES, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
     TRANSFORMS,
-)
+)  # fmt: skip
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}
 

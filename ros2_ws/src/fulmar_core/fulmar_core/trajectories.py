@@ -1,4 +1,4 @@
-"""What happened in some episodes, step by step, and who counts their targets."""
+"""Trajectories of episodes, step by step, and the counter of their targets."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class TrajectoryLog:
 
         Args:
             truth: True state after the step, shapes () or (episodes,).
-            goal: Goal that the judge counts at that time, same leading shape.
+            goal: Goal of a `TargetCounter` at that time, same leading shape.
             command: What was applied, shape (n,) or (episodes, n).
         """
         for name, kept in self._kept(truth, goal, command):
@@ -78,7 +78,7 @@ class TrajectoryLog:
 
         Args:
             truths: True states after the steps, each of shape ().
-            goals: Goals that the judge counted then, same.
+            goals: Goals of a `TargetCounter` then, same.
             commands: What was applied in each, shapes (n,).
         """
         each = [goals[0]] if all(goal is goals[0] for goal in goals) else goals
@@ -128,7 +128,7 @@ def _step_columns(robot: Robot, task: Task, state: PlanarState, goal: Goal) -> d
 
 
 class TargetCounter:
-    """Counts targets by the task's own tolerance, whatever the controller takes for reached."""
+    """Counts reached targets by the task's own tolerance, whatever the controller takes for reached."""
 
     def __init__(self, task: Task, goal: Goal, control_dt: float) -> None:
         self._task, self._dt, self._steps = task.evaluated, control_dt, 0

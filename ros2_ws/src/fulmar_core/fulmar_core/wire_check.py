@@ -22,7 +22,7 @@ class Offer:
 
 
 def wire_problems(wire: Wire, topic: str, offers: Iterable[Offer], *, reliable: bool) -> list[str]:
-    """Describe the publishers of a topic from which its subscribers receive nothing.
+    """Describe the publishers of a topic from which its subscribers receive nothing, one sentence each, sorted.
 
     Durability is no problem: every latched wire is subscribed volatile too, see `operator_subscription`.
 
@@ -31,9 +31,6 @@ def wire_problems(wire: Wire, topic: str, offers: Iterable[Offer], *, reliable: 
         topic: Its full name.
         offers: Its publishers.
         reliable: Whether the subscribers ask for reliable delivery.
-
-    Returns:
-        One sentence for each such publisher, sorted.
     """
     problems = set()
     for offer in offers:

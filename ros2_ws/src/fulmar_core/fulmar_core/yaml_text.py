@@ -34,7 +34,7 @@ def compose(text: str) -> Node | None:
     Raises:
         YamlError: It is none, or nested too deeply.
     """
-    with _told(text):
+    with _yaml_errors(text):
         _check_depth(text)
         root: Node | None = yaml.compose(text, Loader=_LOADER)
     return root
@@ -46,7 +46,7 @@ def load(text: str) -> Any:
     Raises:
         YamlError: It is none, nested too deeply, or a value is not what its tag says.
     """
-    with _told(text):
+    with _yaml_errors(text):
         _check_depth(text)
         loader = _LOADER(text)
         try:
@@ -78,7 +78,7 @@ def _check_depth(text: str) -> None:
 
 
 @contextmanager
-def _told(text: str) -> Iterator[None]:
+def _yaml_errors(text: str) -> Iterator[None]:
     """PyYAML's errors as `YamlError`."""
     try:
         yield

@@ -45,7 +45,6 @@ def throughput(
     fulmar benchmark throughput --robots kingfisher,turtlebot2 --json
     """
     from fulmar_cli.extras import require
-    from fulmar_core.counts import PROCESS_BYTES, WORLD_BYTES, check_count
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.paths import config_names
     from fulmar_core.robot import load_robot
@@ -58,10 +57,8 @@ def throughput(
     names = config_names("robots") if robots is None else [name.strip() for name in robots.split(",")]
     chosen = [load_robot(name) for name in names]
     the_task, the_scenario = load_task(task), load_scenario(scenario)
-    check_count("--worlds", worlds, bytes_each=WORLD_BYTES)
-    check_count("--cores", cores, bytes_each=PROCESS_BYTES)
     require("mujoco", *([] if library == "numpy" else ["torch"]))
-    _check_device(device, library)
+    _check_machine(device, library, worlds, cores)
     from fulmar_benchmarks.throughput import Library, measure
 
     with step_bar("measuring", len(chosen) * ROUNDS) as progress:
@@ -104,8 +101,12 @@ def _fastest(device: str) -> str:
     return "numpy"
 
 
-def _check_device(device: str, library: str) -> None:
-    """Reject a device that the library or this computer does not have."""
+def _check_machine(device: str, library: str, worlds: int, cores: int) -> None:
+    """Reject counts and a device that the library or this computer does not have."""
+    from fulmar_core.counts import PROCESS_BYTES, WORLD_BYTES, check_count
+
+    check_count("--worlds", worlds, bytes_each=WORLD_BYTES)
+    check_count("--cores", cores, bytes_each=PROCESS_BYTES)
     if device != "cuda":
         return
     if library != "torch":

@@ -56,6 +56,10 @@ class Law(ABC):
             raise ValueError("'speed_around' is missing, which says how fast to go among obstacles.")
         robot.timing.substeps(self.control_hz)  # refuses rates that the physics cannot keep
         self.reset()
+        self.prepare()
+
+    def prepare(self) -> None:  # noqa: B027 - most laws need no more than their gains
+        """Compute once what the commands need; raises ValueError for a robot that the law is not for."""
 
     def reset(self) -> None:  # noqa: B027 - most laws remember nothing
         """Forget what was seen."""

@@ -24,8 +24,6 @@ from fulmar_core.controllers.guidance import (
 )
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.propeller_allocation import PropellerAllocation
-from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
 
 
 @dataclass(frozen=True)
@@ -65,18 +63,11 @@ class LineOfSight(Law):
     title = "line of sight"
     gains: LineOfSightGains
 
-    def __init__(
-        self,
-        robot: Robot,
-        task: Task,
-        gains: LineOfSightGains,
-        *,
-        control_hz: float | None = None,
-        name: str | None = None,
-    ) -> None:
-        super().__init__(robot, task, gains, control_hz=control_hz, name=name)
-        assert isinstance(robot.actuators, Propellers)
-        self._allocation = PropellerAllocation(robot.actuators, least=gains.least_thrust)
+    def prepare(self) -> None:
+        """Prepare the allocation."""
+        propellers = self.robot.actuators
+        assert isinstance(propellers, Propellers)
+        self._allocation = PropellerAllocation(propellers, least=self.gains.least_thrust)
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Propeller commands; shapes as in `Controller.act`."""

@@ -26,7 +26,6 @@ from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.health.filters import HealthSettings
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
 
 
 @dataclass(frozen=True)
@@ -129,28 +128,13 @@ class Lqr(Law):
     law = "lqr"
     title = "LQR"
 
-    def __init__(
-        self,
-        robot: Robot,
-        task: Task,
-        gains: LqrWeights,
-        *,
-        control_hz: float | None = None,
-        name: str | None = None,
-    ) -> None:
-        """Solve for the gain and list the valve combinations.
+    gains: LqrWeights
 
-        Args:
-            robot: A planar robot with thrusters.
-            task: A task of poses, positions or velocities.
-            gains: What errors and efforts cost.
-            control_hz: Command rate; the robot's own by default [Hz].
-            name: Under which it was chosen.
-        """
-        super().__init__(robot, task, gains, control_hz=control_hz, name=name)
+    def prepare(self) -> None:
+        """Solve for the gain and list the valve combinations."""
+        robot, gains = self.robot, self.gains
         if not isinstance(robot.actuators, Thrusters):
             raise ValueError("the LQR allocates valves; this robot has none.")
-        self._weights = gains
         self._most_turn = np.deg2rad(gains.heading_error_limit_deg)
         dt = 1.0 / self.control_hz
         a, b = linear_model(robot, dt)
@@ -181,15 +165,13 @@ class Lqr(Law):
         """Choose valves; shapes as in `Controller.act`."""
         now = self.frame.body_state(inputs)
         far = np.minimum(np.hypot(*now.goal) / FAR, 1.0) ** 2
-        dearer = (
-            far * self._weights.open_valve_far / self.control_hz if self._weights.open_valve_far else None
-        )
+        dearer = far * self.gains.open_valve_far / self.control_hz if self.gains.open_valve_far else None
         return self._steady(np.asarray(self.allocation.best(self.wanted(inputs, now), now.alive, dearer)))
 
     def _steady(self, command: np.ndarray) -> np.ndarray:
         """What was chosen last, until valves have had the time to open and close."""
         self._age_s += 1.0 / self.control_hz
-        hasty = self.robot.actuators.binary and self._age_s < self._weights.least_open_s - 1e-6
+        hasty = self.robot.actuators.binary and self._age_s < self.gains.least_open_s - 1e-6
         if self._last is None or self._last.shape != command.shape or not hasty:
             self._last, self._age_s = command, 0.0
         return np.asarray(self._last)
@@ -216,10 +198,10 @@ class Lqr(Law):
             return np.asarray(np.stack(now.motion, axis=-1) - inputs.goal.current)
         to_goal = np.stack(self._aim(inputs, now), axis=-1)
         distance = np.sqrt((to_goal * to_goal).sum(axis=-1, keepdims=True))
-        limit = self._weights.position_error_limit * self.share_of_speed
-        if self._weights.braking:
+        limit = self.gains.position_error_limit * self.share_of_speed
+        if self.gains.braking:
             brake = self.authority.along(-to_goal / np.maximum(distance, 1e-9), now.push[..., :2])[..., None]
-            fastest = np.sqrt(2.0 * self._weights.braking * brake / self.robot.body.mass * distance)
+            fastest = np.sqrt(2.0 * self.gains.braking * brake / self.robot.body.mass * distance)
             limit = np.minimum(limit, self.lead * fastest) + 1e-9
         parts = [-to_goal * (limit / np.maximum(distance, limit))]
         if self.frame.heads:
@@ -240,7 +222,7 @@ class Lqr(Law):
             dx, dy = self.frame.next_leg(inputs)
             far, leg = np.maximum(np.hypot(x, y), 1e-6), np.maximum(np.hypot(dx, dy), 1e-6)
             onward = np.maximum((x * dx + y * dy) / (far * leg), 0.0)
-            longer = 1.0 + self._weights.overshoot * onward / far
+            longer = 1.0 + self.gains.overshoot * onward / far
             return x * longer, y * longer
         return x, y
 

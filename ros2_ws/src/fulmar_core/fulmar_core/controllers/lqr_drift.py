@@ -42,9 +42,7 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import regulator
-from fulmar_core.robot import Robot
 from fulmar_core.rotation import wrap_angle
-from fulmar_core.tasks import Task
 
 STEP, LEAST_STEP = 0.01, 1e-3  # differences of states, relative and at least; inputs: STEP
 SHORT = np.sqrt(0.5)  # of the negative difference of inputs
@@ -72,19 +70,13 @@ class LqrDrift(Law):
     law = "lqr_drift"
     title = "DRIFT's published LQR"
 
-    def __init__(
-        self,
-        robot: Robot,
-        task: Task,
-        gains: DriftWeights,
-        *,
-        control_hz: float | None = None,
-        name: str | None = None,
-    ) -> None:
-        super().__init__(robot, task, gains, control_hz=control_hz, name=name)
-        if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
+    gains: DriftWeights
+
+    def prepare(self) -> None:
+        """Check the valves."""
+        if not isinstance(self.robot.actuators, Thrusters) or self.robot.actuators.continuous:
             raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")
-        self._valves, self._weights = robot.actuators, gains
+        self._valves = self.robot.actuators
         self._known: dict[tuple[int, int], np.ndarray] = {}
 
     def reset(self) -> None:
@@ -114,10 +106,10 @@ class LqrDrift(Law):
 
     def _valves_of(self, inputs: np.ndarray) -> np.ndarray:
         """Numbers to valves, shape (..., n)."""
-        inputs = np.where(np.abs(inputs) < self._weights.threshold, 0.0, inputs)
+        inputs = np.where(np.abs(inputs) < self.gains.threshold, 0.0, inputs)
         low, high = np.min(inputs, axis=-1, keepdims=True), np.max(inputs, axis=-1, keepdims=True)
         share = (inputs - low) / np.where(high > low, high - low, 1.0)
-        return np.where(high != 0.0, np.round(share - self._weights.bias), 0.0)
+        return np.where(high != 0.0, np.round(share - self.gains.bias), 0.0)
 
     def _unwound(self, yaw: np.ndarray) -> np.ndarray:
         """A heading that does not jump, shape (...,) [rad]."""
@@ -136,8 +128,8 @@ class LqrDrift(Law):
         """Gain for a heading and a turn rate, in the steps within which they count as the same."""
         if (heading, rate) not in self._known:
             a, b = self.model(heading * SAME_HEADING, rate * SAME_RATE)
-            r = self._weights.input * np.eye(b.shape[1])
-            self._known[heading, rate] = regulator(a, b, np.diag(self._weights.states), r).gain
+            r = self.gains.input * np.eye(b.shape[1])
+            self._known[heading, rate] = regulator(a, b, np.diag(self.gains.states), r).gain
         return self._known[heading, rate]
 
     def model(self, yaw: float, rate: float) -> tuple[np.ndarray, np.ndarray]:

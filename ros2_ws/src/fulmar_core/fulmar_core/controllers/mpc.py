@@ -20,8 +20,6 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.controllers.valve_allocation import ValveAllocation
-from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
 
 
 @dataclass(frozen=True)
@@ -52,21 +50,16 @@ class Mpc(Law):
     law = "mpc"
     title = "predictive control over valves"
 
-    def __init__(
-        self,
-        robot: Robot,
-        task: Task,
-        gains: MpcGains,
-        *,
-        control_hz: float | None = None,
-        name: str | None = None,
-    ) -> None:
-        super().__init__(robot, task, gains, control_hz=control_hz, name=name)
+    gains: MpcGains
+
+    def prepare(self) -> None:
+        """Build the model."""
+        robot, gains = self.robot, self.gains
         if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
             raise ValueError("the MPC opens and closes valves; this robot has none of that kind.")
         base = LqrWeights(**{field.name: getattr(gains, field.name) for field in fields(LqrWeights)})
-        self._base = Lqr(robot, task, base, control_hz=self.control_hz)
-        self.estimator, self._gains, self._valves = gains.observer, gains, robot.actuators
+        self._base = Lqr(robot, self.task, base, control_hz=self.control_hz)
+        self.estimator = gains.observer
         self._mass, self._inertia = robot.body.mass, robot.body.inertia[2]
         self._dt = dt = 1.0 / self.control_hz
         steps = robot.timing.substeps(self.control_hz)
@@ -93,7 +86,7 @@ class Mpc(Law):
 
         Vectors in the plane are complex numbers, and the frame is the target's: rotations are products.
         """
-        leading, rows, g = now.turn.shape, now.turn.size, self._gains
+        leading, rows, g = now.turn.shape, now.turn.size, self.gains
         spots = np.arange(rows)
         yaw = -now.turn.reshape(rows)
         turned = np.exp(1j * yaw)
@@ -151,12 +144,12 @@ class Mpc(Law):
         """Deceleration that valves and push allow on the straight way to the goal, twice [m/s²]."""
         away = place * np.conj(turned) / np.maximum(np.abs(place), 1e-9)
         authority = self._base.authority.along(np.stack((away.real, away.imag), axis=-1), push[:, :2])
-        return np.asarray(2.0 * self._gains.braking * authority / self._mass)
+        return np.asarray(2.0 * self.gains.braking * authority / self._mass)
 
     def _cut(self, place: np.ndarray, brakes: np.ndarray) -> np.ndarray:
         """Errors of place as the LQR counts them."""
         distance = np.abs(place) + 1e-9
-        limit = np.minimum(self._gains.position_error_limit, self._base.lead * np.sqrt(brakes * distance))
+        limit = np.minimum(self.gains.position_error_limit, self._base.lead * np.sqrt(brakes * distance))
         return np.asarray(place * np.minimum(1.0, limit / distance))
 
     def _wanted(

@@ -1,9 +1,11 @@
-"""Reference paths in the plane, each told by a few sizes.
+"""Reference paths in the plane, each given by a few sizes.
 
-The explicit table of paths. A new path is one class and one line in each of the two places below.
+The explicit table of paths. A new path is one class and one line below.
 """
 
 from __future__ import annotations
+
+from typing import get_args, get_type_hints
 
 from fulmar_core.references.curves import (
     BernoulliLemniscate,
@@ -35,17 +37,4 @@ ReferencePath = (
     | RaceTrack
 )
 
-PATHS: dict[str, type[ReferencePath]] = {
-    "circle": Circle,
-    "square": Square,
-    "infinite_square": InfiniteSquare,
-    "spiral": Spiral,
-    "bernoulli_lemniscate": BernoulliLemniscate,
-    "gerono_lemniscate": GeronoLemniscate,
-    "lissajous": Lissajous,
-    "hippopede": Hippopede,
-    "hypotrochoid": Hypotrochoid,
-    "ngon": Ngon,
-    "sine": Sine,
-    "race_track": RaceTrack,
-}
+PATHS = {get_args(get_type_hints(path)["kind"])[0]: path for path in get_args(ReferencePath)}

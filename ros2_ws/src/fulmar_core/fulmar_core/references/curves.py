@@ -12,9 +12,9 @@ import numpy as np
 from fulmar_core.references.spacing import (
     LARGEST,
     MOST_TURNS,
+    Curve,
     Point,
-    along_corners,
-    along_curve,
+    Polygon,
     few,
     on_circle,
     positive,
@@ -22,25 +22,23 @@ from fulmar_core.references.spacing import (
 
 
 @dataclass(frozen=True)
-class Circle:
+class Circle(Curve):
     """Counter-clockwise from its easternmost point: x = r cos t, y = r sin t."""
 
     kind: Literal["circle"]
     radius: float  # [m]
     centre: Point = (0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(radius=self.radius)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
-        return along_curve(lambda t: self.radius * on_circle(t), count, closed=True, centre=self.centre)
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
+        return self.radius * on_circle(t)
 
 
 @dataclass(frozen=True)
-class Spiral:
+class Spiral(Curve):
     """Archimedean spiral: the radius grows evenly with the angle (Lawrence, "A Catalog of Special Plane Curves")."""
 
     kind: Literal["spiral"]
@@ -61,37 +59,30 @@ class Spiral:
         if self.start_radius == self.end_radius:
             raise ValueError("'start_radius' and 'end_radius' must differ; kind 'circle' has one radius.")
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
-
-        def curve(t: np.ndarray) -> np.ndarray:
-            radius = self.start_radius + (self.end_radius - self.start_radius) * t
-            return np.asarray(radius[:, None] * on_circle(self.turns * t))
-
-        return along_curve(curve, count, closed=False, centre=self.centre)
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
+        radius = self.start_radius + (self.end_radius - self.start_radius) * t
+        return np.asarray(radius[:, None] * on_circle(self.turns * t))
 
 
 @dataclass(frozen=True)
-class Square:
+class Square(Polygon):
     """Counter-clockwise from its lower left corner."""
 
     kind: Literal["square"]
     side: float  # [m]
     centre: Point = (0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(side=self.side)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_corners`."""
-        corners = 0.5 * self.side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        return along_corners(corners, count, closed=True, centre=self.centre)
+    def vertices(self) -> np.ndarray:
+        """See `Polygon.vertices`."""
+        return np.asarray(0.5 * self.side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]))
 
 
 @dataclass(frozen=True)
-class InfiniteSquare:
+class InfiniteSquare(Polygon):
     """Two squares that share a corner at the centre, driven as a figure of eight.
 
     One lies to the upper right and is driven counter-clockwise, the other to the lower left and clockwise, so the
@@ -102,20 +93,18 @@ class InfiniteSquare:
     side: float  # of each square [m]
     centre: Point = (0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(side=self.side)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_corners`."""
+    def vertices(self) -> np.ndarray:
+        """See `Polygon.vertices`."""
         right = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
         left = [[0.0, 0.0], [0.0, -1.0], [-1.0, -1.0], [-1.0, 0.0]]
-        return along_corners(self.side * np.array(right + left), count, closed=True, centre=self.centre)
+        return np.asarray(self.side * np.array(right + left))
 
 
 @dataclass(frozen=True)
-class Ngon:
+class Ngon(Polygon):
     """Regular polygon, counter-clockwise from a corner due east."""
 
     kind: Literal["ngon"]
@@ -123,69 +112,54 @@ class Ngon:
     radius: float  # of the circle through the corners [m]
     centre: Point = (0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(radius=self.radius)
         if self.corners < 3:
             raise ValueError("'corners' must be 3 or more.")
         few(corners=self.corners)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_corners`."""
-        corners = self.radius * on_circle(np.arange(self.corners) / self.corners)
-        return along_corners(corners, count, closed=True, centre=self.centre)
+    def vertices(self) -> np.ndarray:
+        """See `Polygon.vertices`."""
+        return np.asarray(self.radius * on_circle(np.arange(self.corners) / self.corners))
 
 
 @dataclass(frozen=True)
-class BernoulliLemniscate:
+class BernoulliLemniscate(Curve):
     """(x² + y²)² = a² (x² - y²): x = a cos t / (1 + sin² t), y = x sin t."""
 
     kind: Literal["bernoulli_lemniscate"]
     half_width: float  # a: from the centre to the far end of a loop [m]
     centre: Point = (0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(half_width=self.half_width)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
-
-        def curve(t: np.ndarray) -> np.ndarray:
-            cos, sin = on_circle(t).T
-            x = self.half_width * cos / (1.0 + sin * sin)
-            return np.stack((x, x * sin), axis=1)
-
-        return along_curve(curve, count, closed=True, centre=self.centre)
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
+        cos, sin = on_circle(t).T
+        x = self.half_width * cos / (1.0 + sin * sin)
+        return np.stack((x, x * sin), axis=1)
 
 
 @dataclass(frozen=True)
-class GeronoLemniscate:
+class GeronoLemniscate(Curve):
     """x⁴ = a² (x² - y²): x = a cos t, y = a sin t cos t; half as high as it is wide."""
 
     kind: Literal["gerono_lemniscate"]
     half_width: float  # a [m]
     centre: Point = (0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(half_width=self.half_width)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
-
-        def curve(t: np.ndarray) -> np.ndarray:
-            cos, sin = on_circle(t).T
-            return self.half_width * np.stack((cos, sin * cos), axis=1)
-
-        return along_curve(curve, count, closed=True, centre=self.centre)
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
+        cos, sin = on_circle(t).T
+        return self.half_width * np.stack((cos, sin * cos), axis=1)
 
 
 @dataclass(frozen=True)
-class Hippopede:
+class Hippopede(Curve):
     """Horse fetter: r² = 4 b (a - b sin² θ), an oval with a waist where a < 2 b.
 
     Its half width is 2 √(a b), its half height 2 √(b (a - b)).
@@ -196,26 +170,20 @@ class Hippopede:
     b: float  # smaller than a [m]
     centre: Point = (0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(b=self.b)
         if self.a <= self.b:
             raise ValueError("'a' must be greater than 'b', or the curve falls into two loops.")
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
-
-        def curve(t: np.ndarray) -> np.ndarray:
-            direction = on_circle(t)
-            radius = np.sqrt(4.0 * self.b * (self.a - self.b * direction[:, 1:] ** 2))
-            return np.asarray(radius * direction)
-
-        return along_curve(curve, count, closed=True, centre=self.centre)
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
+        direction = on_circle(t)
+        radius = np.sqrt(4.0 * self.b * (self.a - self.b * direction[:, 1:] ** 2))
+        return np.asarray(radius * direction)
 
 
 @dataclass(frozen=True)
-class Lissajous:
+class Lissajous(Curve):
     """x = A sin(m t + φ), y = B sin(n t) (Lawrence, "A Catalog of Special Plane Curves")."""
 
     kind: Literal["lissajous"]
@@ -225,8 +193,6 @@ class Lissajous:
     y_cycles: int  # n
     phase_deg: float = 90.0  # φ [deg]
     centre: Point = (0.0, 0.0)
-
-    closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         positive(
@@ -256,18 +222,14 @@ class Lissajous:
                 return True
         return False
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
-
-        def curve(t: np.ndarray) -> np.ndarray:
-            x = self.half_width * on_circle(self.x_cycles * t + self.phase_deg / 360.0)[:, 1]
-            return np.stack((x, self.half_height * on_circle(self.y_cycles * t)[:, 1]), axis=1)
-
-        return along_curve(curve, count, closed=True, centre=self.centre)
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
+        x = self.half_width * on_circle(self.x_cycles * t + self.phase_deg / 360.0)[:, 1]
+        return np.stack((x, self.half_height * on_circle(self.y_cycles * t)[:, 1]), axis=1)
 
 
 @dataclass(frozen=True)
-class Hypotrochoid:
+class Hypotrochoid(Curve):
     """Drawn by a pen on a wheel that rolls inside a ring (Lawrence, "A Catalog of Special Plane Curves").
 
     x = (R - r) cos t + d cos((R - r) t / r), y = (R - r) sin t - d sin((R - r) t / r).
@@ -278,8 +240,6 @@ class Hypotrochoid:
     wheel_radius: float  # r [m]
     pen_distance: float  # d, from the wheel's axle [m]
     centre: Point = (0.0, 0.0)
-
-    closed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         positive(ring_radius=self.ring_radius, wheel_radius=self.wheel_radius, pen_distance=self.pen_distance)
@@ -296,19 +256,15 @@ class Hypotrochoid:
         """Wheel over ring; the numerator is the number of turns until the curve closes."""
         return Fraction(self.wheel_radius / self.ring_radius).limit_denominator(MOST_TURNS)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
         turns, teeth = self._ratio.numerator, self._ratio.denominator
-
-        def curve(t: np.ndarray) -> np.ndarray:
-            axle = (self.ring_radius - self.wheel_radius) * on_circle(turns * t)
-            return axle + self.pen_distance * on_circle((turns - teeth) * t)
-
-        return along_curve(curve, count, closed=True, centre=self.centre)
+        axle = (self.ring_radius - self.wheel_radius) * on_circle(turns * t)
+        return axle + self.pen_distance * on_circle((turns - teeth) * t)
 
 
 @dataclass(frozen=True)
-class Sine:
+class Sine(Curve):
     """Wave along x, left to right, with its middle at the centre: y = A sin(2 π n s), 0 <= s <= 1."""
 
     kind: Literal["sine"]
@@ -323,11 +279,7 @@ class Sine:
         positive(length=self.length, amplitude=self.amplitude, cycles=self.cycles)
         few(cycles=self.cycles)
 
-    def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
-
-        def curve(t: np.ndarray) -> np.ndarray:
-            y = self.amplitude * on_circle(self.cycles * t)[:, 1]
-            return np.stack((self.length * (t - 0.5), y), axis=1)
-
-        return along_curve(curve, count, closed=False, centre=self.centre)
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `Curve.at`."""
+        y = self.amplitude * on_circle(self.cycles * t)[:, 1]
+        return np.stack((self.length * (t - 0.5), y), axis=1)

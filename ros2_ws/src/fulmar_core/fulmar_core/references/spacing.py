@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 
@@ -64,14 +65,39 @@ def along_curve(
     return np.asarray(curve(at) + np.array(centre))
 
 
-def along_corners(corners: np.ndarray, count: int, *, closed: bool, centre: Point) -> np.ndarray:
-    """Spread points over straight lines between corners, shape (n, 2); otherwise as `along_curve`."""
-    if closed:
+class Curve:
+    """A reference path along a smooth curve, closed unless it says otherwise."""
+
+    centre: Point
+    closed: ClassVar[bool] = True
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Positions (n, 2) about the origin for parameters (n,) from 0 to 1 [m]."""
+        raise NotImplementedError
+
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
+        return along_curve(self.at, count, closed=self.closed, centre=self.centre)
+
+
+class Polygon:
+    """A closed reference path along straight lines."""
+
+    centre: Point
+    closed: ClassVar[bool] = True
+
+    def vertices(self) -> np.ndarray:
+        """Corners about the origin, shape (n, 2) [m]."""
+        raise NotImplementedError
+
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 2) [m]."""
+        corners = self.vertices()
         corners = np.concatenate((corners, corners[:1]))
-    walked = _walked(corners)
-    at = _stations(walked[-1], count, closed)
-    points = np.stack([np.interp(at, walked, corners[:, i]) for i in (0, 1)], axis=1)
-    return np.asarray(points + np.array(centre))
+        walked = _walked(corners)
+        at = _stations(walked[-1], count, closed=True)
+        points = np.stack([np.interp(at, walked, corners[:, i]) for i in (0, 1)], axis=1)
+        return np.asarray(points + np.array(self.centre))
 
 
 def on_circle(turns: np.ndarray) -> np.ndarray:

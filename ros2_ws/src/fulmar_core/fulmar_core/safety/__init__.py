@@ -1,1 +1,1 @@
-"""Safety: pure state machines with injected time, the last word before anything moves."""
+"""Safety: pure state machines with injected time, the last check before anything moves."""

@@ -1,4 +1,4 @@
-"""The last word before actuators: who commands, names, values, limits, slew, watchdog and e-stop in one place."""
+"""Last check before the actuators: publisher, names, values, limits, slew, watchdog and e-stop in one place."""
 
 from __future__ import annotations
 
@@ -12,12 +12,8 @@ from fulmar_core.safety.command_gate import CommandPublishers, command_problem, 
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
 
-LAST_WORDS_NS = (
-    200_000_000  # so long after a person gave back, safe commands by hand may still have been under way
-)
-LEFTOVERS_NS = (
-    2_000_000_000  # so long after the last command, one that is older may still come out of a queue
-)
+LAST_WORDS_NS = 200_000_000  # so long after a person gave back, safe commands by hand may be under way
+LEFTOVERS_NS = 2_000_000_000  # so long after the last command, an older one may come out of a queue
 
 
 class ActuatorGuard:

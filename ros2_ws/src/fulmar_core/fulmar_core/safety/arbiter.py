@@ -1,4 +1,4 @@
-"""Whether a controller may act now: one pure function, most severe reason first."""
+"""Arbiter: whether a controller may act now; one pure function, most severe reason first."""
 
 from __future__ import annotations
 
@@ -49,15 +49,7 @@ class Decision:
 
 
 def arbitrate(flags: Flags, now_ns: int) -> Decision:
-    """Decide for one instant.
-
-    Args:
-        flags: What is known.
-        now_ns: Steady clock [ns].
-
-    Returns:
-        The decision; anything but ACTIVE means the safe command.
-    """
+    """Decide for one instant of the steady clock [ns]; anything but ACTIVE means the safe command."""
     if flags.latched_fault:
         return Decision(Mode.FAULT, False, flags.latched_fault)
     if not flags.configured:

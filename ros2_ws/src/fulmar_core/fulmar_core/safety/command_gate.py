@@ -12,15 +12,7 @@ REJECTIONS_TO_LATCH = 3
 
 
 def command_problem(command: np.ndarray, shape: tuple[int, ...]) -> str | None:
-    """What is wrong with the commands of one robot or of many.
-
-    Args:
-        command: Any array.
-        shape: The one that it must have; actuators along the last axis.
-
-    Returns:
-        A reason for people, or None if it may be limited and applied.
-    """
+    """Reason why commands cannot be applied; None if they can. Actuators lie along the last axis of `shape`."""
     if command.shape != shape:
         return f"command has shape {command.shape}, must be {shape}"
     if not np.isfinite(command).all():
@@ -47,14 +39,7 @@ class Rejections:
         self._in_a_row, self._to_latch = 0, to_latch
 
     def note(self, reason: str | None) -> str | None:
-        """Note the verdict on one command.
-
-        Args:
-            reason: Why it was refused, or None if it was not.
-
-        Returns:
-            The fault to latch, or None.
-        """
+        """Count a command that was refused for a reason, or accepted (None); returns the fault to latch, or None."""
         if reason is None:
             self._in_a_row = 0
             return None

@@ -1,4 +1,4 @@
-"""The emergency stop: the button that one node owns, and the rules of every node that obeys it. No clock, no ROS.
+"""Emergency stop: the button that one node owns, and the monitor of every node that obeys it. No clock, no ROS.
 
 A press latches until a reset. An e-stop node that falls silent counts as pressed.
 """
@@ -87,20 +87,11 @@ class EstopButton:
         self.pressed = True
 
     def receive_command(self, source: str, zero: bool, now_ns: int) -> None:
-        """Note a command.
-
-        Args:
-            source: The wire that it came on.
-            zero: Whether it moves nothing.
-            now_ns: Steady clock [ns].
-        """
+        """Note a command on a topic at a time of the steady clock [ns], and whether it is zero and moves nothing."""
         self._moving[source] = now_ns, not zero
 
     def reset(self, now_ns: int) -> str:
-        """Release it, unless somebody commands motion, which would begin at once.
-
-        Args:
-            now_ns: Steady clock [ns].
+        """Release it at a time of the steady clock [ns], unless a command moves the robot, which would begin at once.
 
         Returns:
             Why it stays pressed; empty if it is released.

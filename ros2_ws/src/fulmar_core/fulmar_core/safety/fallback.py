@@ -25,7 +25,7 @@ WARM_UP = 20  # the first inferences are slow; they happen before anything moves
 
 @dataclass(frozen=True)
 class Standby:
-    """One controller with its identity."""
+    """A controller that is ready to act at the next step: loaded, checked and warm."""
 
     controller: Controller
     metadata: str  # JSON, ready to publish
@@ -35,13 +35,7 @@ class Standby:
 def warm_up(
     controller: Controller, robot: Robot, task: Task, *, said: dict[str, Any] | None = None
 ) -> Standby:
-    """Warm a controller up, on the start of an episode of its task.
-
-    Args:
-        controller: Loaded and checked.
-        robot: The robot.
-        task: What it does.
-        said: More entries of its metadata.
+    """Warm a loaded controller up, on the start of an episode of its task; `said` adds entries to its metadata.
 
     Raises:
         ConfigError: It raised.
@@ -67,11 +61,13 @@ T = TypeVar("T")
 
 
 class ControllerSwitch(Generic[T]):
-    """Changes happen between two control steps only; `propose` may be called from any thread.
+    """Primary and fallback controller of a node, and a candidate that may replace them while it runs.
+
+    Changes happen between two control steps only; `propose` may be called from any thread.
 
     Attributes:
-        current: Whose turn it is.
-        fell_back: Why it is the fallback's; empty if it is not.
+        current: The controller that acts.
+        fell_back: Why the fallback acts; empty if it does not.
     """
 
     def __init__(
@@ -82,12 +78,12 @@ class ControllerSwitch(Generic[T]):
         refused: str = "",
         to_latch: int = REJECTIONS_TO_LATCH,
     ) -> None:
-        """Begin.
+        """Begin with the primary controller, or with the fallback.
 
         Args:
-            first: Who was asked for; None if it was refused.
-            fallback: Who takes over when that fails.
-            refused: Why there is no first.
+            first: The primary controller; None if it was refused.
+            fallback: Takes over when that fails.
+            refused: Why there is no primary controller.
             to_latch: So many refused commands in a row end a controller's turn.
         """
         current = first if first is not None else fallback
@@ -103,20 +99,16 @@ class ControllerSwitch(Generic[T]):
 
     @property
     def rejections(self) -> int:
-        """Commands that were refused so far, of whomever."""
+        """Refused commands so far, of any controller."""
         return self._past_rejections + self._rejections.total
 
     def propose(self, candidate: T) -> None:
-        """Let somebody take over at the next `apply`."""
+        """Let a controller take over at the next `apply`."""
         with self._lock:
             self._next = candidate
 
     def apply(self) -> bool:
-        """Between two steps: let the candidate take over, if there is one.
-
-        Returns:
-            Whether `current` is another now.
-        """
+        """Between two steps: let the candidate take over, if there is one; whether `current` is another now."""
         if self._next is None:
             return False
         with self._lock:
@@ -126,14 +118,7 @@ class ControllerSwitch(Generic[T]):
         return True
 
     def note(self, problem: str | None) -> str | None:
-        """Note the verdict on a command of `current`.
-
-        Args:
-            problem: Why it was refused, or None.
-
-        Returns:
-            The fault to latch, or None; where a fallback is left it takes over instead.
-        """
+        """Count a refused (reason) or accepted (None) command; returns the fault to latch if no fallback takes over."""
         fault = self._rejections.note(problem)
         return None if fault and self.fall_back(fault) else fault
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
+
+if TYPE_CHECKING:  # the command line checks areas without loading NumPy
+    from fulmar_core.robot import Robot
+    from fulmar_core.tasks import Task
 
 NO_AREA = (0.0, 0.0, 0.0, 0.0)  # an area without extent stands for none
 FARTHEST_M = 1000.0  # of a goal from the origin: a goal beyond it is a mistake of units or of frames
@@ -15,13 +18,10 @@ OUT_OF_BOUNDS = "out of bounds: "  # how the reason begins by which a controller
 
 
 def check_area(area: Sequence[float]) -> None:
-    """Refuse what is no area.
-
-    Args:
-        area: x_min, x_max, y_min, y_max [m].
+    """Reject an invalid area: x_min, x_max, y_min, y_max [m].
 
     Raises:
-        ValueError: If it is none.
+        ValueError: It has no extent, or is not finite.
     """
     good = len(area) == 4 and all(math.isfinite(side) for side in area)
     if not good or not (area[0] < area[1] and area[2] < area[3]):
@@ -31,7 +31,7 @@ def check_area(area: Sequence[float]) -> None:
 
 
 def outside(x: float, y: float, area: Sequence[float]) -> str:
-    """How a place lies outside an area; empty if it does not [m]."""
+    """Message that a place lies outside an area; empty if it does not [m]."""
     if is_inside(x, y, area):
         return ""
     return (
@@ -80,15 +80,10 @@ def _sides(area: Sequence[float]) -> str:
 
 
 def check_starts(robot: Robot, task: Task, *, training: bool = False) -> None:
-    """Refuse a robot whose geofence is smaller than the distances that a task draws its starts from.
-
-    Args:
-        robot: Has the geofence.
-        task: Draws the starts.
-        training: Of the starts for learning, not those for evaluation.
+    """Reject a robot whose geofence is smaller than the distances that a task draws its starts from.
 
     Raises:
-        ConfigError: Episodes would start beyond the geofence.
+        ConfigError: Episodes, those for learning if `training`, would start beyond the geofence.
     """
     key, farthest = task.farthest_start(training=training)
     if farthest > robot.limits.geofence:

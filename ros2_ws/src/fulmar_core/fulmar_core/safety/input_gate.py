@@ -1,4 +1,4 @@
-"""The gate before a controller: only believable, fresh measurements pass."""
+"""Gate before a controller: only believable, fresh measurements pass."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Measurement:
 class InputGate:
     """Checks measurements one after the other.
 
-    A jump of time or place is told once and begins a new epoch, so that neither a restarted plant nor one wrong stamp
-    shuts the gate for ever. `epoch` counts these jumps.
+    A jump of time or place is reported once and begins a new epoch, so that neither a restarted plant nor one wrong
+    stamp shuts the gate for ever. `epoch` counts these jumps.
     """
 
     def __init__(self, limits: Limits, *, frozen_after: int = FROZEN_AFTER, jump_m: float = math.inf) -> None:
@@ -49,14 +49,7 @@ class InputGate:
         self.epoch = 0
 
     def problem(self, measurement: Measurement) -> str | None:
-        """What is wrong with a measurement.
-
-        Args:
-            measurement: The next one.
-
-        Returns:
-            A reason for people, or None if it may be used.
-        """
+        """Reason, for people, why the next measurement is rejected; None if it may be used."""
         reason = self._frame_problem(measurement) or self._value_problem(measurement.state)
         if reason is None and self._last is not None:
             reason = self._stamp_problem(measurement, measurement.stamp_ns - self._last.stamp_ns)

@@ -1,4 +1,4 @@
-"""The watchdog next to the actuators: commands must keep coming."""
+"""Watchdog next to the actuators: commands must keep coming."""
 
 from __future__ import annotations
 
@@ -10,25 +10,12 @@ NO_COMMAND = "no command for"  # how the report of a trip begins
 
 
 def default_timeout(control_dt: float) -> float:
-    """Silence after which actuators go to their safe state.
-
-    Args:
-        control_dt: Time between commands, > 0 [s].
-
-    Returns:
-        Twice that, at least 0.2 s and at most 0.5 s [s].
-    """
+    """Silence that makes actuators safe: two command periods, at least 0.2 s and at most 0.5 s [s]."""
     return min(max(SHORTEST_S, 2.0 * control_dt), LONGEST_S)
 
 
 def checked_timeout(seconds: float) -> float:
-    """A timeout that somebody chose, if it protects.
-
-    Args:
-        seconds: Longest silence; 0 switches the watchdog off, which its owner must shout about [s].
-
-    Returns:
-        The same.
+    """A chosen timeout, if it protects; 0 switches the watchdog off, which its owner must shout about [s].
 
     Raises:
         SafetyError: If it is not a number from 0 to 0.5 s.
@@ -44,10 +31,7 @@ class Watchdog:
     """Says whether commands have stopped; knows no clock of its own."""
 
     def __init__(self, timeout_ns: int) -> None:
-        """Wait this long.
-
-        Args:
-            timeout_ns: Longest silence, > 0 [ns].
+        """Wait for `timeout_ns` [ns].
 
         Raises:
             SafetyError: If the timeout would not protect.

@@ -10,7 +10,7 @@ import numpy as np
 from fulmar_core.counter_rng import NOISE
 from fulmar_core.sensors.odometer import Channel, largest_reading
 
-INERTIAL = 4  # tells the unit's random numbers from those of the odometry
+INERTIAL = 4  # stream of the unit's random numbers, beside that of the odometry
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,7 @@ class InertialUnit:
         self._step = np.where(self._quantum > 0.0, self._quantum, 1.0)
 
     def reset(self, seed: int, number: int) -> None:
-        """Forget the past.
-
-        Args:
-            seed: Of the noise.
-            number: Of the episode; each has a bias and a scale error of its own.
-        """
+        """Begin episode `number` of a seed: each has a bias and a scale error of its own."""
         self._rng = np.random.default_rng((seed, number, NOISE, INERTIAL))
         self._bias = self._spec.part("bias_std") * self._rng.standard_normal(6)
         self._scale = 1.0 + self._spec.part("scale_std") * self._rng.standard_normal(6)

@@ -1,4 +1,4 @@
-"""Tasks: what a robot shall reach, what its controller sees, how it is judged.
+"""Tasks: goals, observations, rewards and errors.
 
 The explicit table of tasks. A new task is one file here, one line below and one YAML; a user's own is a class outside.
 """
@@ -42,14 +42,7 @@ _asked_for: set[str] = set()  # dotted paths that this process was given, in the
 
 
 def load_task(name: str) -> Task:
-    """Load a task by its name.
-
-    Args:
-        name: A name that `fulmar list tasks` shows, of `configs/tasks/<name>.yaml`, or the dotted path of a user's
-            own class, `mypackage.mymodule:MyTask`.
-
-    Returns:
-        The task.
+    """Load a task by a name that `fulmar list tasks` shows, or by the dotted path of a user's own class.
 
     Raises:
         ConfigError: Unknown name, a mistake in the file, or a class as of `load_own_task`.
@@ -69,11 +62,7 @@ def load_task(name: str) -> Task:
 
 
 def load_recorded_task(name: str, bag: Path) -> Task:
-    """Load the task that a bag names, without importing a class that nothing but the bag names.
-
-    Args:
-        name: As of `load_task`.
-        bag: The bag, for messages.
+    """Load the task that a bag names, as `load_task` does, without importing a class that only the bag names.
 
     Raises:
         ConfigError: As of `load_task`; or a class that this process has not loaded by `load_task` before.

@@ -60,9 +60,9 @@ class GoToPose(Task):
     tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PoseReward
-    fine_heading_deg: float = 0.0  # where the magnified heading error saturates; 0: it is not told [deg]
-    fine_speed: float = 0.0  # where magnified velocities saturate; 0: they are not told [m/s]
-    fine_yaw_rate: float = 0.0  # same of the turn rate; 0: it is not told [rad/s]
+    fine_heading_deg: float = 0.0  # where the magnified heading error saturates; 0: not observed [deg]
+    fine_speed: float = 0.0  # where magnified velocities saturate; 0: not observed [m/s]
+    fine_yaw_rate: float = 0.0  # same of the turn rate; 0: not observed [rad/s]
     # Instead of `reward_weights`, in training, where all failures leave no pose to hold (`stranding`).
     stranded_weights: PoseReward | None = None
 

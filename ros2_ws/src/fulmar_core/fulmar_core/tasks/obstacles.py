@@ -1,4 +1,4 @@
-"""Discs that stand about: where they are drawn, what controllers see of them, and what counts as touching."""
+"""Discs as obstacles: where they are drawn, how controllers observe them, and what counts as touching."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fulmar_core.tasks.shortest_paths import survey
 
 CANDIDATES = 8  # places tried for each obstacle; one that fits nowhere is left out
 FAR = 1e3  # where an obstacle is that is not there [m]
-SIGHT = 3.0  # vectors to obstacles are not told longer than this [m]
+SIGHT = 3.0  # longest vector to an obstacle in an observation [m]
 TOUCH = 0.01  # nearer than this counts as touching; contacts of simulators are as soft [m]
 
 

@@ -50,8 +50,8 @@ class PushBlock(Task):
     title: str
     episode_s: float  # length of an episode [s]
     block: Block
-    block_distance: Range  # of the block from its place when judged [m]
-    training_block_distance: Range  # when learning [m]
+    block_distance: Range  # of the block from its place in evaluation [m]
+    training_block_distance: Range  # same in training [m]
     start_distance: Range  # of the robot from the block; farther off where it would touch it [m]
     goal_area: float  # side of the square that places are drawn from [m]
     tolerance: Tolerance

@@ -34,7 +34,7 @@ class RaceGates(WaypointTask):
     """Pass between the posts of gates, each in the direction of the track.
 
     A gate is a pose: its middle, and the direction that counts. `reach` and the tolerance are half its width, for
-    controllers and for judges. It is passed when the way of one step crosses the line between its posts.
+    controllers and for evaluation. It is passed when the way of one step crosses the line between its posts.
     """
 
     kind: Literal["race_gates"]
@@ -54,7 +54,7 @@ class RaceGates(WaypointTask):
         return self.track.draw(draws)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
-        """Draw a start at rest and a closed course."""
+        """Draw a start at rest and a closed track."""
         start, goal = super().draw(draws, robot, training=training)
         return start, self.begun(goal, start)
 

@@ -1,4 +1,4 @@
-"""What every task is: one interface for learners, evaluations and the robot."""
+"""The interface of tasks, for learners, evaluations and the robot."""
 
 from __future__ import annotations
 

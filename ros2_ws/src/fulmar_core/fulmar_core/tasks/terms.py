@@ -26,8 +26,8 @@ FINE_TERMS = ("fine_goal_x_in_body", "fine_goal_y_in_body", "goal_distance")
 class Start:
     """Where episodes begin, relative to the goal; headings are uniform over the circle."""
 
-    distance: Range  # when judged [m]
-    training_distance: Range  # when learning; reaching down to 0 it holds near goals too [m]
+    distance: Range  # in evaluation [m]
+    training_distance: Range  # in training; reaching down to 0 it holds near goals too [m]
     goal_area: float  # side of the square that goals are drawn from [m]
 
     def __post_init__(self) -> None:
@@ -40,15 +40,7 @@ class Start:
             raise ValueError("'goal_area' must not be negative.")
 
     def draw(self, draws: Draws, *, training: bool) -> tuple[PlanarState, Array]:
-        """Draw starts at rest, and goal poses.
-
-        Args:
-            draws: One row for each episode; six numbers are drawn.
-            training: Use the training distances.
-
-        Returns:
-            Start states, shapes (worlds,), and goals (worlds, 3) [m, m, rad].
-        """
+        """Draw starts at rest, shapes (worlds,), and goal poses (worlds, 3) [m, m, rad]; six numbers an episode."""
         low, high = self.training_distance if training else self.distance
         place = draws.uniform(-0.5 * self.goal_area, 0.5 * self.goal_area, 2)
         angles = draws.uniform(-math.pi, math.pi, 3)

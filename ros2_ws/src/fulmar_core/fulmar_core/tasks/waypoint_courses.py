@@ -10,12 +10,12 @@ import numpy as np
 from fulmar_core.counter_rng import Draws
 from fulmar_core.references.race_track import draw_corners
 
-CANDIDATES = 12  # places tried for each waypoint, then their mirror images; all fail for 2 courses in 100,000
+CANDIDATES = 12  # places tried for each waypoint, then their mirror images; all fail for 2 in 100,000
 
 
 @dataclass(frozen=True)
 class WaypointCourse:
-    """A closed course of waypoints in a square."""
+    """A closed sequence of waypoints in a square."""
 
     count: int  # waypoints; after the last one the first comes again
     spacing: tuple[float, float]  # from each to the next [m]
@@ -28,14 +28,7 @@ class WaypointCourse:
             )
 
     def draw(self, draws: Draws) -> np.ndarray:
-        """Draw courses.
-
-        Args:
-            draws: One row for each.
-
-        Returns:
-            Waypoints, shape (worlds, count, 2) [m].
-        """
+        """Draw waypoints, shape (worlds, count, 2) [m]."""
         half, n = 0.5 * self.area, draws.worlds
         places = [np.asarray(draws.uniform(-half, half, 2))]
         low, high = self.spacing
@@ -56,7 +49,7 @@ class WaypointCourse:
 
 
 def headings_along(places: np.ndarray) -> np.ndarray:
-    """Heading at each waypoint of a closed course: from the one before to the one after, shape (..., count) [rad]."""
+    """Heading at each of closed waypoints: from the one before to the one after, shape (..., count) [rad]."""
     way = np.roll(places, -1, axis=-2) - np.roll(places, 1, axis=-2)
     return np.asarray(np.arctan2(way[..., 1], way[..., 0]))
 
@@ -79,14 +72,7 @@ class RaceTrack:
             )
 
     def draw(self, draws: Draws) -> np.ndarray:
-        """Draw tracks.
-
-        Args:
-            draws: One row for each.
-
-        Returns:
-            Waypoints in the order of driving, about the origin, shape (worlds, most corners, 2) [m].
-        """
+        """Draw waypoints in the order of driving, about the origin, shape (worlds, most corners, 2) [m]."""
         corners, count = draw_corners(draws, fewest=self.corners[0], most=self.corners[1], size=self.size)
         return _with_middles(corners, count)
 

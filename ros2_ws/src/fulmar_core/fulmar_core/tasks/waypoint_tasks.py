@@ -34,12 +34,7 @@ _SURE = 3.0  # standard deviations of the positioning that a reach stays within 
 
 
 def path_terms(seen: int, *, heading: bool) -> tuple[str, ...]:
-    """Names of the observation terms.
-
-    Args:
-        seen: How many targets a controller sees, from the current one on, 1 to 3.
-        heading: Whether it sees their headings too.
-    """
+    """Names of the observation terms of 1 to 3 targets, from the current one on, with or without their headings."""
     each = (*PLACE_TERMS, *TURN_TERMS) if heading else PLACE_TERMS
     return (*MOTION_TERMS, *(f"{target}_{name}" for target in IN_ORDER[:seen] for name in each))
 
@@ -72,11 +67,9 @@ class WaypointTask(Task):
     title: str
     episode_s: float  # length of an episode [s]
     start_distance: tuple[float, float]  # from the first target [m]
-    start_cone_deg: float = (
-        180.0  # how far from straight behind the first target; 180: on any side of it [deg]
-    )
-    reach: float  # within which a controller takes a target for reached; `fitted` may widen it [m]
-    tolerance: Tolerance  # within which a judge does
+    start_cone_deg: float = 180.0  # from straight behind the first target; 180: on any side of it [deg]
+    reach: float  # radius within which a target counts as reached; `fitted` may widen it [m]
+    tolerance: Tolerance  # same, for evaluation
     required: int = field()  # targets that make an episode a success; a file has to say it
     reward_weights: WaypointReward
 
@@ -92,14 +85,7 @@ class WaypointTask(Task):
             raise ValueError("'start_cone_deg' must lie in [0, 180].")
 
     def fitted(self, robot: Robot) -> Self:
-        """The task as a robot does it: who knows its place better may take more for reached.
-
-        Args:
-            robot: Its odometry says how well it knows its place.
-
-        Returns:
-            The task with a reach from its own up to the tolerance [m].
-        """
+        """The task with a radius from `reach` up to the tolerance, by how well the robot's odometry knows its place."""
         reach = self.tolerance.position - _SURE * robot.sensors.odometry.position.std
         return replace(self, reach=max(self.reach, reach))
 
@@ -112,7 +98,7 @@ class WaypointTask(Task):
         """Draw where the targets are, shape (worlds, k, 2) [m]."""
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
-        """Draw a start at rest and a closed course."""
+        """Draw a start at rest and closed waypoints."""
         places = self.places(draws)
         heading = headings_along(places)
         distance = np.asarray(draws.uniform(*self.start_distance))
@@ -149,7 +135,7 @@ class WaypointTask(Task):
             goal: Before this step.
             state: After it, shapes (...,).
             radius: How near counts [m].
-            strict: TargetCounter the heading, where it counts, as a controller does and not as a judge.
+            strict: Check the heading, where it counts, as a controller does and not as evaluation does.
 
         Returns:
             Truth values, shape (...,).
@@ -204,9 +190,7 @@ class PoseWaypointReward(WaypointReward):
 class PoseWaypointTask(WaypointTask):
     """Pass through poses: a target counts where place and heading are right at the same time."""
 
-    reach_heading_deg: (
-        float  # a controller takes a heading for right within this, less than the tolerance [deg]
-    )
+    reach_heading_deg: float  # a heading counts as right for a controller, within the tolerance [deg]
     reward_weights: PoseWaypointReward
 
     heads: ClassVar[bool] = True
@@ -248,7 +232,7 @@ def _way_to(state: PlanarState, target: Array, distance: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class GoThroughPositions(WaypointTask):
-    """Pass through positions of a random course in their order.
+    """Pass through random positions in their order.
 
     Three of them are seen, one more than in RoboRAN: where a boat leaves a waypoint to depends on the next two.
     """
@@ -266,7 +250,7 @@ class GoThroughPositions(WaypointTask):
 
 @dataclass(frozen=True, kw_only=True)
 class GoThroughPoses(PoseWaypointTask):
-    """Pass through poses of a random course in their order; each looks from the one before to the one after."""
+    """Pass through random poses in their order; each looks from the one before to the one after."""
 
     kind: Literal["go_through_poses"]
     course: WaypointCourse
