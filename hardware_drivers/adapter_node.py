@@ -62,10 +62,6 @@ class AdapterNode(Node):
     def __init__(self, request_exit: RequestExit, *, cli_args: list[str] | None = None) -> None:
         """Create subscription and publisher.
 
-        Args:
-            request_exit: Ends the process.
-            cli_args: ROS arguments of this node alone, where it shares a process.
-
         Raises:
             ConfigError: A parameter is wrong, or the hardware file has another driver.
         """

@@ -45,9 +45,6 @@ def output_lines(
         active_low: Whether a line is active when its pin is low.
         patience_s: Wait so long for a chip that is not there yet [s].
 
-    Returns:
-        The lines.
-
     Raises:
         DeviceError: There is no such chip or line, or another process has it.
     """

@@ -178,9 +178,6 @@ class Decoder:
     def feed(self, data: bytes) -> list[list[str]]:
         """Take bytes.
 
-        Args:
-            data: The next ones.
-
         Returns:
             Fields of the sentences that are complete now, in their order; the first field is the name.
         """

@@ -78,9 +78,6 @@ def base_control(speed: float, turn_rate: float) -> bytes:
     Args:
         speed: Ahead [m/s].
         turn_rate: To the left [rad/s].
-
-    Returns:
-        Bytes to send.
     """
     ahead, half = 1e3 * speed, 5e2 * TRACK
     if abs(turn_rate) < 1e-4:
@@ -108,14 +105,7 @@ class Decoder:
         self.lost = 0
 
     def feed(self, data: bytes) -> list[Packet]:
-        """Take bytes.
-
-        Args:
-            data: The next ones.
-
-        Returns:
-            Packets that are complete now, in their order.
-        """
+        """Take bytes; returns the packets that are complete now, in their order."""
         self._pending += data
         found = []
         while (payload := self._next()) is not None:

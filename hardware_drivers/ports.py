@@ -122,9 +122,6 @@ def open_port(address: str, baud: int, patience_s: float) -> Port:
         baud: Of a serial port.
         patience_s: Try again for so long [s].
 
-    Returns:
-        The open port.
-
     Raises:
         ConfigError: The address is malformed.
         DeviceError: It cannot be opened.

@@ -17,11 +17,6 @@ class TopicDriver(DeviceDriver):
     """Publishes every command; our watchdog thereby also stops nodes that have none."""
 
     def __init__(self, send: Send) -> None:
-        """Prepare.
-
-        Args:
-            send: Publishes a command within the actuators' limits.
-        """
         self._send = send
 
     def write(self, command: np.ndarray) -> None:

@@ -25,9 +25,6 @@ def channels(wiring: Sequence[str], left: float, right: float) -> tuple[float, f
         wiring: Side that each channel turns, `-left` or `-right` where a positive value turns it backwards.
         left: Command of the left side, of any unit.
         right: Same of the right side.
-
-    Returns:
-        Value of each channel, of the same unit.
     """
     values = {"left": left, "right": right}
     first, second = (

@@ -17,12 +17,6 @@ class MockBackend:
     """One robot in the core's dynamics, measured without noise, without an inertial unit."""
 
     def __init__(self, robot: Robot, *, things: tuple[Thing, ...] = ()) -> None:
-        """Prepare for `reset`.
-
-        Args:
-            robot: The robot.
-            things: Objects in the world.
-        """
         self.robot, self._things = robot, things
         self._world = OneWorld(robot, noisy=False)
 

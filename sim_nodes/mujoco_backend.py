@@ -25,13 +25,6 @@ class MujocoBackend:
     """One robot in MuJoCo."""
 
     def __init__(self, robot: Robot, *, sensor_noise: bool = True, things: tuple[Thing, ...] = ()) -> None:
-        """Build the model.
-
-        Args:
-            robot: The robot.
-            sensor_noise: Whether odometry and inertial unit have the noise of the robot's YAML.
-            things: Objects in the world.
-        """
         self.robot = robot
         self._noisy, self._things = sensor_noise, things
         self._unit = InertialUnit(robot.sensors.imu)

@@ -36,12 +36,6 @@ class OnAir:
     """
 
     def __init__(self, backend: CanStand, scenario: Scenario) -> None:
-        """Put a simulator on air.
-
-        Args:
-            backend: The simulator.
-            scenario: Says when the bearing carries the robot, and when a hand holds it.
-        """
         self.robot, self._backend, self._scenario = backend.robot, backend, scenario
         self._safe = self.robot.actuators.safe_command
         self._lock = threading.Lock()

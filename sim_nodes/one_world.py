@@ -31,12 +31,6 @@ class OneWorld:
     """
 
     def __init__(self, robot: Robot, *, noisy: bool) -> None:
-        """Prepare for `reset`.
-
-        Args:
-            robot: The robot.
-            noisy: Whether the odometry is as the robot's YAML says, or perfect.
-        """
         self._robot, self._noisy = robot, noisy
         self._safe = np.array(robot.actuators.safe_command)[:, None]
 

@@ -17,12 +17,6 @@ CAMPAIGN_FILE = "campaign.json"
 def run_campaign(jobs: Sequence[Job], executor: Executor, out: Path, watch: Watch) -> dict[str, Any]:
     """Run one job for each seed, and write what came out.
 
-    Args:
-        jobs: Jobs that differ in nothing but seed and folder.
-        executor: Runs them.
-        out: Folder of the campaign.
-        watch: Receives their progress.
-
     Returns:
         The content of `campaign.json`: each seed's success, their mean and spread, and the best run.
     """
@@ -73,12 +67,7 @@ def _rank(outcome: Outcome) -> tuple[float, float]:
 
 
 def campaign_text(result: dict[str, Any], out: Path) -> str:
-    """A table of `run_campaign`'s result for people.
-
-    Args:
-        result: Result.
-        out: Folder of the campaign.
-    """
+    """A table of `run_campaign`'s result for people."""
     lines = [f"{'seed':>6}  {'held out':>8}  {'MuJoCo':>7}  {'steps':>12}"]
     for each in result["seeds"]:
         if "error" in each:

@@ -27,13 +27,7 @@ _NOT_SAVED = ("_last_lstm_states",)  # not saved by Stable-Baselines3
 
 
 def save_checkpoint(path: Path, learner: BaseAlgorithm, more: dict[str, Any]) -> None:
-    """Write a checkpoint, which replaces an older one only when it is complete.
-
-    Args:
-        path: Its file.
-        learner: Between two updates.
-        more: Other values to restore.
-    """
+    """Write a checkpoint, which replaces an older one only when it is complete."""
     normaliser = learner.get_vec_normalize_env()
     assert normaliser is not None
     worlds = normaliser.venv

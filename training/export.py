@@ -39,9 +39,6 @@ def export(run: Path, out: Path) -> Passport:
         run: Run folder that `train` left.
         out: Folder of the bundle.
 
-    Returns:
-        The sealed passport.
-
     Raises:
         ConfigError: `run` is no run folder, or its robot or task has changed since.
     """

@@ -60,11 +60,6 @@ def fallback_settings(settings: TrainingSettings, robot: Robot, task: Task) -> T
 def load_fallback(run: Path, robot: Robot, settings: TrainingSettings) -> FallbackPolicy:
     """Load the fallback policy that a finished run left.
 
-    Args:
-        run: Its own run folder.
-        robot: The robot.
-        settings: Its training settings.
-
     Raises:
         ConfigError: Its scenario is missing.
         FileNotFoundError: The run has left no network.

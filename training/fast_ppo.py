@@ -230,11 +230,6 @@ class FastMlp:
     def __init__(self, hidden: Iterable[nn.Module], head: nn.Linear, precision: torch.dtype) -> None:
         """Take the layers of a policy.
 
-        Args:
-            hidden: Linear layers, each followed by tanh.
-            head: Layer of the outputs.
-            precision: Number type of hidden layers.
-
         Raises:
             ValueError: If the hidden layers are anything else.
         """

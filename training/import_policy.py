@@ -18,8 +18,7 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.seeds import HELD_OUT_SEED
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
-from training.agent_config import Activations, find_activations
-from training.foreign_checkpoint import FeedForward, Format, read_checkpoint
+from training.foreign_checkpoint import Activations, FeedForward, Format, find_activations, read_checkpoint
 from training.foreign_onnx import ForeignOnnx
 from training.golden_limits import with_limits
 from training.onnx_graph import Graph, Tensor, open_model
@@ -58,9 +57,6 @@ def import_policy(
         activation: Between the layers of a checkpoint; by default from the run's `params/agent.yaml`.
         output_activation: After the last layer of a checkpoint, "none" or "tanh"; by default likewise.
         command: The command line, for the passport.
-
-    Returns:
-        The sealed passport.
 
     Raises:
         ConfigError: The file, or what was asked for, does not fit.

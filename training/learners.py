@@ -124,9 +124,6 @@ def build_ppo(
         env: Environment, usually normalised.
         seed: Seed of weights and action sampling.
         tensorboard: Folder for TensorBoard, or None.
-
-    Returns:
-        The learner.
     """
     sizes = list(settings.hidden)
     policy: dict[str, Any] = {"net_arch": {"pi": sizes, "vf": sizes}, "activation_fn": torch.nn.Tanh}

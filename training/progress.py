@@ -182,14 +182,6 @@ class WandbCurves(KVWriter):
     """Sends every number that is logged; WANDB_MODE=offline keeps them in the run folder."""
 
     def __init__(self, folder: Path, *, project: str, name: str, settings: dict[str, Any]) -> None:
-        """Begin a run there.
-
-        Args:
-            folder: Run folder, where wandb keeps its files.
-            project: Name of the project.
-            name: Name of the run.
-            settings: What it is made with.
-        """
         import wandb
 
         folder.mkdir(parents=True, exist_ok=True)

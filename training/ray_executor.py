@@ -14,7 +14,7 @@ import ray
 from fulmar_core.errors import FulmarError
 from training.executors import Watch
 from training.jobs import Job, Outcome, run_job
-from training.progress import Speed
+from training.progress import ProgressFile
 
 POLL_S = 0.5
 
@@ -79,31 +79,18 @@ class _Board:
         return self._progress
 
 
-class _BoardWatcher:
+class _BoardWatcher(ProgressFile):
     """Writes progress to the board, now and then."""
 
     EVERY_S = 1.0
 
     def __init__(self, number: int, board: Any) -> None:
-        self._number, self._board, self._speed, self._next = number, board, Speed(), 0.0
-        self._progress: dict[str, Any] = {}
+        super().__init__(Path())
+        self._number, self._board = number, board
 
-    def begin(self) -> None:
-        """No progress yet."""
-
-    def advance(self, share: float, elapsed_s: float, steps: int) -> None:
-        """Note how far it is."""
-        self._progress |= {"share": share, "steps": steps, "rate": self._speed.update(elapsed_s, steps)}
-        if time.monotonic() >= self._next:
-            self._next = time.monotonic() + self.EVERY_S
-            self._board.write.remote(self._number, self._progress)
-
-    def evaluated(self, elapsed_s: float, success: float) -> None:
-        """Note the latest check."""
-        self._progress["success"] = success
-
-    def end(self) -> None:
-        """The record says the rest."""
+    def _write(self) -> None:
+        self._next = time.monotonic() + self.EVERY_S
+        self._board.write.remote(self._number, self._progress)
 
 
 @ray.remote(max_retries=0)

@@ -101,9 +101,6 @@ LOCK_FILE = "learning.lock"
 def learning_in(run: Path) -> Iterator[None]:
     """Lock a run folder for one training; the lock ends with the context or the process.
 
-    Args:
-        run: Made if need be.
-
     Raises:
         ConfigError: Another process trains there.
     """

@@ -292,9 +292,6 @@ def load_training_settings(robot: Robot, task: Task, name: str | None = None) ->
         name: A file of `configs/training`, or a path to a YAML file; by default `<robot>_<task>`, if there is one,
             else the one of the robot's family of actuators, such as `thrusters`.
 
-    Returns:
-        The settings.
-
     Raises:
         ConfigError: No such file, a mistake in it, or an algorithm that cannot drive this robot.
     """
